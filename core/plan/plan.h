@@ -1,0 +1,56 @@
+// A scene made ready to run, with the reasons for each choice. Never changes once made; shared between threads.
+// Not a run: it has no state. Used by solve/ and simulation/.
+#ifndef CORE_PLAN_PLAN_H
+#define CORE_PLAN_PLAN_H
+
+#include "core/base/field.h"
+#include "core/contact/identify.h"
+#include "core/scene/scene.h"
+
+// One choice of the planner, for people. Texts are static or live as long as the Decisions.
+typedef struct Decision {
+    char *about, *chose, *why;
+    double value;  // NAN if there is none
+    char *unit;    // NULL if there is none
+} Decision;
+typedef struct Decisions {
+    Decision *at;
+    size_t count;
+} Decisions;
+
+// What a buffer came to for this pair of masses: one per damper and side. What is not known is NAN.
+typedef struct Derived {
+    uint64_t damper;  // from 1
+    int side;         // Side
+    char *material;   // "sponge@1"; NULL if numbers were given
+    double restitution, contact_time, effective_mass, stiffness, damping, damping_ratio;
+} Derived;
+typedef struct DerivedList {
+    Derived *at;
+    size_t count;
+} DerivedList;
+
+typedef struct Warning {
+    char *pointer, *detail;
+} Warning;
+typedef struct Warnings {
+    Warning *at;
+    size_t count;
+} Warnings;
+
+// The readable part of a plan: the API's "plan" object.
+typedef struct PlanReport {
+    char *contact_model;  // "none" where there is no damper
+    char *solver;
+    Decisions decisions;
+    DerivedList derived;
+} PlanReport;
+
+extern const Field plan_report_fields[], derived_fields[], decision_fields[], warning_fields[];
+
+Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value, const char *unit,
+                     const char *format, ...) __attribute__((format(printf, 6, 7)));
+
+#endif

@@ -1,0 +1,58 @@
+// A free mass between two buffered stops, and the buffer's numbers.
+// Used by scene/ and plan/.
+#ifndef CORE_SCENE_DAMPER_H
+#define CORE_SCENE_DAMPER_H
+
+#include <stdint.h>
+
+#include "core/base/field.h"
+#include "core/contact/contact.h"
+
+// e and T_c as measured, or k_b and c_b as known. `material` alone is a name yet to be resolved; beside numbers
+// ("sponge@1") it says where they come from.
+typedef struct Buffer {
+    char *material;
+    double restitution;   // e [-]
+    double contact_time;  // T_c [s]
+    double stiffness;     // k_b [N/m]
+    double damping;       // c_b [N s/m]
+} Buffer;
+
+typedef enum Side { SIDE_LEFT, SIDE_RIGHT } Side;
+extern const char *const side_names[];
+
+// Stops at u = offset +- clearance / 2, u being the free mass's displacement relative to the structure.
+typedef struct Damper {
+    double mass;       // m [kg]
+    double clearance;  // d [m]
+    double offset;     // of the stops' middle [m]
+    double position;   // initial, relative to that middle [m]
+    double velocity;   // initial, relative to the structure [m/s]
+    uint64_t storey;   // from 1; COUNT_ABSENT: the top one
+    Buffer buffer;     // both sides, or
+    Buffer left_buffer;
+    Buffer right_buffer;
+    int identified_for;  // what pair e and T_c belong to
+} Damper;
+
+typedef struct Dampers {
+    Damper *at;
+    size_t count;
+} Dampers;
+
+extern const Field buffer_fields[];
+extern const Field damper_fields[];
+
+// The buffer of one side: that side's own, else the common one.
+const Buffer *damper_buffer(const Damper *damper, Side side);
+
+bool buffer_is_given(const Buffer *buffer);
+
+// Faults that rows cannot see, below `pointer`.
+Status damper_complete(Damper *damper, const Contact *contact, size_t storeys, const char *pointer,
+                       Problem *problem);
+
+// Which law "auto" stands for: spring_damper wherever a contact time or k, c is known, else impulse.
+const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact);
+
+#endif

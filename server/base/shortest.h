@@ -1,0 +1,22 @@
+// The shortest digits that read back to the same double, by dragonbox. The one door to its C++.
+// Used by bytes.c and the encoders.
+#ifndef SERVER_BASE_SHORTEST_H
+#define SERVER_BASE_SHORTEST_H
+
+#include <stddef.h>
+
+enum { SHORTEST_SIZE = 32 };
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Writes a finite double as valid JSON ("0.015", "1e-9", "10001", "-0.5"; plain digits for exponents -5..16,
+// else d.ddde±x) without a NUL; returns the length, at most SHORTEST_SIZE.
+size_t shortest_write(char *target, double value);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,19 @@
+// Field rows printed as JSON Schema 2020-12: types, units, ranges, defaults, docs.
+// Used by the schema target, GET /schemas and tests.
+#ifndef SERVER_CODEC_DESCRIBE_H
+#define SERVER_CODEC_DESCRIBE_H
+
+#include "core/base/field.h"
+#include "server/base/bytes.h"
+
+// A whole schema document, indented, ending in a newline. Units stand under "x-unit".
+void describe_schema(Bytes *bytes, const char *id, const char *title, const Field *fields);
+
+// The documents that exist: "scene", "material" ...; at(NULL-terminated). One line each in describe.c.
+typedef struct SchemaDocument {
+    const char *name, *title;
+    const Field *fields;
+} SchemaDocument;
+extern const SchemaDocument schema_documents[];  // ends with name == NULL
+
+#endif

@@ -1,0 +1,54 @@
+// One run asked for: state, progress, cancel. Counted and locked; read it through job_show.
+#ifndef SERVER_JOBS_JOB_H
+#define SERVER_JOBS_JOB_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/base/status.h"
+
+typedef struct Job Job;
+
+typedef enum JobState {
+    JOB_ACCEPTED,
+    JOB_RUNNING,
+    JOB_SUCCESSFUL,
+    JOB_FAILED,
+    JOB_DISMISSED,
+} JobState;
+extern const char *const job_state_names[];
+
+// Called once, from any thread, when something a waiter waits for has happened. Must be quick.
+typedef struct Waker {
+    void *context;
+    void (*wake)(void *context);
+} Waker;
+
+// A copy of what a job is now. Texts are owned by the show (job_show_clear).
+typedef struct JobShow {
+    char id[40];
+    JobState state;
+    double progress;  // percent
+    bool is_cached;
+    char result[72];  // "" while there is none
+    int64_t created_unix_ms, started_unix_ms, finished_unix_ms;  // 0: not yet
+    double queued, run, total;  // [s]
+    char *problem;    // problem+json of a failed job; NULL
+    char *plan;       // JSON; NULL while unknown
+    char *summary;    // JSON; NULL while unknown
+    char *warnings;   // JSON array
+    char *title;      // NULL if none
+} JobShow;
+
+Job *job_hold(Job *job);
+void job_drop(Job *job);
+bool job_is_finished(Job *job);
+Status job_show(Job *job, JobShow *show);
+void job_show_clear(JobShow *show);
+
+// Has `waker` called once when the job finishes (at once if it is finished). False without memory.
+bool job_watch(Job *job, const Waker *waker);
+// Takes it back; after this returns it will not be called.
+void job_unwatch(Job *job, const Waker *waker);
+
+#endif

@@ -1,0 +1,77 @@
+// The database as the rest of the server sees it: jobs, results, materials. One writer thread commits whatever is
+// queued (durable when a call returns), each reader has its own connection. No SQL outside this room.
+#ifndef SERVER_STORE_STORE_H
+#define SERVER_STORE_STORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/base/field.h"
+#include "core/base/status.h"
+
+typedef struct Store Store;
+
+// Opens (and makes or migrates) DIR/impactd.db; `directory` NULL is a private database in memory, for `impactd run`.
+// STATUS_CONFLICT if another daemon has it open.
+Status store_open(const char *directory, Store **store, Problem *problem);
+void store_close(Store *store);
+
+// --- materials -------------------------------------------------------------------------------------------
+typedef struct MaterialRevision {
+    char *slug, *name, *status, *source;
+    uint64_t revision;
+    double restitution, contact_time;
+} MaterialRevision;
+typedef struct MaterialRevisions {
+    MaterialRevision *at;
+    size_t count;
+} MaterialRevisions;
+extern const Field material_fields[];
+// revision 0: the approved head, else the newest draft. STATUS_NOT_FOUND. Cleared by fields_clear(material_fields).
+Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
+                      Problem *problem);
+Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
+void material_revisions_clear(MaterialRevisions *materials);
+
+// --- jobs ------------------------------------------------------------------------------------------------
+typedef struct JobRow {
+    char id[40];
+    int state;        // JobState
+    char result[72];
+    bool is_cached;
+    int64_t created_unix_ms, started_unix_ms, finished_unix_ms;
+    double queued, run, total;  // [s]
+    char *scene;      // canonical JSON, resolved
+    char *problem, *warnings, *title;
+} JobRow;
+void job_row_clear(JobRow *row);
+Status store_job_add(Store *store, const JobRow *row, Problem *problem);
+Status store_job_update(Store *store, const JobRow *row, Problem *problem);  // state, times, problem, result
+Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
+// Newest first; `before` is an id to go on after, or NULL.
+typedef struct JobRows {
+    JobRow *at;
+    size_t count;
+} JobRows;
+Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows, Problem *problem);
+Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem);  // oldest first
+void job_rows_clear(JobRows *rows);
+
+// --- results ---------------------------------------------------------------------------------------------
+// Everything of a result but its series, which is computed anew when asked for.
+typedef struct ResultRow {
+    char id[72];
+    char *engine, *scene, *plan, *summary, *warnings, *energy, *impacts, *psd;  // JSON documents
+    uint64_t count;       // samples
+    double sample_rate;
+    int64_t created_unix_ms;
+} ResultRow;
+void result_row_clear(ResultRow *row);
+// Saves the result and the finished job in one transaction; a result already there stays as it is.
+Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
+                         Problem *problem);
+Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
+bool store_result_exists(Store *store, const char *id);
+
+#endif
