@@ -40,6 +40,7 @@ struct Listener {
     ListenerSettings settings;
     struct MHD_Daemon *daemon;
     Hall *hall;
+    char url[96];
     uint64_t first_id;
     atomic_uint_fast64_t requests;
     atomic_size_t exchanges; // under way
@@ -94,6 +95,7 @@ static enum MHD_Result send_reply(Exchange *exchange, struct MHD_Connection *con
     add_header(response, MHD_HTTP_HEADER_CONTENT_RANGE, reply->content_range);
     add_header(response, MHD_HTTP_HEADER_RETRY_AFTER, retry_after);
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
+    add_header(response, MHD_HTTP_HEADER_VARY, reply->varies_by_accept ? "Accept" : NULL);
     add_header(response, "X-Request-Id", exchange->request.id);
     add_header(response, "X-Content-Type-Options", "nosniff");
     add_header(response, "Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
@@ -161,6 +163,9 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     request->waker = seat_waker(exchange->seat);
     request->body_most = listener->settings.body_most;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
+
+    if (request->host == NULL)
+        request->host = listener->url + strlen("http://");
 
     Problem problem;
     problem_clear(&problem);
@@ -365,6 +370,7 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
     if (status == STATUS_OK)
         status = address_open(&made->settings.address, &descriptor, problem);
     if (status == STATUS_OK) {
+        address_url(&made->settings.address, made->url);
         made->daemon = MHD_start_daemon(
             MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_TURBO | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC,
             0, NULL, NULL, on_request, made, MHD_OPTION_LISTEN_SOCKET, descriptor,
@@ -387,8 +393,8 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
     return STATUS_OK;
 }
 
-void listener_url(const Listener *listener, char target[96]) {
-    address_url(&listener->settings.address, target);
+const char *listener_url(const Listener *listener) {
+    return listener->url;
 }
 
 void listener_stop(Listener *listener, int grace_ms) {

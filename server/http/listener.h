@@ -19,7 +19,7 @@ typedef struct ListenerSettings {
 // Fails as address_open does.
 Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem);
 // "http://127.0.0.1:8080", with the port that was chosen.
-void listener_url(const Listener *listener, char target[96]);
+const char *listener_url(const Listener *listener);
 // Takes no more connections, ends all waiting and lets requests under way finish for at most
 // `grace_ms`. When this returns nothing is being answered.
 void listener_stop(Listener *listener, int grace_ms);

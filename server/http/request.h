@@ -28,7 +28,8 @@ typedef struct Request {
     size_t body_size;
     bool is_too_large; // the body was over its limit and is not here
     size_t body_most;  // that limit
-    const char *host, *content_type, *accept, *prefer, *if_none_match, *if_range,
+    const char *host;  // as the client names us, else our address
+    const char *content_type, *accept, *prefer, *if_none_match, *if_range,
         *range;         // NULL if absent
     char id[24];        // for the client and the journal
     int64_t started_ns; // monotonic
@@ -71,6 +72,7 @@ typedef struct Reply {
     char content_range[80];
     int retry_after; // seconds, -1 for none
     bool accepts_ranges;
+    bool varies_by_accept; // the same path has several representations
     int wait_ms; // > 0: not a reply yet; call the handler again when woken or after so long
     void *keep;  // with wait_ms: handed back as request->kept; `forget` frees it, always, after the
     void (*forget)(void *keep); // next call of the handler or when the client has gone
