@@ -95,7 +95,9 @@ int main(void) {
         printf("%-20s %9.2f %10.2f %8zu %10.2f %12.2f\n", cases[c].name, run_ns, run_ns / set_ns, impacts,
                plan_ns / 1e3, base_ns);
         simulation_clear(&simulation);
-        fields_clear(warning_fields, &warnings);
+        for (size_t i = 0; i < warnings.count; i++)
+            fields_clear(warning_fields, &warnings.at[i]);
+        free(warnings.at);
     }
     free(block);
     free(copy);
