@@ -74,7 +74,8 @@ typedef struct Plan {
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan, Problem *problem);
 void plan_free(Plan *plan);
 
-// Add one line; texts are copied. Lines beyond 256 are left out. STATUS_NO_MEMORY leaves the list as it was.
+// Add one line; texts are copied. Lines beyond 256 are left out, and all where the
+// list is NULL. STATUS_NO_MEMORY leaves the list as it was.
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value, const char *unit,
