@@ -257,28 +257,10 @@ Status fields_copy(const Field *fields, const void *source, void *target) {
     return status;
 }
 
-static bool is_empty(const Field *fields, const void *item) {
-    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        const void *member = member_of(field, item);
-        switch (field->kind) {
-        case FIELD_KIND_FLAG:
-            break;
-        case FIELD_KIND_ITEM:
-        case FIELD_KIND_BASE:
-            if (!is_empty(field->fields, member))
-                return false;
-            break;
-        default:
-            if (!field_is_absent(field, item))
-                return false;
-            break;
-        }
-    }
-    return true;
-}
+static bool all_empty(const Field *fields, const void *item);
 
-bool field_is_absent(const Field *field, const void *item) {
-    const void *member = member_of(field, item);
+// Whether the member holds nothing, whatever its presence says of that.
+static bool is_empty(const Field *field, const void *member) {
     switch (field->kind) {
     case FIELD_KIND_REAL:
         return isnan(*(const double *)member);
@@ -297,13 +279,35 @@ bool field_is_absent(const Field *field, const void *item) {
     case FIELD_KIND_VARIANT:
         return *(Variant *const *)member == NULL;
     case FIELD_KIND_ITEM:
-        return field->presence != PRESENCE_DEFAULT && is_empty(field->fields, member);
-    case FIELD_KIND_FLAG:
     case FIELD_KIND_BASE:
+        return all_empty(field->fields, member);
+    case FIELD_KIND_FLAG:
     case FIELD_KIND_END:
         break;
     }
-    return false;
+    return true;
+}
+
+static bool all_empty(const Field *fields, const void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
+        if (!is_empty(field, member_of(field, item)))
+            return false;
+    return true;
+}
+
+bool field_is_absent(const Field *field, const void *item) {
+    switch (field->kind) {
+    case FIELD_KIND_FLAG:
+    case FIELD_KIND_BASE:
+        return false;
+    case FIELD_KIND_REALS:
+    case FIELD_KIND_TEXTS:
+    case FIELD_KIND_LIST:
+    case FIELD_KIND_ITEM:
+        return field->presence != PRESENCE_DEFAULT && is_empty(field, member_of(field, item));
+    default:
+        return is_empty(field, member_of(field, item));
+    }
 }
 
 Variant *variant_new(const Kind *kind) {

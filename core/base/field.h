@@ -121,13 +121,17 @@ struct Field {
 #define FIELD_AT(Type, member, Wanted) \
     (offsetof(Type, member) +          \
      0 * sizeof(char[_Generic(&((Type *)0)->member, Wanted *: 1, default: -1)]))
-#define FIELD_LIST_AT(Type, member)                                                          \
-    (offsetof(Type, member) + 0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) && \
-                                                      offsetof(Type, member.count) -         \
-                                                              offsetof(Type, member) ==      \
-                                                          offsetof(List, count)              \
-                                                  ? 1                                        \
-                                                  : -1]))
+// A typed twin of List: a pointer called `at`, then a size_t called `count`, and nothing else.
+#define FIELD_LIST_AT(Type, member)                                                             \
+    (offsetof(Type, member) +                                                                   \
+     0 * sizeof(char[_Generic(&((Type *)0)->member.count, size_t *: 1, default: -1)]) +         \
+     0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) &&                             \
+                             sizeof(((Type *)0)->member.at) == sizeof(void *) &&                \
+                             offsetof(Type, member.at) == offsetof(Type, member) &&             \
+                             offsetof(Type, member.count) ==                                    \
+                                 offsetof(Type, member) + offsetof(List, count)                 \
+                         ? 1                                                                    \
+                         : -1]))
 
 // Each macro takes the struct, the member, which is also the JSON name, and what the kind needs.
 // clang-format off
@@ -186,8 +190,9 @@ void fields_clear(const Field *fields, void *item);
 // Deep copy; `target` may be uninitialised and is left clear on failure.
 Status fields_copy(const Field *fields, const void *source, void *target);
 
-// Whether the member under `field` of `item` is absent (NAN, COUNT_ABSENT, NULL, no elements ...). FLAG and BASE
-// never are; an ITEM is if it is not PRESENCE_DEFAULT and all its members are absent (its flags do not count).
+// Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ... Never absent are
+// FLAG, BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty list was asked for then). Any
+// other ITEM is absent if all its members are, whatever their presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);
 
 // Makes a new default value of `kind`; NULL without memory. Freed by variant_free.

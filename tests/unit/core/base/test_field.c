@@ -432,6 +432,22 @@ static void an_optional_item_is_absent_when_its_members_are(void **state) {
     fields_clear(whole_fields, &whole);
 }
 
+static void an_empty_list_is_not_the_same_as_a_default(void **state) {
+    (void)state;
+    Whole whole;
+    make_whole(&whole);
+    const Field *field = fields_find(whole_fields, "channels", NULL);
+    for (size_t i = 0; i < whole.channels.count; i++)
+        free(whole.channels.at[i]);
+    whole.channels.count = 0;
+    assert_false(field_is_absent(field, &whole));
+    problem_clear(&problem);
+    assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_OK);
+    whole.samples.count = 0;
+    assert_true(field_is_absent(fields_find(whole_fields, "samples", NULL), &whole));
+    fields_clear(whole_fields, &whole);
+}
+
 static void rows_are_found_also_inside_a_base(void **state) {
     (void)state;
     size_t offset = 0;
@@ -495,6 +511,7 @@ int main(void) {
         cmocka_unit_test(a_choice_is_written_by_its_name),
         cmocka_unit_test(long_values_pass_through_the_canonical_writer),
         cmocka_unit_test(an_optional_item_is_absent_when_its_members_are),
+        cmocka_unit_test(an_empty_list_is_not_the_same_as_a_default),
         cmocka_unit_test(rows_are_found_also_inside_a_base),
         cmocka_unit_test(a_slip_of_the_pen_finds_the_name_that_was_meant),
         cmocka_unit_test(pointers_are_escaped_and_cut),
