@@ -15,6 +15,9 @@ const PaperBuffer paper_buffers[5] = {
 void paper_scene(Simulation *simulation, double restitution, double contact_time, double duration) {
     if (fields_default(simulation_fields, simulation) != STATUS_OK)
         abort();
+    simulation->scene.structure = variant_new(&structure_sdof);
+    if (simulation->scene.structure == NULL)
+        abort();
     StructureSdof *structure = (StructureSdof *)(void *)simulation->scene.structure;
     structure->mass = 1.35;
     structure->stiffness = 865;

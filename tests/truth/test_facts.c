@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "core/excite/random.h"
 #include "core/excite/record.h"
 #include "core/excite/sine.h"
 #include "core/math/fourier.h"
@@ -138,7 +139,8 @@ static void sponge_contacts_in_free_vibration_last_as_long_as_published(void **s
     assert_near(outcome->summary.rms_displacement, 0.0025838755, 1e-7);
     assert_near(outcome->summary.rms_acceleration, 1.5233478, 1e-7);
     assert_near(outcome->summary.peak_acceleration, 9.6111111, 1e-7);
-    assert_near(outcome->summary.peak_contact_force, 3.8424065276783246, 1e-12);
+    assert_near(impact(outcome, 0)->peak_force, 3.8424065276783246, 1e-12);
+    assert_near(outcome->summary.peak_contact_force, impact(outcome, 1)->peak_force, 0);
     outcome_drop(outcome);
 }
 
