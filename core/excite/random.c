@@ -76,25 +76,23 @@ static double sample_count(const ExcitationRandom *random, const Span *span) {
 // --- judging
 // -------------------------------------------------------------------------------------------------
 
-// Whether the rate is one to compare with; says so where the base would have too many samples.
+// Whether the rate is one to judge the band by; says so where the base would have too many samples.
 static bool check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
-                       Problem *problem, Status *status) {
-    if (!(random->rate >= RATE_LEAST) || !isfinite(random->rate)) {
-        *status = STATUS_INVALID; // the row's fault, or the sample rate's
-        return false;
-    }
+                       Problem *problem) {
+    if (!(random->rate >= RATE_LEAST) || !isfinite(random->rate))
+        return false; // the row's fault, or the sample rate's
     const size_t most = span->most != 0 && span->most < SAMPLES_MOST ? span->most : SAMPLES_MOST;
     // The one sample past the end is not counted: a run of just the samples allowed has its base.
-    if (isfinite(span->duration) && sample_count(random, span) - 1 > (double)most) {
-        char place[256], rate[32], limit[32];
-        pointer_join(place, sizeof place, pointer, "rate");
-        *status = problem_add_real(problem, STATUS_INVALID, place, random->rate, "Hz",
-                                   "must be at most %s Hz, which makes %zu samples of the base in "
-                                   "this duration, is %s",
-                                   text_real(limit, ((double)most - 1) / span->duration), most,
-                                   text_real(rate, random->rate));
-    }
-    return true;
+    if (!isfinite(span->duration) || sample_count(random, span) - 1 <= (double)most)
+        return true;
+    char place[256], rate[32], limit[32];
+    pointer_join(place, sizeof place, pointer, "rate");
+    problem_add_real(problem, STATUS_INVALID, place, random->rate, "Hz",
+                     "must be at most %s Hz, which makes %zu samples of the base in this duration, "
+                     "is %s",
+                     text_real(limit, ((double)most - 1) / span->duration), most,
+                     text_real(rate, random->rate));
+    return false;
 }
 
 static Status random_complete(Excitation *excitation, const Span *span, const char *pointer,
@@ -106,7 +104,9 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     pointer_index(highest, sizeof highest, band, 1);
     if (isnan(random->rate))
         random->rate = span->sample_rate;
-    const bool has_rate = check_rate(random, span, pointer, problem, &status);
+    const bool has_rate = check_rate(random, span, pointer, problem);
+    if (!has_rate)
+        status = STATUS_INVALID;
 
     if (random->band.count != 2)
         return problem_add(problem, STATUS_INVALID, band,

@@ -56,7 +56,7 @@ static char *text_of(const char *format, va_list arguments) {
 }
 
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...) {
-    if (warnings->count >= REPORT_LINES)
+    if (warnings == NULL || warnings->count >= REPORT_LINES)
         return STATUS_OK;
     Warning *at = realloc(warnings->at, (warnings->count + 1) * sizeof *at);
     if (at == NULL)
@@ -77,7 +77,7 @@ Status warnings_add(Warnings *warnings, const char *pointer, const char *format,
 
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
                      const char *unit, const char *format, ...) {
-    if (decisions->count >= REPORT_LINES)
+    if (decisions == NULL || decisions->count >= REPORT_LINES)
         return STATUS_OK;
     Decision *at = realloc(decisions->at, (decisions->count + 1) * sizeof *at);
     if (at == NULL)

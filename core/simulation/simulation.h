@@ -27,11 +27,6 @@ typedef struct Output {
     double statistics_from;  // [s]
 } Output;
 
-// First member of every solver's settings ("accuracy").
-typedef struct Accuracy {
-    Variant variant;
-} Accuracy;
-
 // What was asked: the API's "scene".
 typedef struct Simulation {
     Scene scene;
@@ -47,12 +42,14 @@ extern const Field simulation_fields[];
 typedef struct SimulationLimits {
     size_t samples;  // per channel; 0: none
     size_t impacts;  // ledger rows; 0: none
+    double steps;    // solver steps of a run; 0: none
 } SimulationLimits;
 
 void simulation_clear(Simulation *simulation);  // fields_clear by another name; defaults by fields_default
 
 // Judges the whole (rows and what rows cannot see), completes it to its canonical form, and collects warnings
-// (implausible values, a cut segment). Slugs must be resolved before. All faults are added to `problem`.
+// (implausible values, a cut segment). Slugs must be resolved before. All faults are added to `problem`; faults
+// already in it, a reader's, fail it too. `limits` and `warnings` may be NULL.
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits, Warnings *warnings,
                            Problem *problem);
 
