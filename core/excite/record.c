@@ -2,9 +2,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/record.h"
+#include "core/excite/excitation.h"
 
 enum { RECORD_SAMPLES = 1 << 22 };
+
+typedef struct ExcitationRecord {
+    Excitation excitation;
+    Reals samples;   // [m/s^2] before scaling
+    double interval; // [s]
+    double scale;    // [-]
+} ExcitationRecord;
 
 // clang-format off
 static const Field record_fields[] = {
@@ -21,7 +28,7 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
     (void)span;
     const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
     if (!isfinite(record->scale))
-        return STATUS_OK;  // told by the rows
+        return STATUS_OK; // told by the rows
     for (size_t i = 0; i < record->samples.count; i++) {
         if (isfinite(record->samples.at[i] * record->scale) || !isfinite(record->samples.at[i]))
             continue;
