@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "core/base/status.h"
 
@@ -71,11 +72,12 @@ typedef struct Range {
     bool is_open_below, is_open_above;  // the bound itself is refused
 } Range;
 
-#define ABOVE(x) ((Range){(x), INFINITY, true, false})
-#define AT_LEAST(x) ((Range){(x), INFINITY, false, false})
-#define WITHIN(a, b) ((Range){(a), (b), false, false})
-#define WITHIN_ABOVE(a, b) ((Range){(a), (b), true, false})  // a < x <= b
-#define ANY ((Range){-INFINITY, INFINITY, false, false})
+// Braces alone, no compound literals: those are no constants in ISO C.
+#define ABOVE(x) {(x), (double)INFINITY, true, false}
+#define AT_LEAST(x) {(x), (double)INFINITY, false, false}
+#define WITHIN(a, b) {(a), (b), false, false}
+#define WITHIN_ABOVE(a, b) {(a), (b), true, false}  // a < x <= b
+#define ANY {(double)-INFINITY, (double)INFINITY, false, false}
 
 // How a row behaves when the member is not given.
 typedef enum Presence {
@@ -85,7 +87,8 @@ typedef enum Presence {
 } Presence;
 
 enum {
-    FIELD_NOTE = 1,  // changes nothing: left out of the canonical form (title, labels)
+    FIELD_NOTE = 1,           // changes nothing: left out of the canonical form (title, labels)
+    FIELD_NULL_IS_EMPTY = 2,  // ITEM: JSON null is allowed and makes every member absent (fields_clear)
 };
 
 struct Field {
@@ -114,16 +117,21 @@ struct Field {
 #define FIELD_PRESENCE(x) \
     ((x) == REQUIRED ? PRESENCE_REQUIRED : (x) == OPTIONAL ? PRESENCE_OPTIONAL : PRESENCE_DEFAULT)
 
-// A member of the wrong type does not compile: the pointer comparison in FIELD_AT has no valid types then.
+// A member of the wrong type does not compile: the array in FIELD_AT has a negative size then.
 #define FIELD_AT(Type, member, Wanted) \
-    (offsetof(Type, member) + 0 * sizeof(&((Type *)0)->member == (Wanted *)0))
-#define FIELD_LIST_AT(Type, member)                                                          \
-    (offsetof(Type, member) + 0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) && \
-                                                      offsetof(Type, member.count) -         \
-                                                              offsetof(Type, member) ==      \
-                                                          offsetof(List, count)              \
-                                                  ? 1                                        \
-                                                  : -1]))
+    (offsetof(Type, member) +          \
+     0 * sizeof(char[_Generic(&((Type *)0)->member, Wanted *: 1, default: -1)]))
+// A typed twin of List: a pointer called `at`, then a size_t called `count`, and nothing else.
+#define FIELD_LIST_AT(Type, member)                                                             \
+    (offsetof(Type, member) +                                                                   \
+     0 * sizeof(char[_Generic(&((Type *)0)->member.count, size_t *: 1, default: -1)]) +         \
+     0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) &&                             \
+                             sizeof(((Type *)0)->member.at) == sizeof(void *) &&                \
+                             offsetof(Type, member.at) == offsetof(Type, member) &&             \
+                             offsetof(Type, member.count) ==                                    \
+                                 offsetof(Type, member) + offsetof(List, count)                 \
+                         ? 1                                                                    \
+                         : -1]))
 
 // Each macro takes the struct, the member, which is also the JSON name, and what the kind needs.
 // clang-format off
@@ -152,6 +160,9 @@ struct Field {
 #define FIELD_ITEM(Type, member, rows_, shorthand_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_ITEM, .offset = offsetof(Type, member), .fields = rows_, \
      .size = sizeof(((Type *)0)->member), .shorthand = shorthand_, .presence = presence_, .doc = doc_}
+#define FIELD_ITEM_OR_NULL(Type, member, rows_, presence_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_ITEM, .offset = offsetof(Type, member), .fields = rows_, \
+     .size = sizeof(((Type *)0)->member), .presence = presence_, .flags = FIELD_NULL_IS_EMPTY, .doc = doc_}
 #define FIELD_LIST(Type, member, rows_, most_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Type, member), .fields = rows_, \
      .size = sizeof(*((Type *)0)->member.at), .most = most_, .presence = presence_, .doc = doc_}
@@ -168,17 +179,20 @@ struct Field {
 // A VARIANT under PRESENCE_DEFAULT becomes at(0) with its defaults. STATUS_NO_MEMORY leaves `item` clearable.
 Status fields_default(const Field *fields, void *item);
 
-// Judges every member against its row, below `pointer`; REAL and COUNT ranges, finite numbers, REQUIRED ones
-// present, list lengths. Adds all faults. Returns STATUS_OK or STATUS_INVALID.
+// Judges every member against its row, below `pointer`: REAL and COUNT ranges, finite numbers, REQUIRED ones
+// present, lengths, texts allowed. A CHOICE under PRESENCE_DEFAULT may be absent: whoever completes the struct
+// erases what is not used. Adds all faults. Returns STATUS_OK or STATUS_INVALID.
 Status fields_check(const Field *fields, const void *item, const char *pointer, Problem *problem);
 
-// Frees what the members own and sets all of `item` to zero or absent. All-zero items are fine.
+// Frees what the members own and makes every member absent (FLAG: false). All-zero items are fine.
 void fields_clear(const Field *fields, void *item);
 
 // Deep copy; `target` may be uninitialised and is left clear on failure.
 Status fields_copy(const Field *fields, const void *source, void *target);
 
-// Whether the member under `field` is absent (NAN, COUNT_ABSENT, NULL ...). FLAG, ITEM and BASE never are.
+// Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ... Never absent are
+// FLAG, BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty list was asked for then). Any
+// other ITEM is absent if all its members are, whatever their presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);
 
 // Makes a new default value of `kind`; NULL without memory. Freed by variant_free.
@@ -186,13 +200,17 @@ Variant *variant_new(const Kind *kind);
 void variant_free(Variant *variant);
 const Kind *kind_find(const KindTable *table, const char *name);
 
-// The row called `name`, also inside BASE rows, whose offsets are added to *offset (which may be NULL).
+// The row called `name`, also inside BASE rows, whose offsets are added to *offset (which may be NULL; the row's
+// own is not), so that its member is row->offset bytes behind (char *)item + *offset.
 const Field *fields_find(const Field *fields, const char *name, size_t *offset);
 
 // The nearest of the rows' names (BASE rows included), or of a NULL-terminated list; NULL if none is near
 // enough to be meant (a third of the letters may differ). For did_you_mean.
 const char *fields_nearest(const Field *fields, const char *name);
 const char *texts_nearest(const char *const *texts, const char *name);
+
+// Adds the fault "must be one of ..." for `text` at `pointer`, with the nearest of `texts`. Returns STATUS_INVALID.
+Status texts_refuse(const char *const *texts, const char *text, const char *pointer, Problem *problem);
 
 // "pointer/name" with ~ and / escaped, cut at size.
 void pointer_join(char *target, size_t size, const char *pointer, const char *name);

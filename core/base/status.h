@@ -4,6 +4,7 @@
 #ifndef CORE_BASE_STATUS_H
 #define CORE_BASE_STATUS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 // One list yields the enum, the names and the titles. Order is free; OK is first because it is 0.
@@ -54,7 +55,7 @@ typedef struct Fault {
 // All zero is "no problem". Only the first `count` faults (at most PROBLEM_FAULTS) are set.
 typedef struct Problem {
     Status status;       // the first one's
-    char detail[512];    // the first one's sentence
+    char detail[512];    // the first one's sentence, after its place
     size_t count;        // faults met, also those beyond PROBLEM_FAULTS
     Fault faults[PROBLEM_FAULTS];
 } Problem;
@@ -70,11 +71,22 @@ Status problem_set(Problem *problem, Status status, const char *format, ...)
 Status problem_add(Problem *problem, Status status, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
+// The same with the number that is wrong and its unit (NULL: none).
+Status problem_add_real(Problem *problem, Status status, const char *pointer, double value,
+                        const char *unit, const char *format, ...)
+    __attribute__((format(printf, 6, 7)));
+
 // The same with value, unit and suggestion filled in by the caller.
 Status problem_put(Problem *problem, Status status, const Fault *fault);
 
+// Whether a fault lies at `pointer` or below it. Faults beyond PROBLEM_FAULTS are not seen.
+bool problem_concerns(const Problem *problem, const char *pointer);
+
 // Copies `text` into `target[size]`, cut at a UTF-8 character's edge and marked by "..." if it is too long.
 void text_fit(char *target, size_t size, const char *text);
+
+// `text` as a JSON string with its quotes, cut likewise inside them.
+void text_quote(char *target, size_t size, const char *text);
 
 // The shortest of %.15g, %.16g, %.17g that reads back to the same double, for messages.
 const char *text_real(char target[32], double value);

@@ -1,0 +1,354 @@
+// Every walk is one switch over the kind of a row. Members are reached by offset; lists go through memcpy, because a
+// typed twin's pointer may not be read as another pointer type.
+#include "core/base/field.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void *member_of(const Field *field, const void *item) {
+    return (char *)item + field->offset;
+}
+
+static List list_of(const void *member) {
+    List list;
+    memcpy(&list, member, sizeof list);
+    return list;
+}
+
+static void *element_of(const Field *field, List list, size_t index) {
+    return (char *)list.at + index * field->size;
+}
+
+// Makes every member absent without looking at what it was.
+static void absent_all(const Field *fields, void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        void *member = member_of(field, item);
+        switch (field->kind) {
+        case FIELD_KIND_REAL:
+            *(double *)member = (double)NAN;
+            break;
+        case FIELD_KIND_COUNT:
+            *(uint64_t *)member = COUNT_ABSENT;
+            break;
+        case FIELD_KIND_FLAG:
+            *(bool *)member = false;
+            break;
+        case FIELD_KIND_TEXT:
+            *(char **)member = NULL;
+            break;
+        case FIELD_KIND_CHOICE:
+            *(int *)member = CHOICE_ABSENT;
+            break;
+        case FIELD_KIND_REALS:
+            *(Reals *)member = (Reals){NULL, 0};
+            break;
+        case FIELD_KIND_TEXTS:
+            *(Texts *)member = (Texts){NULL, 0};
+            break;
+        case FIELD_KIND_LIST:
+            memset(member, 0, sizeof(List));
+            break;
+        case FIELD_KIND_VARIANT:
+            *(Variant **)member = NULL;
+            break;
+        case FIELD_KIND_ITEM:
+        case FIELD_KIND_BASE:
+            absent_all(field->fields, member);
+            break;
+        case FIELD_KIND_END:
+            break;
+        }
+    }
+}
+
+static void free_all(const Field *fields, void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        void *member = member_of(field, item);
+        switch (field->kind) {
+        case FIELD_KIND_TEXT:
+            free(*(char **)member);
+            break;
+        case FIELD_KIND_REALS:
+            free(((Reals *)member)->at);
+            break;
+        case FIELD_KIND_TEXTS: {
+            const Texts *texts = member;
+            for (size_t i = 0; i < texts->count; i++)
+                free(texts->at[i]);
+            free(texts->at);
+            break;
+        }
+        case FIELD_KIND_LIST: {
+            const List list = list_of(member);
+            for (size_t i = 0; i < list.count; i++)
+                free_all(field->fields, element_of(field, list, i));
+            free(list.at);
+            break;
+        }
+        case FIELD_KIND_VARIANT:
+            variant_free(*(Variant **)member);
+            break;
+        case FIELD_KIND_ITEM:
+        case FIELD_KIND_BASE:
+            free_all(field->fields, member);
+            break;
+        default:
+            break;
+        }
+    }
+}
+
+void fields_clear(const Field *fields, void *item) {
+    if (item == NULL)
+        return;
+    free_all(fields, item);
+    absent_all(fields, item);
+}
+
+static Status texts_copy(const char *const *source, size_t count, Texts *target) {
+    if (count == 0)
+        return STATUS_OK;
+    target->at = calloc(count, sizeof *target->at);
+    if (target->at == NULL)
+        return STATUS_NO_MEMORY;
+    for (; target->count < count; target->count++) {
+        char *text = strdup(source[target->count]);
+        if (text == NULL)
+            return STATUS_NO_MEMORY;
+        target->at[target->count] = text;
+    }
+    return STATUS_OK;
+}
+
+// `item` is absent throughout.
+static Status default_all(const Field *fields, void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (field->kind != FIELD_KIND_BASE && field->presence != PRESENCE_DEFAULT)
+            continue;
+        void *member = member_of(field, item);
+        switch (field->kind) {
+        case FIELD_KIND_REAL:
+            *(double *)member = field->initial;
+            break;
+        case FIELD_KIND_COUNT:
+            *(uint64_t *)member = (uint64_t)field->initial;
+            break;
+        case FIELD_KIND_FLAG:
+            *(bool *)member = field->initial != 0;
+            break;
+        case FIELD_KIND_CHOICE:
+            *(int *)member = (int)field->initial;
+            break;
+        case FIELD_KIND_TEXTS: {
+            size_t count = 0;
+            while (field->initial_texts != NULL && field->initial_texts[count] != NULL)
+                count++;
+            TRY(texts_copy(field->initial_texts, count, member));
+            break;
+        }
+        case FIELD_KIND_VARIANT: {
+            Variant *variant = variant_new(field->kinds->at(0));
+            if (variant == NULL)
+                return STATUS_NO_MEMORY;
+            *(Variant **)member = variant;
+            break;
+        }
+        case FIELD_KIND_ITEM:
+        case FIELD_KIND_BASE:
+            TRY(default_all(field->fields, member));
+            break;
+        default:
+            break;
+        }
+    }
+    return STATUS_OK;
+}
+
+Status fields_default(const Field *fields, void *item) {
+    absent_all(fields, item);
+    return default_all(fields, item);
+}
+
+// `target` is absent throughout.
+static Status copy_all(const Field *fields, const void *source, void *target) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *from = member_of(field, source);
+        void *to = member_of(field, target);
+        switch (field->kind) {
+        case FIELD_KIND_REAL:
+            *(double *)to = *(const double *)from;
+            break;
+        case FIELD_KIND_COUNT:
+            *(uint64_t *)to = *(const uint64_t *)from;
+            break;
+        case FIELD_KIND_FLAG:
+            *(bool *)to = *(const bool *)from;
+            break;
+        case FIELD_KIND_CHOICE:
+            *(int *)to = *(const int *)from;
+            break;
+        case FIELD_KIND_TEXT: {
+            const char *text = *(char *const *)from;
+            if (text != NULL && (*(char **)to = strdup(text)) == NULL)
+                return STATUS_NO_MEMORY;
+            break;
+        }
+        case FIELD_KIND_REALS: {
+            const Reals *reals = from;
+            if (reals->count == 0)
+                break;
+            double *at = malloc(reals->count * sizeof *at);
+            if (at == NULL)
+                return STATUS_NO_MEMORY;
+            memcpy(at, reals->at, reals->count * sizeof *at);
+            *(Reals *)to = (Reals){at, reals->count};
+            break;
+        }
+        case FIELD_KIND_TEXTS: {
+            const Texts *texts = from;
+            TRY(texts_copy((const char *const *)texts->at, texts->count, to));
+            break;
+        }
+        case FIELD_KIND_LIST: {
+            const List list = list_of(from);
+            if (list.count == 0)
+                break;
+            const List copy = {calloc(list.count, field->size), list.count};
+            if (copy.at == NULL)
+                return STATUS_NO_MEMORY;
+            // The list is whole before its elements are, so that a failure leaves it clearable.
+            memcpy(to, &copy, sizeof copy);
+            for (size_t i = 0; i < copy.count; i++)
+                absent_all(field->fields, element_of(field, copy, i));
+            for (size_t i = 0; i < copy.count; i++)
+                TRY(copy_all(field->fields, element_of(field, list, i),
+                             element_of(field, copy, i)));
+            break;
+        }
+        case FIELD_KIND_VARIANT: {
+            const Variant *variant = *(Variant *const *)from;
+            if (variant == NULL)
+                break;
+            Variant *copy = calloc(1, variant->kind->size);
+            if (copy == NULL)
+                return STATUS_NO_MEMORY;
+            *(Variant **)to = copy;
+            copy->kind = variant->kind;
+            absent_all(copy->kind->fields, copy);
+            TRY(copy_all(copy->kind->fields, variant, copy));
+            break;
+        }
+        case FIELD_KIND_ITEM:
+        case FIELD_KIND_BASE:
+            TRY(copy_all(field->fields, from, to));
+            break;
+        case FIELD_KIND_END:
+            break;
+        }
+    }
+    return STATUS_OK;
+}
+
+Status fields_copy(const Field *fields, const void *source, void *target) {
+    absent_all(fields, target);
+    const Status status = copy_all(fields, source, target);
+    if (status != STATUS_OK)
+        fields_clear(fields, target);
+    return status;
+}
+
+static bool all_empty(const Field *fields, const void *item);
+
+// Whether the member holds nothing, whatever its presence says of that.
+static bool is_empty(const Field *field, const void *member) {
+    switch (field->kind) {
+    case FIELD_KIND_REAL:
+        return isnan(*(const double *)member);
+    case FIELD_KIND_COUNT:
+        return *(const uint64_t *)member == COUNT_ABSENT;
+    case FIELD_KIND_TEXT:
+        return *(char *const *)member == NULL;
+    case FIELD_KIND_CHOICE:
+        return *(const int *)member == CHOICE_ABSENT;
+    case FIELD_KIND_REALS:
+        return ((const Reals *)member)->count == 0;
+    case FIELD_KIND_TEXTS:
+        return ((const Texts *)member)->count == 0;
+    case FIELD_KIND_LIST:
+        return list_of(member).count == 0;
+    case FIELD_KIND_VARIANT:
+        return *(Variant *const *)member == NULL;
+    case FIELD_KIND_ITEM:
+    case FIELD_KIND_BASE:
+        return all_empty(field->fields, member);
+    case FIELD_KIND_FLAG:
+    case FIELD_KIND_END:
+        break;
+    }
+    return true;
+}
+
+static bool all_empty(const Field *fields, const void *item) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
+        if (!is_empty(field, member_of(field, item)))
+            return false;
+    return true;
+}
+
+bool field_is_absent(const Field *field, const void *item) {
+    switch (field->kind) {
+    case FIELD_KIND_FLAG:
+    case FIELD_KIND_BASE:
+        return false;
+    case FIELD_KIND_REALS:
+    case FIELD_KIND_TEXTS:
+    case FIELD_KIND_LIST:
+    case FIELD_KIND_ITEM:
+        return field->presence != PRESENCE_DEFAULT && is_empty(field, member_of(field, item));
+    default:
+        return is_empty(field, member_of(field, item));
+    }
+}
+
+Variant *variant_new(const Kind *kind) {
+    Variant *variant = calloc(1, kind->size);
+    if (variant == NULL)
+        return NULL;
+    variant->kind = kind;
+    if (fields_default(kind->fields, variant) != STATUS_OK) {
+        variant_free(variant);
+        return NULL;
+    }
+    return variant;
+}
+
+void variant_free(Variant *variant) {
+    if (variant == NULL)
+        return;
+    free_all(variant->kind->fields, variant);
+    free(variant);
+}
+
+const Kind *kind_find(const KindTable *table, const char *name) {
+    const Kind *kind;
+    for (size_t i = 0; (kind = table->at(i)) != NULL; i++)
+        if (strcmp(kind->name, name) == 0)
+            return kind;
+    return NULL;
+}
+
+const Field *fields_find(const Field *fields, const char *name, size_t *offset) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (field->kind == FIELD_KIND_BASE) {
+            const Field *found = fields_find(field->fields, name, offset);
+            if (found != NULL) {
+                if (offset != NULL)
+                    *offset += field->offset;
+                return found;
+            }
+        } else if (strcmp(field->name, name) == 0) {
+            return field;
+        }
+    }
+    return NULL;
+}

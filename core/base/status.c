@@ -1,0 +1,185 @@
+// Faults are kept in the order met, one per place. Past the hundredth they are only counted, before any text is
+// made of them: a document of a million faults costs no more than its reading.
+#include "core/base/status.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const status_slugs[] = {
+#define STATUS_SLUG(name, slug, title) slug,
+    STATUS_LIST(STATUS_SLUG)
+#undef STATUS_SLUG
+};
+
+static const char *const status_titles[] = {
+#define STATUS_TITLE(name, slug, title) title,
+    STATUS_LIST(STATUS_TITLE)
+#undef STATUS_TITLE
+};
+
+const char *status_slug(Status status) {
+    return (size_t)status < COUNT(status_slugs) ? status_slugs[status]
+                                                : status_slugs[STATUS_INTERNAL];
+}
+
+const char *status_title(Status status) {
+    return (size_t)status < COUNT(status_titles) ? status_titles[status]
+                                                 : status_titles[STATUS_INTERNAL];
+}
+
+// The largest length <= `most` at which `text` may be cut without splitting a UTF-8 character.
+static size_t edge_before(const char *text, size_t most) {
+    while (most > 0 && ((unsigned char)text[most] & 0xC0) == 0x80)
+        most--;
+    return most;
+}
+
+void text_fit(char *target, size_t size, const char *text) {
+    if (size == 0)
+        return;
+    const size_t length = strlen(text);
+    if (length < size) {
+        memcpy(target, text, length + 1);
+        return;
+    }
+    const char *mark = size > 4 ? "..." : "";
+    const size_t kept = edge_before(text, size - 1 - strlen(mark));
+    memcpy(target, text, kept);
+    memcpy(target + kept, mark, strlen(mark) + 1);
+}
+
+void text_quote(char *target, size_t size, const char *text) {
+    if (size < 8) {
+        if (size > 0)
+            target[0] = '\0';
+        return;
+    }
+    // One character takes at most 6 bytes; the tail is "..." and the closing quote.
+    const size_t end = size - 5;
+    size_t length = 0;
+    target[length++] = '"';
+    for (size_t i = 0; text[i] != '\0'; i++) {
+        const unsigned char c = (unsigned char)text[i];
+        char piece[8];
+        size_t bytes = 1;
+        if (c < 0x20 || c == '"' || c == '\\') {
+            bytes = (size_t)snprintf(piece, sizeof piece, c < 0x20 ? "\\u%04x" : "\\%c", (int)c);
+        } else {
+            while (bytes < 4 && ((unsigned char)text[i + bytes] & 0xC0) == 0x80)
+                bytes++;
+            memcpy(piece, text + i, bytes);
+            i += bytes - 1;
+        }
+        if (length + bytes > end) {
+            memcpy(target + length, "...", 3);
+            length += 3;
+            break;
+        }
+        memcpy(target + length, piece, bytes);
+        length += bytes;
+    }
+    target[length] = '"';
+    target[length + 1] = '\0';
+}
+
+const char *text_real(char target[32], double value) {
+    for (int digits = 15; digits <= 17; digits++) {
+        snprintf(target, 32, "%.*g", digits, value);
+        if (strtod(target, NULL) == value)
+            break;
+    }
+    return target;
+}
+
+void problem_clear(Problem *problem) {
+    if (problem == NULL)
+        return;
+    problem->status = STATUS_OK;
+    problem->detail[0] = '\0';
+    problem->count = 0;
+}
+
+Status problem_set(Problem *problem, Status status, const char *format, ...) {
+    if (problem == NULL || problem->status != STATUS_OK || status == STATUS_OK)
+        return status;
+    char text[2 * sizeof problem->detail];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    problem->status = status;
+    text_fit(problem->detail, sizeof problem->detail, text);
+    return status;
+}
+
+// True where a fault would only be counted; it is then.
+static bool count_only(Problem *problem) {
+    if (problem == NULL)
+        return true;
+    if (problem->count < PROBLEM_FAULTS)
+        return false;
+    problem->count++;
+    return true;
+}
+
+Status problem_put(Problem *problem, Status status, const Fault *fault) {
+    if (count_only(problem))
+        return status;
+    for (size_t i = 0; i < problem->count; i++)
+        if (strcmp(problem->faults[i].pointer, fault->pointer) == 0)
+            return status;
+    problem->faults[problem->count++] = *fault;
+    return problem_set(problem, status, "%s%s%s", fault->pointer,
+                       fault->pointer[0] == '\0' ? "" : ": ", fault->detail);
+}
+
+static void fault_fill(Fault *fault, const char *pointer, const char *format, va_list arguments) {
+    char text[2 * sizeof fault->detail];
+    vsnprintf(text, sizeof text, format, arguments);
+    memset(fault, 0, sizeof *fault);
+    text_fit(fault->pointer, sizeof fault->pointer, pointer);
+    text_fit(fault->detail, sizeof fault->detail, text);
+}
+
+Status problem_add(Problem *problem, Status status, const char *pointer, const char *format, ...) {
+    if (count_only(problem))
+        return status;
+    Fault fault;
+    va_list arguments;
+    va_start(arguments, format);
+    fault_fill(&fault, pointer, format, arguments);
+    va_end(arguments);
+    return problem_put(problem, status, &fault);
+}
+
+Status problem_add_real(Problem *problem, Status status, const char *pointer, double value,
+                        const char *unit, const char *format, ...) {
+    if (count_only(problem))
+        return status;
+    Fault fault;
+    va_list arguments;
+    va_start(arguments, format);
+    fault_fill(&fault, pointer, format, arguments);
+    va_end(arguments);
+    char digits[32];
+    // JSON has no word for what is not finite.
+    text_fit(fault.value, sizeof fault.value, isfinite(value) ? text_real(digits, value) : "");
+    text_fit(fault.unit, sizeof fault.unit, unit != NULL ? unit : "");
+    return problem_put(problem, status, &fault);
+}
+
+bool problem_concerns(const Problem *problem, const char *pointer) {
+    if (problem == NULL)
+        return false;
+    const size_t length = strlen(pointer);
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        const char *place = problem->faults[i].pointer;
+        if (strncmp(place, pointer, length) == 0 &&
+            (place[length] == '\0' || place[length] == '/'))
+            return true;
+    }
+    return false;
+}
