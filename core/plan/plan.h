@@ -48,6 +48,32 @@ typedef struct PlanReport {
 
 extern const Field plan_report_fields[], derived_fields[], decision_fields[], warning_fields[];
 
+// One stop's contact parameters, ready for a solver.
+typedef struct PlanStop {
+    double restitution;  // e, under CONTACT_IMPULSIVE
+    double stiffness;    // k_b [N/m], under CONTACT_LINEAR
+    double damping;      // c_b [N s/m]
+} PlanStop;
+
+// Plain values, written once by plan_new.
+typedef struct Plan {
+    double mass, stiffness, damping;  // M, K, C of the structure
+    bool has_damper;
+    double damper_mass, clearance, offset;  // m, d, middle of the stops
+    ContactForm form;                       // CONTACT_IMPULSIVE or CONTACT_LINEAR
+    PlanStop stops[2];                      // by Side
+    double displacement, velocity;          // of the structure at t = 0
+    double position, relative_velocity;     // of the free mass at t = 0, relative to the stops' middle and the structure
+    double duration, sample_rate;
+    size_t count;  // samples
+    PlanReport report;
+} Plan;
+
+// Makes ready a scene that scene_complete has passed; `solver` is the chosen solver's name, `asked` what the
+// accuracy object said. Freed by plan_free.
+Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan, Problem *problem);
+void plan_free(Plan *plan);
+
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)

@@ -27,11 +27,6 @@ typedef struct Output {
     double statistics_from;  // [s]
 } Output;
 
-// First member of every solver's settings ("accuracy").
-typedef struct Accuracy {
-    Variant variant;
-} Accuracy;
-
 // What was asked: the API's "scene".
 typedef struct Simulation {
     Scene scene;

@@ -11,18 +11,18 @@ typedef struct Bytes {
     char *at;       // NUL-terminated when not NULL
     size_t count;   // without the NUL
     size_t room;
-    size_t most;    // 0: no limit
+    size_t most;    // of count; 0: no limit
     bool is_failed;
 } Bytes;
 
-void bytes_clear(Bytes *bytes);
+void bytes_clear(Bytes *bytes);  // empty and sound again, under the same limit
 void bytes_put(Bytes *bytes, const void *data, size_t size);
 void bytes_text(Bytes *bytes, const char *text);
 void bytes_format(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool bytes_reserve(Bytes *bytes, size_t more);  // room for `more` beyond count; false once failed
 void bytes_real(Bytes *bytes, double value);    // shortest digits that read back; "null" where not finite
-void bytes_json_string(Bytes *bytes, const char *text);  // quoted and escaped; NULL is null
-// Takes the buffer out; the caller frees it with free(). NULL if failed.
+void bytes_json_string(Bytes *bytes, const char *text);  // quoted and escaped; NULL is null, bad UTF-8 U+FFFD
+// Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with free(). NULL if failed.
 char *bytes_take(Bytes *bytes, size_t *size);
 
 #endif
