@@ -50,7 +50,7 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
     const char *near = row->kind == FIELD_KIND_CHOICE ? texts_nearest(row->choices, value) : NULL;
     if (near != NULL)
         text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near);
-    text_fit(fault.detail, sizeof fault.detail, detail);
+    snprintf(fault.detail, sizeof fault.detail, "must be %s, is %.100s", detail, value);
     return problem_put(reader->problem, STATUS_USAGE, &fault);
 }
 
@@ -87,21 +87,21 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
     case FIELD_KIND_REAL: {
         const double number = strtod(value, &end);
         if (end == value || *end != '\0' || !isfinite(number))
-            return refuse(reader, typed, value, row, "must be a number");
+            return refuse(reader, typed, value, row, "a number");
         *(double *)member(reader, row) = number;
         break;
     }
     case FIELD_KIND_COUNT: {
         const unsigned long long number = strtoull(value, &end, 10);
         if (!isdigit((unsigned char)value[0]) || *end != '\0' || errno != 0 || number == COUNT_ABSENT)
-            return refuse(reader, typed, value, row, "must be a whole number of at least 0");
+            return refuse(reader, typed, value, row, "a whole number of at least 0");
         *(uint64_t *)member(reader, row) = number;
         break;
     }
     case FIELD_KIND_FLAG: {
         const bool is_on = strcmp(value, "true") == 0 || strcmp(value, "1") == 0;
         if (!is_on && strcmp(value, "false") != 0 && strcmp(value, "0") != 0)
-            return refuse(reader, typed, value, row, "must be true or false");
+            return refuse(reader, typed, value, row, "true or false");
         *(bool *)member(reader, row) = is_on;
         break;
     }
@@ -110,7 +110,7 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
         while (row->choices[index] != NULL && strcmp(row->choices[index], value) != 0)
             index++;
         if (row->choices[index] == NULL)
-            return refuse(reader, typed, value, row, "is none of the choices");
+            return refuse(reader, typed, value, row, "one of the choices");
         *(int *)member(reader, row) = index;
         break;
     }

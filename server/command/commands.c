@@ -113,8 +113,6 @@ int command_refuse(const char *name, const Problem *problem) {
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         const Fault *fault = &problem->faults[i];
         fprintf(stderr, "impactd %s: %s %s", name, fault->pointer, fault->detail);
-        if (fault->value[0] != '\0')
-            fprintf(stderr, ", is %s", fault->value);
         if (fault->did_you_mean[0] != '\0')
             fprintf(stderr, " (did you mean %s?)", fault->did_you_mean);
         fputc('\n', stderr);
@@ -131,6 +129,7 @@ int command_exit(Status status) {
         return COMMAND_OK;
     case STATUS_UNREADABLE:
     case STATUS_INVALID:
+    case STATUS_TOO_LARGE:
         return COMMAND_BAD_SCENE;
     case STATUS_USAGE:
         return COMMAND_USAGE;
