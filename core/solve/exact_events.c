@@ -83,7 +83,7 @@ void exact_release(Exact *exact) {
 
 // Finds the first event on the arc. In flight `side` is the stop that is reached.
 bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side) {
-    double gap[ROOT_DEGREE + 1];
+    double gap[ROOT_DEGREE + 1] = {0};
     *side = exact->side;
     if (exact->phase == RESTING) {
         // arc.push times the side's sign must stay positive.
