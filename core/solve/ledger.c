@@ -86,10 +86,6 @@ void ledger_bounce(Ledger *ledger, double time, Side side, double approach, doub
     add(ledger, &impact);
 }
 
-void ledger_lose(Ledger *ledger, double lost) {
-    ledger->energy.contact += lost;
-}
-
 void ledger_work(Ledger *ledger, double input, double structural_damping) {
     ledger->energy.input += input;
     ledger->energy.structural_damping += structural_damping;
