@@ -136,7 +136,8 @@ static Status travel(Journey *journey, Problem *problem) {
                .base = &journey->base,
                .watch = journey->watch,
                .statistics_from = simulation->output.statistics_from,
-               .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts};
+               .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
+               .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
     TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, &run, problem));
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, &run, problem));
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));

@@ -42,6 +42,7 @@ extern const Field simulation_fields[];
 typedef struct SimulationLimits {
     size_t samples;  // per channel; 0: none
     size_t impacts;  // ledger rows; 0: none
+    double steps;    // solver steps of a run; 0: none
 } SimulationLimits;
 
 void simulation_clear(Simulation *simulation);  // fields_clear by another name; defaults by fields_default

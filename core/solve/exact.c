@@ -14,224 +14,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/arc.h"
-#include "core/solve/cursor.h"
-#include "core/solve/flight.h"
-#include "core/solve/hold.h"
-#include "core/solve/ledger.h"
-#include "core/solve/record.h"
+#include "core/solve/exact_events.h"
+#include "core/solve/exact_state.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
-
-typedef enum Phase { FLIGHT, CONTACT, RESTING } Phase;
-typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN_MIDDLE } Origin;
-
-typedef struct Exact {
-    Run *run;
-    const Plan *plan;
-    Problem *problem;
-    Motion flying, touching[2], resting;
-    Flight flight;
-    Phase phase;
-    Side side;      // of CONTACT and RESTING
-    Origin origin;  // what state.r is counted from
-    bool is_leaving;  // released from rest a moment ago: gap, its speed and its acceleration are exactly 0
-    State state;
-    size_t sample;  // the last one passed
-    double offset;  // time since then [s]
-    double interval;
-    BaseCursor base;
-    Ledger ledger;
-    Recorder recorder;
-    Hold *holds[2];       // by Side; made when a contact first lasts long
-    size_t contact_arcs;  // since it began
-    size_t arcs;          // since the watch was asked
-    size_t still_events;  // in a row, without time passing
-} Exact;
-
-static double sign_of(Side side) {
-    return side == SIDE_RIGHT ? 1 : -1;
-}
-
-// Room between the free mass and a stop at r = 0 of the present origin [m].
-static double room(const Exact *exact, Side side) {
-    if (exact->origin == ORIGIN_MIDDLE)
-        return exact->plan->clearance / 2;
-    return exact->origin == (Origin)side ? 0 : exact->plan->clearance;
-}
-
-// u = x-relative displacement of the free mass [m].
-static double relative(const Exact *exact) {
-    const double stop = exact->plan->clearance / 2;
-    const double origin = exact->origin == ORIGIN_MIDDLE ? 0 : sign_of((Side)exact->origin) * stop;
-    return exact->plan->offset + origin + exact->state.r;
-}
-
-static double now(const Exact *exact) {
-    return (double)exact->sample / exact->plan->sample_rate + exact->offset;
-}
-
-// s = (C v + K x) / M: what pushes the free mass to the right, seen from the structure [m/s^2].
-static double push(const Exact *exact) {
-    return exact->flying.damping * exact->state.v + exact->flying.omega2 * exact->state.x;
-}
-
-// Contact force on the structure, positive to the right [N].
-static double force(const Exact *exact) {
-    const Plan *plan = exact->plan;
-    if (exact->phase == CONTACT)
-        return plan->stops[exact->side].stiffness * exact->state.r + plan->stops[exact->side].damping * exact->state.w;
-    if (exact->phase == RESTING)
-        return plan->damper_mass * (1 - exact->resting.share) * push(exact);
-    return 0;
-}
-
-static Moment moment(const Exact *exact) {
-    const double n = force(exact);
-    Moment moment = {.x = exact->state.x,
-                     .v = exact->state.v,
-                     .acceleration = n / exact->plan->mass - push(exact),
-                     .force = n};
-    if (exact->plan->has_damper) {
-        moment.damper_x = exact->state.x + relative(exact);
-        moment.damper_v = exact->state.v + exact->state.w;
-        moment.penetration = exact->phase == CONTACT ? fmax(sign_of(exact->side) * exact->state.r, 0) : 0;
-    }
-    return moment;
-}
-
-static EnergyState energy_state(const Exact *exact) {
-    const Plan *plan = exact->plan;
-    const State *state = &exact->state;
-    const double z = state->v + state->w;
-    const double k = exact->phase == CONTACT ? plan->stops[exact->side].stiffness : 0;
-    return (EnergyState){0.5 * plan->mass * state->v * state->v + 0.5 * plan->damper_mass * z * z,
-                         0.5 * plan->stiffness * state->x * state->x + 0.5 * k * state->r * state->r};
-}
-
-static const Motion *motion(const Exact *exact) {
-    return exact->phase == FLIGHT    ? &exact->flying
-           : exact->phase == CONTACT ? &exact->touching[exact->side]
-                                     : &exact->resting;
-}
-
-static void note_event(Exact *exact) {
-    const Moment at = moment(exact);
-    const EnergyState energy = energy_state(exact);
-    ledger_peaks(&exact->ledger, &at);
-    ledger_balance(&exact->ledger, &energy);
-}
-
-static void begin_contact(Exact *exact, Side side) {
-    exact->phase = CONTACT;
-    exact->contact_arcs = 0;
-    exact->side = side;
-    exact->origin = (Origin)side;
-    exact->state.r = 0;
-    const double speed = fabs(exact->state.w);
-    ledger_open(&exact->ledger, IMPACT_IMPACT, now(exact), side, speed);
-    ledger_force(&exact->ledger, exact->plan->stops[side].damping * speed);
-}
-
-static void begin_rest(Exact *exact, Side side) {
-    // What relative momentum is left goes over to both, conserved.
-    const double mass = exact->plan->damper_mass * (1 - exact->resting.share);
-    ledger_lose(&exact->ledger, 0.5 * mass * exact->state.w * exact->state.w);
-    exact->state.v += exact->resting.share * exact->state.w;
-    exact->state.w = 0;
-    exact->state.r = 0;
-    exact->origin = (Origin)side;
-    exact->phase = RESTING;
-    exact->side = side;
-    ledger_open(&exact->ledger, IMPACT_RESTING, now(exact), side, NAN);
-    ledger_force(&exact->ledger, fabs(force(exact)));
-}
-
-static void bounce(Exact *exact, Side side) {
-    const Plan *plan = exact->plan;
-    const double sign = sign_of(side), e = plan->stops[side].restitution;
-    const double approach = fabs(exact->state.w);
-    const double mass = plan->damper_mass * (1 - exact->resting.share);  // m_e = m M / (M + m)
-    exact->origin = (Origin)side;
-    exact->state.r = 0;
-    exact->state.v += sign * exact->resting.share * (1 + e) * approach;
-    exact->state.w = -sign * e * approach;
-    ledger_bounce(&exact->ledger, now(exact), side, approach, e * approach, mass);
-    // Bounces towards a pushing stop follow each other in a geometric series. When all that are left take less time
-    // than the clock resolves, they are one: the mass rests.
-    const double pull = sign * push(exact);
-    const double left = 2 * e * approach / (pull * (1 - e));
-    const double clock = 4 * DBL_EPSILON * fmax(now(exact), exact->interval);
-    if (pull >= 0 && (e * approach == 0 || left <= clock))
-        begin_rest(exact, side);
-}
-
-static void touch(Exact *exact, Side side) {
-    exact->is_leaving = false;
-    note_event(exact);
-    if (exact->plan->form == CONTACT_LINEAR)
-        begin_contact(exact, side);
-    else if (exact->plan->clearance == 0)
-        begin_rest(exact, side);
-    else
-        bounce(exact, side);
-    note_event(exact);
-}
-
-static void release(Exact *exact) {
-    note_event(exact);
-    // A slope of the wrong sign is rounding: the gap does open.
-    const double sign = sign_of(exact->side);
-    exact->is_leaving = exact->phase == RESTING;
-    exact->state.r = 0;
-    exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
-    ledger_close(&exact->ledger, now(exact), exact->phase == RESTING ? NAN : fabs(exact->state.w));
-    const bool is_held = exact->phase == RESTING && exact->plan->clearance == 0;
-    exact->phase = FLIGHT;
-    if (is_held)  // between stops without clearance the other one takes over
-        begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
-    note_event(exact);
-}
-
-// Finds the first event on the arc. In flight `side` is the stop that is reached.
-static bool find_event(const Exact *exact, Arc *arc, double *s, Side *side) {
-    double gap[ROOT_DEGREE + 1];
-    *side = exact->side;
-    if (exact->phase == RESTING) {
-        // arc.push times the side's sign must stay positive.
-        const double sign = sign_of(exact->side);
-        for (size_t k = 0; k < arc->degree; k++)
-            gap[k] = sign * arc->push[k];
-        gap[0] = fmax(gap[0], 0);
-        return root_first_crossing(gap, arc->degree - 1, s);
-    }
-    if (exact->phase == CONTACT) {
-        const double sign = sign_of(exact->side);
-        for (size_t k = 0; k <= arc->degree; k++)
-            gap[k] = sign * arc->r[k];
-        gap[0] = fmax(gap[0], 0);
-        return root_first_crossing(gap, arc->degree, s);
-    }
-    bool is_found = false;
-    if (!exact->plan->has_damper)
-        return false;
-    for (int i = 0; i < 2; i++) {
-        const double sign = sign_of((Side)i);
-        for (size_t k = 0; k <= arc->degree; k++)
-            gap[k] = -sign * arc->r[k];
-        gap[0] = fmax(gap[0] + room(exact, (Side)i), 0);
-        if (exact->is_leaving && exact->origin == (Origin)i)
-            gap[0] = gap[1] = gap[2] = 0;
-        double at;
-        if (root_first_crossing(gap, arc->degree, &at) && (!is_found || at < *s)) {
-            is_found = true;
-            *s = at;
-            *side = (Side)i;
-        }
-    }
-    return is_found;
-}
 
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
@@ -243,7 +30,7 @@ static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
 
 // What a stretch of contact or rest adds to its row of the ledger.
 static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integrals) {
-    const double mass = exact->plan->damper_mass * (1 - exact->resting.share);
+    const double mass = exact_effective_mass(exact);
     double s = -1;
     const double peak = arc_peak_force(arc, exact->ledger.open.peak_force / mass, &s);
     ledger_force(&exact->ledger, mass * peak);
@@ -259,7 +46,7 @@ static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integ
 
 // After an arc of free flight: has the gap opened beyond rounding yet?
 static void leave(Exact *exact) {
-    const double sign = sign_of((Side)exact->origin);
+    const double sign = exact_sign((Side)exact->origin);
     if (sign * exact->state.r < 0 && sign * exact->state.w < 0)
         exact->is_leaving = false;
     else
@@ -271,9 +58,13 @@ static Status keep_going(Exact *exact) {
     exact->arcs = 0;
     if (!isfinite(state->x) || !isfinite(state->v) || !isfinite(state->r) || !isfinite(state->w))
         return problem_set(exact->problem, STATUS_UNSTABLE,
-                           "the motion left what double precision can hold at t = %.6g s", now(exact));
-    if (!watch_advance(exact->run->watch, now(exact) / exact->plan->duration))
-        return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", now(exact));
+                           "the motion left what double precision can hold at t = %.6g s", exact_time(exact));
+    if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
+        return problem_set(exact->problem, STATUS_LIMIT,
+                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s", exact->run->steps_most,
+                           exact_time(exact), exact->plan->duration);
+    if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
+        return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", exact_time(exact));
     return STATUS_OK;
 }
 
@@ -284,9 +75,9 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
         return false;
     if (!held->is_made)
         hold_make(held, &exact->touching[exact->side], slice->omega, exact->interval);
-    const double mass = exact->plan->damper_mass * (1 - exact->resting.share);
+    const double mass = exact_effective_mass(exact);
     State end;
-    const HoldLevel *level = hold_step(held, &exact->state, slice, length, sign_of(exact->side),
+    const HoldLevel *level = hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
                                        exact->ledger.open.peak_force / mass, &end);
     if (level == NULL)
         return false;
@@ -295,7 +86,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     take_integrals(exact, &integrals);
     exact->state = end;
     exact->offset += level->length;
-    ledger_force(&exact->ledger, fabs(force(exact)));
+    ledger_force(&exact->ledger, fabs(exact_force(exact)));
     ledger_stretch(&exact->ledger, level->length, mass * impulse,
                    exact->plan->stops[exact->side].damping * integrals.ww);
     return true;
@@ -303,7 +94,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
 
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(Exact *exact, double length) {
-    const Motion *system = motion(exact);
+    const Motion *system = exact_motion(exact);
     Slice slice;
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
@@ -315,7 +106,7 @@ static Status advance(Exact *exact, double length) {
     arc_make(&arc, system, &exact->state, &slice, length);
     double s;
     Side side;
-    const bool is_event = find_event(exact, &arc, &s, &side);
+    const bool is_event = exact_find_event(exact, &arc, &s, &side);
     if (is_event)
         arc_cut(&arc, s);
     if (arc.length > 0) {
@@ -332,11 +123,11 @@ static Status advance(Exact *exact, double length) {
     if (is_event) {
         if (++exact->still_events > STILL_EVENTS)
             return problem_set(exact->problem, STATUS_UNSTABLE,
-                               "more than %d contact events at one instant, t = %.17g s", STILL_EVENTS, now(exact));
+                               "more than %d contact events at one instant, t = %.17g s", STILL_EVENTS, exact_time(exact));
         if (exact->phase == FLIGHT)
-            touch(exact, side);
+            exact_touch(exact, side);
         else
-            release(exact);
+            exact_release(exact);
         TRY(ledger_status(&exact->ledger, exact->problem));
     }
     return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
@@ -351,13 +142,12 @@ static bool fly(Exact *exact) {
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
     if (exact->plan->has_damper) {
-        const double most = slice.omega > 0
-                                ? fabs(slice.value) + fabs(slice.slope)
-                                : fmax(fabs(slice.value), fabs(slice.value + slice.slope * exact->interval));
+        const double first = fabs(slice.value), last = fabs(slice.value + slice.slope * exact->interval);
+        const double most = slice.omega > 0 ? first + fabs(slice.slope) : first > last ? first : last;
         const double sag = flight_curvature(&exact->flight, &exact->state, most) * exact->interval *
                            exact->interval / 8;
-        const double right = room(exact, SIDE_RIGHT), left = room(exact, SIDE_LEFT);
-        if (!(fmin(right - fmax(exact->state.r, end.r), left + fmin(exact->state.r, end.r)) > sag))
+        const double nearest = exact_room(exact, SIDE_RIGHT) - sag, furthest = sag - exact_room(exact, SIDE_LEFT);
+        if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest && end.r > furthest))
             return false;
     }
     take_integrals(exact, &integrals);
@@ -368,16 +158,22 @@ static bool fly(Exact *exact) {
 
 // From the present sample over `length`.
 static Status cross(Exact *exact, double length) {
-    while (exact->offset < length) {
+    // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
+    const double clock = 2 * DBL_EPSILON * length;
+    while (length - exact->offset > clock) {
         const double before = exact->offset;
+        const size_t events = exact->still_events;
         TRY(advance(exact, length - exact->offset));
-        if (exact->offset == before && exact->still_events == 0)
-            break;  // what is left is below the clock's resolution
+        if (exact->offset == before && exact->still_events == events)
+            return problem_set(exact->problem, STATUS_UNSTABLE,
+                               "the contact is too stiff to be followed: at t = %.6g s a step of 1/%.6g s is below "
+                               "the clock's resolution",
+                               exact_time(exact), exact_motion(exact)->rate);
     }
     return STATUS_OK;
 }
 
-static void prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
+static Status prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
     const Plan *plan = run->plan;
     memset(exact, 0, sizeof *exact);
     exact->run = run;
@@ -398,14 +194,19 @@ static void prepare(Exact *exact, Run *run, Response *response, Problem *problem
         touching->contact_damping = plan->stops[side].damping / mass;
         touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping), flying.rate);
     }
+    if (!isfinite(flying.rate) || !isfinite(exact->touching[SIDE_LEFT].rate + exact->touching[SIDE_RIGHT].rate) ||
+        !(share > 0 || !plan->has_damper) || !(share < 1))
+        return problem_set(problem, STATUS_UNSTABLE,
+                           "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
     flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0, exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement, plan->velocity, plan->position, plan->relative_velocity};
-    const EnergyState energy = energy_state(exact);
+    const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     recorder_start(&exact->recorder, run, response);
+    return STATUS_OK;
 }
 
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
@@ -416,10 +217,10 @@ static Status settle(Exact *exact) {
         double s;
         Side side;
         (void)base_cursor_slice(&exact->base, 0, 0, &slice);
-        arc_make(&arc, motion(exact), &exact->state, &slice, fmin(exact->interval, 1 / motion(exact)->rate));
-        is_event = exact->phase == FLIGHT && find_event(exact, &arc, &s, &side) && s == 0;
+        arc_make(&arc, exact_motion(exact), &exact->state, &slice, fmin(exact->interval, 1 / exact_motion(exact)->rate));
+        is_event = exact->phase == FLIGHT && exact_find_event(exact, &arc, &s, &side) && s == 0;
         if (is_event)
-            touch(exact, side);
+            exact_touch(exact, side);
     }
     return ledger_status(&exact->ledger, exact->problem);
 }
@@ -427,7 +228,7 @@ static Status settle(Exact *exact) {
 static Status solve(Exact *exact) {
     const Plan *plan = exact->plan;
     TRY(settle(exact));
-    Moment at = moment(exact);
+    Moment at = exact_moment(exact);
     recorder_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
     ledger_peaks(&exact->ledger, &at);
     while (exact->sample + 1 < plan->count) {
@@ -438,25 +239,25 @@ static Status solve(Exact *exact) {
         }
         exact->sample++;
         exact->offset = 0;
-        at = moment(exact);
+        at = exact_moment(exact);
         recorder_take(&exact->recorder, exact->sample, &at, base_cursor_at(&exact->base, exact->sample));
         ledger_peaks(&exact->ledger, &at);
         if (exact->sample % 64 == 0) {
-            const EnergyState energy = energy_state(exact);
+            const EnergyState energy = exact_energy(exact);
             ledger_balance(&exact->ledger, &energy);
         }
     }
     // The duration may end between samples.
     TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
-    note_event(exact);
+    exact_note(exact);
     TRY(keep_going(exact));
-    const EnergyState energy = energy_state(exact);
+    const EnergyState energy = exact_energy(exact);
     return ledger_finish(&exact->ledger, &energy, exact->problem);
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
     Exact exact;
-    prepare(&exact, run, response, problem);
+    TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);
     recorder_finish(&exact.recorder, response);
     free(exact.holds[SIDE_LEFT]);

@@ -23,6 +23,7 @@ typedef struct Run {
     double *columns[CHANNEL_COUNT];  // plan->count values each; NULL: not wanted
     double statistics_from;          // [s]
     size_t impacts_most;             // ledger rows; 0: no limit
+    double steps_most;               // solver steps; 0: no limit
     double steps;                    // out: work counted, in solver steps
 } Run;
 

@@ -377,7 +377,7 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
             MHD_OPTION_THREAD_POOL_SIZE, (unsigned)THREADS, MHD_OPTION_CONNECTION_LIMIT,
             (unsigned)CONNECTIONS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
             MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)(IDLE_MS / 1000), MHD_OPTION_STRICT_FOR_CLIENT,
-            1, MHD_OPTION_URI_LOG_CALLBACK, on_target, made, MHD_OPTION_NOTIFY_CONNECTION,
+            0, MHD_OPTION_URI_LOG_CALLBACK, on_target, made, MHD_OPTION_NOTIFY_CONNECTION,
             on_connection, made, MHD_OPTION_NOTIFY_COMPLETED, on_completed, made, MHD_OPTION_END);
         if (made->daemon == NULL) {
             close(descriptor);

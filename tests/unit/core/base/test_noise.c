@@ -49,6 +49,43 @@ static void a_pair_is_box_and_mullers_of_the_counters_words(void **state) {
     assert_true(fabsl(pair[1] - radius * sinl(angle)) < 1e-15L * radius);
 }
 
+static uint32_t inverse(uint32_t odd) {
+    uint32_t x = odd; // right in its 3 lowest bits; each step doubles them
+    for (int i = 0; i < 4; i++)
+        x *= 2 - odd * x;
+    return x;
+}
+
+// The counter whose result is `out`: every round can be undone.
+static void unphilox(const uint32_t out[4], const uint32_t key[2], uint32_t counter[4]) {
+    uint32_t c[4];
+    memcpy(c, out, sizeof c);
+    for (uint32_t round = 10; round-- > 0;) {
+        const uint32_t c0 = c[3] * inverse(0xD2511F53), c2 = c[1] * inverse(0xCD9E8D57);
+        const uint64_t a = UINT64_C(0xD2511F53) * c0, b = UINT64_C(0xCD9E8D57) * c2;
+        const uint32_t c1 = c[0] ^ (uint32_t)(b >> 32) ^ (key[0] + round * 0x9E3779B9u);
+        const uint32_t c3 = c[2] ^ (uint32_t)(a >> 32) ^ (key[1] + round * 0xBB67AE85u);
+        memcpy(c, (const uint32_t[]){c0, c1, c2, c3}, sizeof c);
+    }
+    memcpy(counter, c, sizeof c);
+}
+
+static void even_the_rarest_words_make_finite_numbers(void **state) {
+    (void)state;
+    const uint32_t key[2] = {0, 0}, least[4] = {0, 0, 0, 0}, most[4] = {~0u, ~0u, ~0u, ~0u};
+    uint32_t c[4], back[4];
+    double pair[2];
+    unphilox(least, key, c);
+    noise_philox(c, key, back);
+    assert_memory_equal(back, least, sizeof back);
+    noise_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
+    assert_true(fabs(pair[0] - sqrt(2 * 53 * log(2))) < 1e-14); // 8.57
+    assert_true(pair[1] == 0);
+    unphilox(most, key, c);
+    noise_normal_pair(0, (uint64_t)c[3] << 32 | c[2], (uint64_t)c[1] << 32 | c[0], pair);
+    assert_true(pair[0] == 0 && pair[1] == 0);
+}
+
 static void the_normal_numbers_have_a_normal_distributions_moments(void **state) {
     (void)state;
     enum { PAIRS = 1000000 };
@@ -96,6 +133,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_generator_gives_the_published_integers),
         cmocka_unit_test(a_pair_is_box_and_mullers_of_the_counters_words),
+        cmocka_unit_test(even_the_rarest_words_make_finite_numbers),
         cmocka_unit_test(the_normal_numbers_have_a_normal_distributions_moments),
         cmocka_unit_test(seed_stream_and_index_each_matter_in_both_halves),
     };
