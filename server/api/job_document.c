@@ -73,7 +73,7 @@ void job_put_dry_run(Bytes *bytes, const DryRun *run) {
     bytes_text(bytes, ", \"bytes\": ");
     bytes_real(bytes, run->cost.bytes);
     bytes_text(bytes, "}, \"warnings\": ");
-    write_list(bytes, warning_fields, run->warnings.at, run->warnings.count, sizeof *run->warnings.at,
-               WRITE_REPORT);
+    write_list(bytes, warning_fields, run->warnings.at, run->warnings.count,
+               sizeof *run->warnings.at, WRITE_REPORT);
     bytes_text(bytes, "}");
 }

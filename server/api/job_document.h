@@ -7,8 +7,9 @@
 #include "server/jobs/intake.h"
 
 enum {
-    JOB_PUT_WHOLE = 1,  // with plan, summary and warnings, as one job is shown; without, as in a list
-    JOB_PUT_LINKS = 2,  // where a server has it; without, "links" is empty
+    JOB_PUT_WHOLE =
+        1, // with plan, summary and warnings, as one job is shown; without, as in a list
+    JOB_PUT_LINKS = 2, // where a server has it; without, "links" is empty
 };
 
 void job_put(Bytes *bytes, const JobShow *show, int parts);

@@ -1,4 +1,5 @@
-// impactd check SCENE.json: the dry run of the daemon, for people or (--json) as the daemon answers it.
+// impactd check SCENE.json: the dry run of the daemon, for people or (--json) as the daemon answers
+// it.
 #include "server/command/check.h"
 
 #include <stdio.h>
@@ -27,7 +28,8 @@ static void real_print(const char *name, double value, const char *unit) {
 
 // "  right of damper 1, sponge@1:  e = 0.61  T_c = 0.025 s ..."
 static void derived_print(const Derived *derived) {
-    printf("  %s stop of damper %llu", side_names[derived->side], (unsigned long long)derived->damper);
+    printf("  %s stop of damper %llu", side_names[derived->side],
+           (unsigned long long)derived->damper);
     if (derived->material != NULL)
         printf(", %s", derived->material);
     putchar(':');
@@ -76,9 +78,8 @@ static void plan_print(const char *path, const DryRun *run) {
 }
 
 static Status plan_show(const char *path, const Bytes *text, bool is_json, Problem *problem) {
-    const IntakeSettings settings = {.workers = 1,
-                                     .queue_most = 1,
-                                     .limits = {SCENE_FILE_SAMPLES, SCENE_FILE_IMPACTS}};
+    const IntakeSettings settings = {
+        .workers = 1, .queue_most = 1, .limits = {SCENE_FILE_SAMPLES, SCENE_FILE_IMPACTS}};
     Store *store = NULL;
     Intake *intake = NULL;
     DryRun run = {0};
@@ -110,7 +111,8 @@ static int check(int argc, char *const *argv, Problem *problem) {
     (void)fields_default(check_fields, &settings);
     Status status = options_read(check_fields, &settings, argc, argv, NULL, &options, problem);
     if (status == STATUS_OK && options.operand_count != 1)
-        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu", options.operand_count);
+        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
+                             options.operand_count);
     if (status != STATUS_OK)
         return command_refuse("check", problem);
     const char *path = options.operands[0];
@@ -137,11 +139,12 @@ const Command command_check = {
     .name = "check",
     .operands = "SCENE.json",
     .summary = "say what is wrong with a scene, or show its plan",
-    .help = "  impactd check scene.json          all faults at once, or what would be done and why\n"
-            "  impactd check scene.json --json   the same for programs\n"
-            "  impactd check - < scene.json      from standard input\n"
-            "\n"
-            "Runs nothing. Exit code 3 if the scene has faults.\n",
+    .help =
+        "  impactd check scene.json          all faults at once, or what would be done and why\n"
+        "  impactd check scene.json --json   the same for programs\n"
+        "  impactd check - < scene.json      from standard input\n"
+        "\n"
+        "Runs nothing. Exit code 3 if the scene has faults.\n",
     .options = check_fields,
     .run = check_run,
 };

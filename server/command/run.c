@@ -1,5 +1,5 @@
-// impactd run SCENE.json: what the daemon does with a job, without the daemon. The scene is judged and completed as
-// there, so that equal scenes have equal results by number and by id.
+// impactd run SCENE.json: what the daemon does with a job, without the daemon. The scene is judged
+// and completed as there, so that equal scenes have equal results by number and by id.
 #include "server/command/run.h"
 
 #include <stdio.h>
@@ -62,12 +62,14 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
 }
 
 // A job of nobody's queue, finished.
-static Status job_write(const Simulation *simulation, const Warnings *warnings, const Outcome *outcome,
-                        const int64_t began_unix_ms, double took, Bytes *bytes) {
+static Status job_write(const Simulation *simulation, const Warnings *warnings,
+                        const Outcome *outcome, const int64_t began_unix_ms, double took,
+                        Bytes *bytes) {
     Bytes plan = {0}, summary = {0}, told = {0};
     write_item(&plan, plan_report_fields, &outcome->plan, WRITE_REPORT);
     write_item(&summary, summary_fields, &outcome->summary, WRITE_REPORT);
-    write_list(&told, warning_fields, warnings->at, warnings->count, sizeof *warnings->at, WRITE_REPORT);
+    write_list(&told, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
+               WRITE_REPORT);
     JobShow show = {.id = "j-local",
                     .state = JOB_SUCCESSFUL,
                     .progress = 100,
@@ -164,14 +166,16 @@ static Status encoder_choose(const char *output, const Encoder **encoder, Proble
     for (size_t i = 0, used = 0; encoders[i] != NULL && used < sizeof known; i++)
         used += (size_t)snprintf(known + used, sizeof known - used, "%s.%s", i > 0 ? ", " : "",
                                  encoders[i]->extension);
-    return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known, output);
+    return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known,
+                       output);
 }
 
 static int run(const RunSettings *settings, const Options *options, Problem *problem) {
     const Encoder *encoder = NULL;
     Status status = encoder_choose(settings->output, &encoder, problem);
     if (status == STATUS_OK && options->operand_count != 1)
-        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu", options->operand_count);
+        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
+                             options->operand_count);
     if (status != STATUS_OK)
         return command_refuse("run", problem);
     const char *path = options->operands[0];
@@ -194,9 +198,10 @@ static int run_run(int argc, char *const *argv) {
         free(problem);
         return command_exit(STATUS_NO_MEMORY);
     }
-    const int code = options_read(run_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
-                         ? run(&settings, &options, problem)
-                         : command_refuse("run", problem);
+    const int code =
+        options_read(run_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
+            ? run(&settings, &options, problem)
+            : command_refuse("run", problem);
     fields_clear(run_fields, &settings);
     free(problem);
     return code;
@@ -206,14 +211,15 @@ const Command command_run = {
     .name = "run",
     .operands = "SCENE.json",
     .summary = "run one scene here, without a daemon",
-    .help = "  impactd run scene.json                 print the finished job\n"
-            "  impactd run scene.json -o out.csv      write the time series, as a table\n"
-            "  impactd run scene.json -o out.npy      the same for numpy.load\n"
-            "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
-            "  impactd run - < scene.json             from standard input\n"
-            "\n"
-            "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
-            "Exit code 3 if the scene has faults, 1 if the run failed.\n",
+    .help =
+        "  impactd run scene.json                 print the finished job\n"
+        "  impactd run scene.json -o out.csv      write the time series, as a table\n"
+        "  impactd run scene.json -o out.npy      the same for numpy.load\n"
+        "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
+        "  impactd run - < scene.json             from standard input\n"
+        "\n"
+        "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
+        "Exit code 3 if the scene has faults, 1 if the run failed.\n",
     .options = run_fields,
     .run = run_run,
 };
