@@ -27,9 +27,7 @@ static Outcome *run(Simulation *simulation) {
     if (simulation_complete(simulation, NULL, &warnings, &problem) != STATUS_OK ||
         simulation_run(simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].pointer : "");
-    for (size_t i = 0; i < warnings.count; i++)
-        fields_clear(warning_fields, &warnings.at[i]);
-    free(warnings.at);
+    warnings_clear(&warnings);
     simulation_clear(simulation);
     return outcome;
 }
