@@ -1,4 +1,5 @@
-// Sample i stands at t = i * interval; between samples the acceleration is linear, from the last one on it is 0.
+// Sample i stands at t = i * interval; between samples the acceleration is linear, from the last
+// one on it is 0.
 #include "core/excite/base.h"
 
 #include <math.h>

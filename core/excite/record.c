@@ -21,7 +21,7 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
     (void)span;
     const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
     if (!isfinite(record->scale))
-        return STATUS_OK;  // told by the rows
+        return STATUS_OK; // told by the rows
     for (size_t i = 0; i < record->samples.count; i++) {
         if (isfinite(record->samples.at[i] * record->scale) || !isfinite(record->samples.at[i]))
             continue;

@@ -1,5 +1,5 @@
-// A sine of the base, amplitude * sin(2 pi f t), given as its acceleration or as its displacement; of the latter the
-// acceleration is a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
+// A sine of the base, amplitude * sin(2 pi f t), given as its acceleration or as its displacement;
+// of the latter the acceleration is a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
 #include <string.h>
 
 #include "core/excite/sine.h"
@@ -23,8 +23,7 @@ static double omega_of(const ExcitationSine *sine) {
 
 static double amplitude_of(const ExcitationSine *sine) {
     const double omega = omega_of(sine);
-    return sine->quantity == SINE_DISPLACEMENT ? -sine->amplitude * omega * omega
-                                               : sine->amplitude;
+    return sine->quantity == SINE_DISPLACEMENT ? -sine->amplitude * omega * omega : sine->amplitude;
 }
 
 static Status sine_complete(Excitation *excitation, const Span *span, const char *pointer,
@@ -34,7 +33,7 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
     if (sine->quantity == CHOICE_ABSENT)
         sine->quantity = SINE_ACCELERATION;
     if (!isfinite(sine->frequency) || !isfinite(sine->amplitude))
-        return STATUS_OK;  // told by the rows
+        return STATUS_OK; // told by the rows
     char place[sizeof((Fault){0}.pointer)];
     if (!isfinite(omega_of(sine))) {
         pointer_join(place, sizeof place, pointer, "frequency");

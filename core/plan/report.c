@@ -7,7 +7,7 @@
 #include "core/base/side.h"
 #include "core/plan/plan.h"
 
-enum { REPORT_LINES = 256 };  // warnings or decisions at most; more would not be read
+enum { REPORT_LINES = 256 }; // warnings or decisions at most; more would not be read
 
 // clang-format off
 const Field decision_fields[] = {

@@ -1,4 +1,5 @@
-// A buffer is given in exactly one way: e with T_c, e alone, or k_b with c_b. Which of them do depends on the law.
+// A buffer is given in exactly one way: e with T_c, e alone, or k_b with c_b. Which of them do
+// depends on the law.
 #include "core/scene/buffer.h"
 
 #include <stdlib.h>
@@ -36,10 +37,9 @@ static bool is_same(double a, double b) {
 }
 
 bool buffer_equals(const Buffer *a, const Buffer *b) {
-    const bool is_same_material =
-        a->material == NULL || b->material == NULL
-            ? a->material == b->material
-            : strcmp(a->material, b->material) == 0;
+    const bool is_same_material = a->material == NULL || b->material == NULL
+                                      ? a->material == b->material
+                                      : strcmp(a->material, b->material) == 0;
     return is_same_material && is_same(a->restitution, b->restitution) &&
            is_same(a->contact_time, b->contact_time) && is_same(a->stiffness, b->stiffness) &&
            is_same(a->damping, b->damping);
@@ -85,8 +85,7 @@ static Status check_way(const Buffer *buffer, const char *pointer, Problem *prob
     return STATUS_OK;
 }
 
-Status buffer_check(const Buffer *buffer, ContactForm form, const char *pointer,
-                    Problem *problem) {
+Status buffer_check(const Buffer *buffer, ContactForm form, const char *pointer, Problem *problem) {
     if (problem_concerns(problem, pointer))
         return STATUS_INVALID;
     TRY(check_way(buffer, pointer, problem));

@@ -1,5 +1,5 @@
-// A damper may have one buffer for both stops, one for each, or one for both and another for one of them. What all of
-// these mean is kept in one form, so that equal dampers are written equally.
+// A damper may have one buffer for both stops, one for each, or one for both and another for one of
+// them. What all of these mean is kept in one form, so that equal dampers are written equally.
 #include "core/scene/damper.h"
 
 #include <stdlib.h>
@@ -26,8 +26,7 @@ enum { BUFFERS = 3 };
 static const char *const buffer_names[BUFFERS] = {"buffer", "left_buffer", "right_buffer"};
 
 static Buffer *buffer_at(Damper *damper, size_t index) {
-    Buffer *const buffers[BUFFERS] = {&damper->buffer, &damper->left_buffer,
-                                      &damper->right_buffer};
+    Buffer *const buffers[BUFFERS] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
     return buffers[index];
 }
 

@@ -1,5 +1,5 @@
-// Judging what rows cannot see. Each part is judged on its own, so that all faults are told at once; a part that could
-// not be read, or has a fault already, is passed over.
+// Judging what rows cannot see. Each part is judged on its own, so that all faults are told at
+// once; a part that could not be read, or has a fault already, is passed over.
 #include "core/scene/scene.h"
 
 #include <stdio.h>
@@ -43,7 +43,8 @@ static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
     char duration[32], rate[32], count[32];
     text_real(duration, scene->duration);
     text_real(rate, scene->sample_rate);
-    text_real(count, last_sample(scene) + 1);
+    const double samples = last_sample(scene) + 1;
+    snprintf(count, sizeof count, samples < 1e15 ? "%.0f" : "%.3g", samples);
     return problem_add_real(problem, STATUS_INVALID, "/duration", scene->duration, "s",
                             "%s s at a sample_rate of %s Hz are %s samples, must be at most %zu",
                             duration, rate, count, most);

@@ -1,12 +1,12 @@
-// Single values go by a table over the names of their rows, which mean the same wherever they stand; the rest are
-// relations between two parts.
+// Single values go by a table over the names of their rows, which mean the same wherever they
+// stand; the rest are relations between two parts.
 #include "core/simulation/plausible.h"
 
 #include <string.h>
 
 typedef struct Usual {
-    const char *name;  // of a REAL row
-    double most;       // usual magnitude at most, in the row's unit
+    const char *name; // of a REAL row
+    double most;      // usual magnitude at most, in the row's unit
     const char *hint;
 } Usual;
 
@@ -29,8 +29,7 @@ static const Usual *usual_find(const char *name) {
     return NULL;
 }
 
-static Status warn_real(const Field *field, double value, const char *pointer,
-                        Warnings *warnings) {
+static Status warn_real(const Field *field, double value, const char *pointer, Warnings *warnings) {
     const Usual *limit = usual_find(field->name);
     if (limit == NULL || !(fabs(value) > limit->most))
         return STATUS_OK;

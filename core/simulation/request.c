@@ -1,4 +1,5 @@
-// What was asked, judged and completed. Three steps: the rows, what rows cannot see, and only then warnings.
+// What was asked, judged and completed. Three steps: the rows, what rows cannot see, and only then
+// warnings.
 #include <stdlib.h>
 #include <string.h>
 
@@ -160,11 +161,10 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     if (scene->duration > 0 && output->statistics_from > scene->duration &&
         isfinite(output->statistics_from)) {
         char duration[32], is[32];
-        status = problem_add_real(problem, STATUS_INVALID, "/output/statistics_from",
-                                  output->statistics_from, "s",
-                                  "must be within the duration, [0, %s] s, is %s",
-                                  text_real(duration, scene->duration),
-                                  text_real(is, output->statistics_from));
+        status = problem_add_real(
+            problem, STATUS_INVALID, "/output/statistics_from", output->statistics_from, "s",
+            "must be within the duration, [0, %s] s, is %s", text_real(duration, scene->duration),
+            text_real(is, output->statistics_from));
     }
     const Status psd = complete_psd(&output->psd, count, warnings, problem);
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
@@ -176,8 +176,7 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     const Status rows = fields_check(simulation_fields, simulation, "", problem);
     const Status scene = scene_complete(&simulation->scene, most_samples, problem);
     // Faults that the caller met before are among those of the problem.
-    const bool is_sound =
-        rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
+    const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
     const size_t count = is_sound ? scene_sample_count(&simulation->scene) : 0;
     Status status = complete_output(simulation, count, warnings, problem);
     TRY(rows);

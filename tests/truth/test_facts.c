@@ -14,6 +14,7 @@
 #include "core/excite/sine.h"
 #include "core/math/fourier.h"
 #include "tests/support/paper.h"
+#include "tests/support/scenes.h"
 
 static const double TURN = 6.283185307179586;
 
@@ -145,9 +146,7 @@ static void sponge_contacts_in_free_vibration_last_as_long_as_published(void **s
 }
 
 static void constant_base(Simulation *simulation, double acceleration, double duration) {
-    variant_free(simulation->scene.excitation);
-    simulation->scene.excitation = variant_new(&excitation_record.kind);
-    assert_non_null(simulation->scene.excitation);
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "record");
     ExcitationRecord *record = (ExcitationRecord *)(void *)simulation->scene.excitation;
     record->samples.at = malloc(2 * sizeof *record->samples.at);
     assert_non_null(record->samples.at);

@@ -19,7 +19,7 @@ static void table_one_of_the_paper_is_met_within_half_a_percent(void **state) {
     static const struct {
         double e, T_c, k_b, c_b;
     } table[] = {
-        {0.61, 0.025, 1.65e3, 4.05},  {0.44, 0.019, 2.99e3, 8.80}, {0.53, 0.004, 65.7e3, 32.5},
+        {0.61, 0.025, 1.65e3, 4.05},  {0.44, 0.019, 2.99e3, 8.80},  {0.53, 0.004, 65.7e3, 32.5},
         {0.49, 0.003, 118.0e3, 48.7}, {0.46, 0.0003, 11900e3, 530},
     };
     const double m_e = effective_mass(1.35, 0.1107);

@@ -21,10 +21,18 @@ static void channels_and_their_names_are_in_one_order(void **state) {
 // The order of the contract, which CSV and JSON keep.
 static void an_impact_has_these_rows(void **state) {
     (void)state;
-    static const char *const names[] = {
-        "kind",           "start",            "end",         "damper",   "side",
-        "approach_speed", "separation_speed", "restitution", "duration", "peak_force",
-        "impulse",        "energy_lost"};
+    static const char *const names[] = {"kind",
+                                        "start",
+                                        "end",
+                                        "damper",
+                                        "side",
+                                        "approach_speed",
+                                        "separation_speed",
+                                        "restitution",
+                                        "duration",
+                                        "peak_force",
+                                        "impulse",
+                                        "energy_lost"};
     for (size_t i = 0; i < COUNT(names); i++)
         assert_string_equal(impact_fields[i].name, names[i]);
     assert_int_equal(impact_fields[COUNT(names)].kind, FIELD_KIND_END);
