@@ -1,5 +1,5 @@
-// Each present row is its name and a NUL, then its value; an object ends with an empty name. Texts, lists and arrays
-// begin with their length, so no value can be mistaken for another's beginning.
+// Each present row is its name and a NUL, then its value; an object ends with an empty name. Texts,
+// lists and arrays begin with their length, so no value can be mistaken for another's beginning.
 #include "core/base/canonical.h"
 
 #include <string.h>
@@ -8,7 +8,7 @@ typedef struct Writer {
     void (*take)(void *context, const void *bytes, size_t size);
     void *context;
     size_t length;
-    unsigned char bytes[4096];  // small pieces gathered
+    unsigned char bytes[4096]; // small pieces gathered
 } Writer;
 
 static void flush(Writer *writer) {
@@ -37,7 +37,7 @@ static void put_count(Writer *writer, uint64_t value) {
 
 static void put_real(Writer *writer, double value) {
     uint64_t bits;
-    value += 0.0;  // -0 becomes 0
+    value += 0.0; // -0 becomes 0
     memcpy(&bits, &value, sizeof bits);
     put_count(writer, bits);
 }

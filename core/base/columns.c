@@ -1,4 +1,5 @@
-// One block for all columns: one allocation, one free, and a matrix in Fortran order for whoever wants one.
+// One block for all columns: one allocation, one free, and a matrix in Fortran order for whoever
+// wants one.
 #include "core/base/columns.h"
 
 #include <stdint.h>

@@ -1,5 +1,5 @@
-// Every walk is one switch over the kind of a row. Members are reached by offset; lists go through memcpy, because a
-// typed twin's pointer may not be read as another pointer type.
+// Every walk is one switch over the kind of a row. Members are reached by offset; lists go through
+// memcpy, because a typed twin's pointer may not be read as another pointer type.
 #include "core/base/field.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-// Judging rows: what is said of a value that its row does not allow. One sentence per fault: what is wrong, what would
-// be right, the unit.
+// Judging rows: what is said of a value that its row does not allow. One sentence per fault: what
+// is wrong, what would be right, the unit.
 #include <stdio.h>
 #include <string.h>
 
@@ -46,8 +46,8 @@ static Status check_length(size_t most, size_t has, const char *what, const char
                            Problem *problem) {
     if (most == 0 || has <= most)
         return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, pointer, "must have at most %zu %s, has %zu", most,
-                       what, has);
+    return problem_add(problem, STATUS_INVALID, pointer, "must have at most %zu, has %zu %s", most,
+                       has, what);
 }
 
 static Status check_missing(const Field *field, const char *pointer, Problem *problem) {
@@ -115,9 +115,8 @@ static Status check_member(const Field *field, const void *item, const char *poi
         return check_number(field, (double)*(const uint64_t *)member, pointer, problem);
     case FIELD_KIND_TEXT: {
         const char *text = *(char *const *)member;
-        return text == NULL
-                   ? STATUS_OK
-                   : check_length(field->most, strlen(text), "bytes", pointer, problem);
+        return text == NULL ? STATUS_OK
+                            : check_length(field->most, strlen(text), "bytes", pointer, problem);
     }
     case FIELD_KIND_CHOICE: {
         int choices = 0;
@@ -173,8 +172,8 @@ static Status check_member(const Field *field, const void *item, const char *poi
     return STATUS_OK;
 }
 
-// Whether an absent member is a fault. A default leaves nothing absent but what may be empty (texts and lists) or
-// was erased because it is not used (a choice).
+// Whether an absent member is a fault. A default leaves nothing absent but what may be empty (texts
+// and lists) or was erased because it is not used (a choice).
 static bool must_be_there(const Field *field) {
     if (field->presence == PRESENCE_REQUIRED)
         return true;

@@ -1,11 +1,12 @@
-// "Did you mean": the least number of letters put in, taken out, changed or swapped with their neighbour (optimal
-// string alignment), whatever their case. And the pointers that say where a fault is.
+// "Did you mean": the least number of letters put in, taken out, changed or swapped with their
+// neighbour (optimal string alignment), whatever their case. And the pointers that say where a
+// fault is.
 #include <stdio.h>
 #include <string.h>
 
 #include "core/base/field.h"
 
-enum { NAME_MOST = 48 };  // longer ones are no slips of the pen
+enum { NAME_MOST = 48 }; // longer ones are no slips of the pen
 
 static int lower(char c) {
     return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : (unsigned char)c;
@@ -40,9 +41,9 @@ static size_t distance(const char *a, size_t a_length, const char *b, size_t b_l
 }
 
 typedef struct Nearest {
-    const char *meant;  // what was written
+    const char *meant; // what was written
     size_t length;
-    const char *name;  // the nearest so far, NULL if none is near enough
+    const char *name; // the nearest so far, NULL if none is near enough
     size_t distance;
 } Nearest;
 

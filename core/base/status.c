@@ -1,5 +1,5 @@
-// Faults are kept in the order met, one per place. Past the hundredth they are only counted, before any text is
-// made of them: a document of a million faults costs no more than its reading.
+// Faults are kept in the order met, one per place. Past the hundredth they are only counted, before
+// any text is made of them: a document of a million faults costs no more than its reading.
 #include "core/base/status.h"
 
 #include <math.h>
@@ -177,8 +177,7 @@ bool problem_concerns(const Problem *problem, const char *pointer) {
     const size_t length = strlen(pointer);
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         const char *place = problem->faults[i].pointer;
-        if (strncmp(place, pointer, length) == 0 &&
-            (place[length] == '\0' || place[length] == '/'))
+        if (strncmp(place, pointer, length) == 0 && (place[length] == '\0' || place[length] == '/'))
             return true;
     }
     return false;

@@ -48,6 +48,8 @@ typedef struct PlanReport {
 
 extern const Field plan_report_fields[], derived_fields[], decision_fields[], warning_fields[];
 
+// Add one line; texts are copied. Lines beyond 256 are left out, and all where the
+// list is NULL. STATUS_NO_MEMORY leaves the list as it was.
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value, const char *unit,

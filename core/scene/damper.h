@@ -1,4 +1,5 @@
-// A free mass between two buffered stops, and the buffer's numbers.
+// A free mass between two buffered stops.
+// Not a buffer's numbers (buffer.h) and not what they come to for a pair of masses (contact/identify.h).
 // Used by scene/ and plan/.
 #ifndef CORE_SCENE_DAMPER_H
 #define CORE_SCENE_DAMPER_H
@@ -6,20 +7,9 @@
 #include <stdint.h>
 
 #include "core/base/field.h"
+#include "core/base/side.h"
 #include "core/contact/contact.h"
-
-// e and T_c as measured, or k_b and c_b as known. `material` alone is a name yet to be resolved; beside numbers
-// ("sponge@1") it says where they come from.
-typedef struct Buffer {
-    char *material;
-    double restitution;   // e [-]
-    double contact_time;  // T_c [s]
-    double stiffness;     // k_b [N/m]
-    double damping;       // c_b [N s/m]
-} Buffer;
-
-typedef enum Side { SIDE_LEFT, SIDE_RIGHT } Side;
-extern const char *const side_names[];
+#include "core/scene/buffer.h"
 
 // Stops at u = offset +- clearance / 2, u being the free mass's displacement relative to the structure.
 typedef struct Damper {
@@ -40,19 +30,19 @@ typedef struct Dampers {
     size_t count;
 } Dampers;
 
-extern const Field buffer_fields[];
 extern const Field damper_fields[];
 
 // The buffer of one side: that side's own, else the common one.
 const Buffer *damper_buffer(const Damper *damper, Side side);
 
-bool buffer_is_given(const Buffer *buffer);
-
-// Faults that rows cannot see, below `pointer`.
-Status damper_complete(Damper *damper, const Contact *contact, size_t storeys, const char *pointer,
-                       Problem *problem);
-
-// Which law "auto" stands for: spring_damper wherever a contact time or k, c is known, else impulse.
+// Which law a run of these dampers uses: what "auto" stands for is spring_damper wherever a contact time or k, c is
+// known on any side, else impulse.
 const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact);
+
+// Faults that rows cannot see, below `pointer`, under the law that dampers_contact_law found. Then fills the storey,
+// erases what the law does not use, and gives equal buffers one form: `buffer` where both sides are the same,
+// else one for each side.
+Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
+                       Problem *problem);
 
 #endif

@@ -1,5 +1,5 @@
 // What the user describes: structure, dampers, contact, excitation, time. Plain values in SI units.
-// Not yet judged against each other (scene_check) and not made ready (plan/).
+// Not yet judged against each other (scene_complete) and not made ready (plan/).
 // Used by plan/ and simulation/.
 #ifndef CORE_SCENE_SCENE_H
 #define CORE_SCENE_SCENE_H
@@ -36,9 +36,9 @@ static inline const Excitation *scene_excitation(const Scene *scene) {
 size_t scene_sample_count(const Scene *scene);
 
 // Judges and completes: adds every fault that the rows alone cannot see (materials still unresolved, parts that
-// exclude each other, positions beyond a stop, more than `most_samples` samples), fills defaults that depend on
-// other members and erases what the chosen model does not use, so that equal scenes have equal canonical forms.
-// Call after fields_check and after slugs are resolved; needs no member that already has a fault.
+// exclude each other, positions beyond a stop, more than `most_samples` samples; 0: no limit), fills defaults that
+// depend on other members and erases what the chosen model does not use, so that equal scenes have equal canonical
+// forms. Call after fields_check and after slugs are resolved; says nothing of what already has a fault.
 Status scene_complete(Scene *scene, size_t most_samples, Problem *problem);
 
 #endif

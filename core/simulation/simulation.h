@@ -52,7 +52,8 @@ typedef struct SimulationLimits {
 void simulation_clear(Simulation *simulation);  // fields_clear by another name; defaults by fields_default
 
 // Judges the whole (rows and what rows cannot see), completes it to its canonical form, and collects warnings
-// (implausible values, a cut segment). Slugs must be resolved before. All faults are added to `problem`.
+// (implausible values, a cut segment). Slugs must be resolved before. All faults are added to `problem`; faults
+// already in it, a reader's, fail it too. `limits` and `warnings` may be NULL.
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits, Warnings *warnings,
                            Problem *problem);
 

@@ -17,16 +17,14 @@ typedef struct Part {
 static const Field part_fields[] = {
     FIELD_TEXT(Part, material, 8, PRESENCE_OPTIONAL, 0, "where it comes from"),
     FIELD_REAL(Part, stiffness, "N/m", ABOVE(0), REQUIRED, "contact stiffness k_b"),
-    FIELD_REAL(Part, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"),
-    FIELD_END};
+    FIELD_REAL(Part, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"), FIELD_END};
 
 typedef struct Common {
     double offset;
 } Common;
 
 static const Field common_fields[] = {
-    FIELD_REAL(Common, offset, "m", WITHIN(-1, 1), 0.25, "where it stands"),
-    FIELD_END};
+    FIELD_REAL(Common, offset, "m", WITHIN(-1, 1), 0.25, "where it stands"), FIELD_END};
 
 // Two shapes under the tag "shape", both beginning with the common part.
 typedef struct Round {
@@ -43,12 +41,10 @@ typedef struct Square {
 
 static const Field round_fields[] = {
     FIELD_BASE(Round, common, common_fields),
-    FIELD_REAL(Round, radius, "m", WITHIN_ABOVE(0, 2), 1, "of the circle"),
-    FIELD_END};
+    FIELD_REAL(Round, radius, "m", WITHIN_ABOVE(0, 2), 1, "of the circle"), FIELD_END};
 static const Field square_fields[] = {
     FIELD_BASE(Square, common, common_fields),
-    FIELD_REALS(Square, sides, "m", AT_LEAST(0), 4, PRESENCE_REQUIRED, "of the square"),
-    FIELD_END};
+    FIELD_REALS(Square, sides, "m", AT_LEAST(0), 4, PRESENCE_REQUIRED, "of the square"), FIELD_END};
 
 static const Kind shape_round = {"round", "a circle", round_fields, sizeof(Round)};
 static const Kind shape_square = {"square", "a square", square_fields, sizeof(Square)};
@@ -241,7 +237,7 @@ static void all_faults_are_told_at_once_each_at_its_place(void **state) {
     assert_string_equal(fault_at("/in/mass")->unit, "kg");
     assert_string_equal(detail_at("/in/storey"), "must be at least 1, is 0");
     assert_string_equal(detail_at("/in/rule"), "is none of the choices");
-    assert_string_equal(detail_at("/in/title"), "must have at most 10 bytes, has 11");
+    assert_string_equal(detail_at("/in/title"), "must have at most 10, has 11 bytes");
     assert_string_equal(detail_at("/in/samples/2"), "must be within [-10, 10] m/s^2, is 10.5");
     assert_string_equal(detail_at("/in/samples/0"), "must be finite");
     assert_string_equal(fault_at("/in/samples/0")->value, "");
@@ -308,8 +304,8 @@ static void too_long_lists_are_one_fault_each(void **state) {
     problem_clear(&problem);
     assert_int_equal(fields_check(whole_fields, &whole, "", &problem), STATUS_INVALID);
     assert_int_equal(problem.count, 2);
-    assert_string_equal(detail_at("/samples"), "must have at most 5 numbers, has 6");
-    assert_string_equal(detail_at("/parts"), "must have at most 2 elements, has 3");
+    assert_string_equal(detail_at("/samples"), "must have at most 5, has 6 numbers");
+    assert_string_equal(detail_at("/parts"), "must have at most 2, has 3 elements");
     fields_clear(whole_fields, &whole);
 }
 
@@ -346,13 +342,13 @@ static void the_canonical_form_changes_with_each_member_but_not_with_notes(void 
     whole.samples.at[0] = -0.0;
     now = canonical(&whole);
     assert_true(same(&first, &now));
-#define CHANGE(member, value)              \
-    do {                                   \
-        const Whole kept = whole;          \
-        whole.member = value;              \
-        now = canonical(&whole);           \
-        assert_false(same(&first, &now));  \
-        whole = kept;                      \
+#define CHANGE(member, value)                                                                      \
+    do {                                                                                           \
+        const Whole kept = whole;                                                                  \
+        whole.member = value;                                                                      \
+        now = canonical(&whole);                                                                   \
+        assert_false(same(&first, &now));                                                          \
+        whole = kept;                                                                              \
     } while (0)
     CHANGE(mass, 3);
     CHANGE(storey, 4);

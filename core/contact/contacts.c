@@ -1,0 +1,26 @@
+// All contact laws, the default first.
+#include "core/contact/contact.h"
+
+const char *const separation_names[] = {[SEPARATION_ZERO_PENETRATION] = "zero_penetration", NULL};
+
+// clang-format off
+const Field contact_fields[] = {
+    FIELD_CHOICE(Contact, separation, separation_names, SEPARATION_ZERO_PENETRATION, "when a contact ends"),
+    FIELD_END
+};
+// clang-format on
+
+const ContactLaw contact_auto = {
+    .kind = {"auto", "spring_damper wherever a contact time or k, c is known, else impulse",
+             contact_fields, sizeof(Contact)},
+    .form = CONTACT_CHOSEN,
+};
+
+const ContactLaw *const contacts[] = {&contact_auto, &contact_impulse, &contact_spring_damper,
+                                      NULL};
+
+static const Kind *contact_at(size_t index) {
+    return index < COUNT(contacts) - 1 ? &contacts[index]->kind : NULL;
+}
+
+const KindTable contact_kinds = {"model", contact_at};

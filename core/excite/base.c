@@ -1,0 +1,35 @@
+// Sample i stands at t = i * interval; between samples the acceleration is linear, from the last
+// one on it is 0.
+#include "core/excite/base.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void base_clear(Base *base) {
+    if (base == NULL)
+        return;
+    free(base->values);
+    memset(base, 0, sizeof *base);
+}
+
+static double sampled_at(const Base *base, double time) {
+    const double place = time / base->interval;
+    if (base->count == 0 || !(place < (double)(base->count - 1)))
+        return 0;
+    const size_t i = (size_t)place;
+    const double part = place - (double)i;
+    return base->values[i] + part * (base->values[i + 1] - base->values[i]);
+}
+
+double base_at(const Base *base, double time) {
+    switch (base->form) {
+    case BASE_SAMPLED:
+        return sampled_at(base, time);
+    case BASE_SINE:
+        return base->amplitude * sin(base->omega * time);
+    case BASE_STILL:
+        break;
+    }
+    return 0;
+}

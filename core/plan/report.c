@@ -1,0 +1,104 @@
+// What a plan says of itself, and what it warns of.
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/side.h"
+#include "core/plan/plan.h"
+
+enum { REPORT_LINES = 256 }; // warnings or decisions at most; more would not be read
+
+// clang-format off
+const Field decision_fields[] = {
+    FIELD_TEXT(Decision, about, 0, PRESENCE_OPTIONAL, 0, "what was to be chosen"),
+    FIELD_TEXT(Decision, chose, 0, PRESENCE_OPTIONAL, 0, "what was chosen"),
+    FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
+    FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
+    FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
+    FIELD_END
+};
+
+const Field derived_fields[] = {
+    FIELD_COUNT(Derived, damper, NULL, AT_LEAST(1), OPTIONAL, "number of the damper"),
+    FIELD_CHOICE(Derived, side, side_names, OPTIONAL, "side of the damper"),
+    FIELD_TEXT(Derived, material, 0, PRESENCE_OPTIONAL, 0, "where the numbers come from"),
+    FIELD_REAL(Derived, restitution, NULL, ANY, OPTIONAL, "coefficient of restitution e"),
+    FIELD_REAL(Derived, contact_time, "s", ANY, OPTIONAL, "contact time T_c of an isolated impact"),
+    FIELD_REAL(Derived, effective_mass, "kg", ANY, OPTIONAL, "effective mass m_e of the pair"),
+    FIELD_REAL(Derived, stiffness, "N/m", ANY, OPTIONAL, "contact stiffness k_b"),
+    FIELD_REAL(Derived, damping, "N s/m", ANY, OPTIONAL, "contact damping c_b"),
+    FIELD_REAL(Derived, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio Z of the contact"),
+    FIELD_END
+};
+
+const Field warning_fields[] = {
+    FIELD_TEXT(Warning, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to what is doubtful"),
+    FIELD_TEXT(Warning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful about it"),
+    FIELD_END
+};
+
+const Field plan_report_fields[] = {
+    FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "the contact model that is run"),
+    FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
+    FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
+    FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
+    FIELD_END
+};
+// clang-format on
+
+// The text of a format, owned by the caller; NULL without memory.
+static char *text_of(const char *format, va_list arguments) {
+    char text[1024], cut[512];
+    vsnprintf(text, sizeof text, format, arguments);
+    text_fit(cut, sizeof cut, text);
+    return strdup(cut);
+}
+
+Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...) {
+    if (warnings == NULL || warnings->count >= REPORT_LINES)
+        return STATUS_OK;
+    Warning *at = realloc(warnings->at, (warnings->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    warnings->at = at;
+    va_list arguments;
+    va_start(arguments, format);
+    const Warning warning = {.pointer = strdup(pointer), .detail = text_of(format, arguments)};
+    va_end(arguments);
+    at[warnings->count] = warning;
+    if (warning.pointer == NULL || warning.detail == NULL) {
+        fields_clear(warning_fields, &at[warnings->count]);
+        return STATUS_NO_MEMORY;
+    }
+    warnings->count++;
+    return STATUS_OK;
+}
+
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
+                     const char *unit, const char *format, ...) {
+    if (decisions == NULL || decisions->count >= REPORT_LINES)
+        return STATUS_OK;
+    Decision *at = realloc(decisions->at, (decisions->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    decisions->at = at;
+    va_list arguments;
+    va_start(arguments, format);
+    const Decision decision = {
+        .about = strdup(about),
+        .chose = strdup(chose),
+        .why = text_of(format, arguments),
+        .value = value,
+        .unit = unit != NULL ? strdup(unit) : NULL,
+    };
+    va_end(arguments);
+    at[decisions->count] = decision;
+    if (decision.about == NULL || decision.chose == NULL || decision.why == NULL ||
+        (unit != NULL && decision.unit == NULL)) {
+        fields_clear(decision_fields, &at[decisions->count]);
+        return STATUS_NO_MEMORY;
+    }
+    decisions->count++;
+    return STATUS_OK;
+}

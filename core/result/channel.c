@@ -1,0 +1,31 @@
+// All channels in the order of ChannelId.
+#include "core/result/channel.h"
+
+#include <stddef.h>
+
+// clang-format off
+const Channel channels[CHANNEL_COUNT] = {
+    [CHANNEL_DISPLACEMENT]        = {"displacement", "m", "m^2/Hz", "of the structure, relative to the base", CHANNEL_OF_STOREY},
+    [CHANNEL_VELOCITY]            = {"velocity", "m/s", "(m/s)^2/Hz", "of the structure, relative to the base", CHANNEL_OF_STOREY},
+    [CHANNEL_ACCELERATION]        = {"acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the structure, absolute, at the instant", CHANNEL_OF_STOREY},
+    [CHANNEL_MEAN_ACCELERATION]   = {"mean_acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the structure, absolute, mean over the sample interval before, impulses included", CHANNEL_OF_STOREY},
+    [CHANNEL_DAMPER_DISPLACEMENT] = {"damper_displacement", "m", "m^2/Hz", "of the free mass, relative to the base", CHANNEL_OF_DAMPER},
+    [CHANNEL_DAMPER_VELOCITY]     = {"damper_velocity", "m/s", "(m/s)^2/Hz", "of the free mass, relative to the base", CHANNEL_OF_DAMPER},
+    [CHANNEL_PENETRATION]         = {"penetration", "m", "m^2/Hz", "of the buffer in contact", CHANNEL_OF_DAMPER},
+    [CHANNEL_CONTACT_FORCE]       = {"contact_force", "N", "N^2/Hz", "on the structure, positive to the right", CHANNEL_OF_DAMPER},
+    [CHANNEL_BASE_ACCELERATION]   = {"base_acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the base", CHANNEL_OF_BASE},
+};
+
+const char *const channel_names[] = {
+    [CHANNEL_DISPLACEMENT]        = "displacement",
+    [CHANNEL_VELOCITY]            = "velocity",
+    [CHANNEL_ACCELERATION]        = "acceleration",
+    [CHANNEL_MEAN_ACCELERATION]   = "mean_acceleration",
+    [CHANNEL_DAMPER_DISPLACEMENT] = "damper_displacement",
+    [CHANNEL_DAMPER_VELOCITY]     = "damper_velocity",
+    [CHANNEL_PENETRATION]         = "penetration",
+    [CHANNEL_CONTACT_FORCE]       = "contact_force",
+    [CHANNEL_BASE_ACCELERATION]   = "base_acceleration",
+    [CHANNEL_COUNT]               = NULL,
+};
+// clang-format on

@@ -1,0 +1,47 @@
+// The rows of the ledgers, in the order in which people read them.
+#include "core/result/response.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/side.h"
+
+const char *const impact_kind_names[] = {
+    [IMPACT_IMPACT] = "impact", [IMPACT_RESTING] = "resting", NULL};
+
+// clang-format off
+const Field impact_fields[] = {
+    FIELD_CHOICE(Impact, kind, impact_kind_names, IMPACT_IMPACT, "an impact, or an interval of persistent contact"),
+    FIELD_REAL(Impact, start, "s", ANY, OPTIONAL, "when the contact begins"),
+    FIELD_REAL(Impact, end, "s", ANY, OPTIONAL, "when it ends; unknown where it is open at the end of the run"),
+    FIELD_COUNT(Impact, damper, NULL, AT_LEAST(1), OPTIONAL, "number of the damper"),
+    FIELD_CHOICE(Impact, side, side_names, OPTIONAL, "the stop that was met"),
+    FIELD_REAL(Impact, approach_speed, "m/s", ANY, OPTIONAL, "relative speed at the start"),
+    FIELD_REAL(Impact, separation_speed, "m/s", ANY, OPTIONAL, "relative speed at the end"),
+    FIELD_REAL(Impact, restitution, NULL, ANY, OPTIONAL, "separation speed over approach speed"),
+    FIELD_REAL(Impact, duration, "s", ANY, OPTIONAL, "from start to end"),
+    FIELD_REAL(Impact, peak_force, "N", ANY, OPTIONAL, "largest |N| of the contact"),
+    FIELD_REAL(Impact, impulse, "N s", ANY, OPTIONAL, "|integral of N|"),
+    FIELD_REAL(Impact, energy_lost, "J", ANY, OPTIONAL, "work of the contact's dissipative part"),
+    FIELD_END
+};
+
+const Field energy_fields[] = {
+    FIELD_REAL(Energy, initial, "J", ANY, OPTIONAL, "kinetic and of the springs at the start"),
+    FIELD_REAL(Energy, input, "J", ANY, OPTIONAL, "work of the base's motion"),
+    FIELD_REAL(Energy, structural_damping, "J", ANY, OPTIONAL, "lost in the structure's damping"),
+    FIELD_REAL(Energy, contact, "J", ANY, OPTIONAL, "lost in contacts"),
+    FIELD_REAL(Energy, kinetic, "J", ANY, OPTIONAL, "of the structure and the free masses at the end"),
+    FIELD_REAL(Energy, strain, "J", ANY, OPTIONAL, "of the structure's and the contact springs at the end"),
+    FIELD_REAL(Energy, residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
+    FIELD_END
+};
+// clang-format on
+
+void response_clear(Response *response) {
+    if (response == NULL)
+        return;
+    columns_clear(&response->series);
+    free(response->impacts.at);
+    memset(response, 0, sizeof *response);
+}

@@ -1,0 +1,147 @@
+// A damper may have one buffer for both stops, one for each, or one for both and another for one of
+// them. What all of these mean is kept in one form, so that equal dampers are written equally.
+#include "core/scene/damper.h"
+
+#include <stdlib.h>
+
+static const char *const identified_for_names[] = {"scene", NULL};
+
+// clang-format off
+const Field damper_fields[] = {
+    FIELD_REAL(Damper, mass, "kg", ABOVE(0), REQUIRED, "free mass m"),
+    FIELD_REAL(Damper, clearance, "m", AT_LEAST(0), REQUIRED, "total clearance d between the stops"),
+    FIELD_REAL(Damper, offset, "m", ANY, 0, "of the stops' middle, relative to the structure"),
+    FIELD_REAL(Damper, position, "m", ANY, 0, "initial, of the free mass relative to the stops' middle"),
+    FIELD_REAL(Damper, velocity, "m/s", ANY, 0, "initial, of the free mass relative to the structure"),
+    FIELD_COUNT(Damper, storey, NULL, AT_LEAST(1), OPTIONAL, "where it stands, from 1 at the ground; the top one if not given"),
+    FIELD_ITEM(Damper, buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at both stops"),
+    FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
+    FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
+    FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
+    FIELD_END
+};
+// clang-format on
+
+enum { BUFFERS = 3 };
+static const char *const buffer_names[BUFFERS] = {"buffer", "left_buffer", "right_buffer"};
+
+static Buffer *buffer_at(Damper *damper, size_t index) {
+    Buffer *const buffers[BUFFERS] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
+    return buffers[index];
+}
+
+const Buffer *damper_buffer(const Damper *damper, Side side) {
+    const Buffer *own = side == SIDE_LEFT ? &damper->left_buffer : &damper->right_buffer;
+    return buffer_is_given(own) ? own : &damper->buffer;
+}
+
+const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact) {
+    const ContactLaw *law = contact_law(contact);
+    if (law->form != CONTACT_CHOSEN)
+        return law;
+    for (size_t i = 0; i < dampers->count; i++)
+        if (buffer_has_contact(damper_buffer(&dampers->at[i], SIDE_LEFT)) ||
+            buffer_has_contact(damper_buffer(&dampers->at[i], SIDE_RIGHT)))
+            return &contact_spring_damper;
+    return &contact_impulse;
+}
+
+static Status check_buffers(Damper *damper, const ContactLaw *law, const char *pointer,
+                            Problem *problem) {
+    char places[BUFFERS][sizeof((Fault){0}.pointer)];
+    bool is_given[BUFFERS], is_told = false;
+    for (size_t i = 0; i < BUFFERS; i++) {
+        pointer_join(places[i], sizeof places[i], pointer, buffer_names[i]);
+        is_given[i] = buffer_is_given(buffer_at(damper, i));
+        is_told = is_told || problem_concerns(problem, places[i]);
+    }
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < BUFFERS; i++)
+        if (is_given[i] &&
+            buffer_check(buffer_at(damper, i), law->form, places[i], problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    // A buffer that could not be read may be the one that seems to be missing.
+    if (is_told)
+        return STATUS_INVALID;
+    if (is_given[0] && is_given[1] && is_given[2])
+        return problem_add(problem, STATUS_INVALID, places[0],
+                           "is used by neither side: left_buffer and right_buffer are given too");
+    if (!is_given[0] && !(is_given[1] && is_given[2]))
+        return problem_add(problem, STATUS_INVALID, places[0],
+                           "is required: nothing stands at the %s (a material, restitution and "
+                           "contact_time, or stiffness and damping)",
+                           is_given[1]   ? "right stop"
+                           : is_given[2] ? "left stop"
+                                         : "stops");
+    return status;
+}
+
+static Status check_position(const Damper *damper, const char *pointer, Problem *problem) {
+    const double most = damper->clearance / 2;
+    if (!(most >= 0) || !isfinite(damper->position) || fabs(damper->position) <= most)
+        return STATUS_OK;
+    char place[sizeof((Fault){0}.pointer)], limit[32], is[32];
+    pointer_join(place, sizeof place, pointer, "position");
+    text_real(limit, most);
+    text_real(is, damper->position);
+    return problem_add_real(problem, STATUS_INVALID, place, damper->position, "m",
+                            "must be between the stops, within [-%s, %s] m, is %s", limit, limit,
+                            is);
+}
+
+// A sum of finite numbers may not be finite.
+static Status check_stops(const Damper *damper, const char *pointer, Problem *problem) {
+    const double furthest = fabs(damper->offset) + damper->clearance;
+    if (!isfinite(damper->offset) || !isfinite(damper->clearance) || isfinite(furthest))
+        return STATUS_OK;
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, "offset");
+    return problem_add_real(problem, STATUS_INVALID, place, damper->offset, "m",
+                            "puts a stop beyond all numbers");
+}
+
+static Status check_storey(const Damper *damper, size_t storeys, const char *pointer,
+                           Problem *problem) {
+    if (damper->storey <= storeys)
+        return STATUS_OK;
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, "storey");
+    return problem_add_real(problem, STATUS_INVALID, place, (double)damper->storey, NULL,
+                            "must be at most %zu, the number of storeys, is %llu", storeys,
+                            (unsigned long long)damper->storey);
+}
+
+static void normalise_buffers(Damper *damper, const ContactLaw *law) {
+    if (law->form == CONTACT_IMPULSIVE)
+        for (size_t i = 0; i < BUFFERS; i++)
+            buffer_erase_contact(buffer_at(damper, i));
+    if (buffer_is_given(&damper->buffer)) {
+        if (buffer_is_given(&damper->left_buffer))
+            buffer_move(&damper->right_buffer, &damper->buffer);
+        else if (buffer_is_given(&damper->right_buffer))
+            buffer_move(&damper->left_buffer, &damper->buffer);
+    }
+    if (buffer_is_given(&damper->left_buffer) &&
+        buffer_equals(&damper->left_buffer, &damper->right_buffer)) {
+        buffer_move(&damper->buffer, &damper->left_buffer);
+        fields_clear(buffer_fields, &damper->right_buffer);
+    }
+}
+
+Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
+                       Problem *problem) {
+    if (damper->storey == COUNT_ABSENT)
+        damper->storey = storeys;
+    if (damper->identified_for == CHOICE_ABSENT)
+        damper->identified_for = 0;
+    const Status faults[] = {
+        check_position(damper, pointer, problem),
+        check_stops(damper, pointer, problem),
+        check_storey(damper, storeys, pointer, problem),
+        check_buffers(damper, law, pointer, problem),
+    };
+    for (size_t i = 0; i < COUNT(faults); i++)
+        TRY(faults[i]);
+    normalise_buffers(damper, law);
+    return STATUS_OK;
+}

@@ -1,0 +1,134 @@
+// Judging what rows cannot see. Each part is judged on its own, so that all faults are told at
+// once; a part that could not be read, or has a fault already, is passed over.
+#include "core/scene/scene.h"
+
+#include <stdio.h>
+
+#include "core/contact/identify.h"
+
+enum { STOREYS = 1, DAMPERS = 1 };
+
+// clang-format off
+const Field scene_fields[] = {
+    FIELD_VARIANT(Scene, structure, &structure_kinds, PRESENCE_REQUIRED, "the primary structure"),
+    FIELD_LIST(Scene, dampers, damper_fields, DAMPERS, PRESENCE_DEFAULT, "impact dampers"),
+    FIELD_VARIANT(Scene, contact, &contact_kinds, PRESENCE_DEFAULT, "how a free mass and a stop meet"),
+    FIELD_VARIANT(Scene, excitation, &excitation_kinds, PRESENCE_DEFAULT, "motion of the base, and the initial state"),
+    FIELD_REAL(Scene, duration, "s", ABOVE(0), REQUIRED, "simulated time"),
+    FIELD_REAL(Scene, sample_rate, "Hz", ABOVE(0), REQUIRED, "samples per second of simulated time"),
+    FIELD_END
+};
+// clang-format on
+
+// The index of the last sample, not yet an integer type's.
+static double last_sample(const Scene *scene) {
+    return floor(scene->duration * scene->sample_rate * (1 + 1e-12));
+}
+
+size_t scene_sample_count(const Scene *scene) {
+    const double last = last_sample(scene);
+    if (!(last >= 0))
+        return 0;
+    return last < 0x1p62 ? (size_t)last + 1 : SIZE_MAX;
+}
+
+static bool is_positive(double value) {
+    return isfinite(value) && value > 0;
+}
+
+static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
+    if (!is_positive(scene->duration) || !is_positive(scene->sample_rate) || most == 0 ||
+        scene_sample_count(scene) <= most)
+        return STATUS_OK;
+    char duration[32], rate[32], count[32];
+    text_real(duration, scene->duration);
+    text_real(rate, scene->sample_rate);
+    const double samples = last_sample(scene) + 1;
+    snprintf(count, sizeof count, samples < 1e15 ? "%.0f" : "%.3g", samples);
+    return problem_add_real(problem, STATUS_INVALID, "/duration", scene->duration, "s",
+                            "%s s at a sample_rate of %s Hz are %s samples, must be at most %zu",
+                            duration, rate, count, most);
+}
+
+// e and T_c that each are in range may still come to a stiffness that no double holds.
+static Status check_contacts(const Scene *scene, Problem *problem) {
+    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
+    for (size_t i = 0; i < scene->dampers.count; i++) {
+        const Damper *damper = &scene->dampers.at[i];
+        const double m_e = effective_mass(sdof->mass, damper->mass);
+        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
+            const Buffer *buffer = damper_buffer(damper, (Side)side);
+            if (isnan(buffer->contact_time))
+                continue;
+            const Identified found =
+                identify_measured(m_e, buffer->restitution, buffer->contact_time);
+            char place[sizeof((Fault){0}.pointer)];
+            snprintf(place, sizeof place, "/dampers/%zu/%s/contact_time", i,
+                     buffer == &damper->buffer        ? "buffer"
+                     : buffer == &damper->left_buffer ? "left_buffer"
+                                                      : "right_buffer");
+            if (!is_positive(found.stiffness) || !isfinite(found.damping))
+                return problem_add_real(problem, STATUS_INVALID, place, buffer->contact_time, "s",
+                                        "must give a stiffness m_e (pi^2 + ln(e)^2) / T_c^2 that "
+                                        "numbers can hold");
+        }
+    }
+    return STATUS_OK;
+}
+
+static Status complete_dampers(Scene *scene, Problem *problem) {
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    Status status = STATUS_OK;
+    // More than the rows allow were told by the rows.
+    for (size_t i = 0; i < scene->dampers.count && i < DAMPERS; i++) {
+        char place[sizeof((Fault){0}.pointer)];
+        pointer_index(place, sizeof place, "/dampers", i);
+        if (damper_complete(&scene->dampers.at[i], law, STOREYS, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    Contact *contact = (Contact *)(void *)scene->contact;
+    if (law->form == CONTACT_IMPULSIVE)
+        contact->separation = CHOICE_ABSENT;
+    else if (contact->separation == CHOICE_ABSENT)
+        contact->separation = SEPARATION_ZERO_PENETRATION;
+    return status;
+}
+
+// Without dampers nothing ever meets: whatever was said of contacts means the same.
+static Status reset_contact(Scene *scene, Problem *problem) {
+    Variant *usual = variant_new(contact_kinds.at(0));
+    if (usual == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
+    variant_free(scene->contact);
+    scene->contact = usual;
+    return STATUS_OK;
+}
+
+static Status complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
+    Excitation *excitation = (Excitation *)(void *)scene->excitation;
+    const ExcitationKind *kind = excitation_kind(excitation);
+    if (kind->complete == NULL || !is_positive(scene->duration) ||
+        !is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
+        return STATUS_OK;
+    const Span span = {scene->duration, scene->sample_rate, most_samples};
+    return kind->complete(excitation, &span, "/excitation", problem);
+}
+
+Status scene_complete(Scene *scene, size_t most_samples, Problem *problem) {
+    Status faults[4] = {STATUS_OK};
+    if (scene->structure != NULL)
+        faults[0] =
+            structure_complete((Structure *)(void *)scene->structure, "/structure", problem);
+    if (scene->contact != NULL)
+        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, problem)
+                                             : reset_contact(scene, problem);
+    faults[2] = check_samples(scene, most_samples, problem);
+    if (scene->excitation != NULL)
+        faults[3] = complete_excitation(scene, most_samples, problem);
+    for (size_t i = 0; i < COUNT(faults); i++)
+        TRY(faults[i]);
+    if (problem_concerns(problem, "/structure") || problem_concerns(problem, "/dampers") ||
+        scene->structure == NULL || scene->contact == NULL)
+        return STATUS_OK;
+    return check_contacts(scene, problem);
+}

@@ -1,0 +1,112 @@
+// Single values go by a table over the names of their rows, which mean the same wherever they
+// stand; the rest are relations between two parts.
+#include "core/simulation/plausible.h"
+
+#include <string.h>
+
+typedef struct Usual {
+    const char *name; // of a REAL row
+    double most;      // usual magnitude at most, in the row's unit
+    const char *hint;
+} Usual;
+
+static const Usual usual[] = {
+    {"clearance", 1, "metres are meant, not millimetres"},
+    {"offset", 1, "metres are meant, not millimetres"},
+    {"position", 1, "metres are meant, not millimetres"},
+    {"displacement", 1, "metres are meant, not millimetres"},
+    {"velocity", 100, "metres per second are meant"},
+    {"contact_time", 1, "seconds are meant, not milliseconds"},
+    {"interval", 1, "seconds are meant, not milliseconds"},
+    {"damping_ratio", 1, "a ratio is meant, not percent"},
+    {"rms", 100, "m/s^2 are meant, not cm/s^2"},
+};
+
+static const Usual *usual_find(const char *name) {
+    for (size_t i = 0; i < COUNT(usual); i++)
+        if (strcmp(usual[i].name, name) == 0)
+            return &usual[i];
+    return NULL;
+}
+
+static Status warn_real(const Field *field, double value, const char *pointer, Warnings *warnings) {
+    const Usual *limit = usual_find(field->name);
+    if (limit == NULL || !(fabs(value) > limit->most))
+        return STATUS_OK;
+    char is[32], most[32];
+    const char *space = field->unit != NULL ? " " : "";
+    const char *unit = field->unit != NULL ? field->unit : "";
+    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", text_real(is, value),
+                        space, unit, text_real(most, limit->most), space, unit, limit->hint);
+}
+
+static Status warn_rows(const Field *fields, const void *item, const char *pointer,
+                        Warnings *warnings) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *member = (const char *)item + field->offset;
+        char place[sizeof((Fault){0}.pointer)];
+        if (field->kind == FIELD_KIND_BASE) {
+            TRY(warn_rows(field->fields, member, pointer, warnings));
+            continue;
+        }
+        pointer_join(place, sizeof place, pointer, field->name);
+        if (field->kind == FIELD_KIND_REAL) {
+            TRY(warn_real(field, *(const double *)member, place, warnings));
+        } else if (field->kind == FIELD_KIND_ITEM) {
+            TRY(warn_rows(field->fields, member, place, warnings));
+        } else if (field->kind == FIELD_KIND_VARIANT) {
+            const Variant *variant = *(Variant *const *)member;
+            if (variant != NULL)
+                TRY(warn_rows(variant->kind->fields, variant, place, warnings));
+        } else if (field->kind == FIELD_KIND_LIST) {
+            List list;
+            memcpy(&list, member, sizeof list);
+            for (size_t i = 0; i < list.count; i++) {
+                char element[sizeof((Fault){0}.pointer)];
+                pointer_index(element, sizeof element, place, i);
+                TRY(warn_rows(field->fields, (const char *)list.at + i * field->size, element,
+                              warnings));
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
+static Status warn_times(const Scene *scene, const StructureSdof *sdof, Warnings *warnings) {
+    if (sdof->stiffness <= 0)
+        return STATUS_OK;
+    const double omega = sqrt(sdof->stiffness / sdof->mass);
+    const double frequency = omega / (2 * 3.14159265358979323846);
+    char is[32];
+    if (scene->duration * frequency < 1)
+        TRY(warnings_add(warnings, "/duration",
+                         "is %s s, less than one period of the structure, %.3g s",
+                         text_real(is, scene->duration), 1 / frequency));
+    if (scene->sample_rate < 2 * frequency)
+        TRY(warnings_add(warnings, "/sample_rate",
+                         "is %s Hz, fewer than two samples in a period of the structure, %.3g s",
+                         text_real(is, scene->sample_rate), 1 / frequency));
+    return STATUS_OK;
+}
+
+static Status warn_masses(const Scene *scene, const StructureSdof *sdof, Warnings *warnings) {
+    for (size_t i = 0; i < scene->dampers.count; i++) {
+        const double mass = scene->dampers.at[i].mass;
+        if (mass <= sdof->mass)
+            continue;
+        char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
+        pointer_index(damper, sizeof damper, "/dampers", i);
+        pointer_join(place, sizeof place, damper, "mass");
+        TRY(warnings_add(warnings, place, "is %s kg, more than the structure's %s kg",
+                         text_real(is, mass), text_real(than, sdof->mass)));
+    }
+    return STATUS_OK;
+}
+
+Status plausible_warn(const Simulation *simulation, Warnings *warnings) {
+    const Scene *scene = &simulation->scene;
+    TRY(warn_rows(simulation_fields, simulation, "", warnings));
+    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
+    TRY(warn_times(scene, sdof, warnings));
+    return warn_masses(scene, sdof, warnings);
+}

@@ -1,0 +1,190 @@
+// What was asked, judged and completed. Three steps: the rows, what rows cannot see, and only then
+// warnings.
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/accuracy.h"
+#include "core/simulation/plausible.h"
+#include "core/simulation/simulation.h"
+
+enum { LABELS = 32, TITLE_BYTES = 200, SEGMENT = 4096 };
+
+static const char *const usual_channels[] = {"displacement",        "velocity",      "acceleration",
+                                             "damper_displacement", "contact_force", NULL};
+static const char *const usual_psd_channels[] = {"mean_acceleration", NULL};
+
+// clang-format off
+static const Field psd_fields[] = {
+    FIELD_TEXTS(SpectrumRequest, channels, channel_names, usual_psd_channels, CHANNEL_COUNT, PRESENCE_DEFAULT, 0, "channels of which a spectrum is wanted"),
+    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_LEAST(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
+    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_LEAST(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
+    FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
+    FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "what is taken off each segment"),
+    FIELD_END
+};
+
+static const Field output_fields[] = {
+    FIELD_TEXTS(Output, channels, channel_names, usual_channels, CHANNEL_COUNT, PRESENCE_DEFAULT, 0, "channels that are sampled"),
+    FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
+    FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which statistics are taken"),
+    FIELD_END
+};
+
+const Field simulation_fields[] = {
+    FIELD_BASE(Simulation, scene, scene_fields),
+    FIELD_VARIANT(Simulation, accuracy, &accuracy_kinds, PRESENCE_DEFAULT, "how it is solved"),
+    FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "what is wanted of it"),
+    FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; changes nothing"),
+    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; change nothing"),
+    FIELD_END
+};
+
+const Field summary_fields[] = {
+    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events"),
+    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples"),
+    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events"),
+    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples"),
+    FIELD_COUNT(Summary, impacts, NULL, AT_LEAST(0), OPTIONAL, "number of impacts"),
+    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events"),
+    FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
+    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated relative error"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "time to which the trajectory can be trusted"),
+    FIELD_END
+};
+// clang-format on
+
+void simulation_clear(Simulation *simulation) {
+    fields_clear(simulation_fields, simulation);
+}
+
+static const Channel *channel_find(const char *name) {
+    for (size_t i = 0; i < CHANNEL_COUNT; i++)
+        if (strcmp(channels[i].name, name) == 0)
+            return &channels[i];
+    return NULL;
+}
+
+static bool is_of_damper(const char *name) {
+    const Channel *channel = channel_find(name);
+    return channel != NULL && channel->owner == CHANNEL_OF_DAMPER;
+}
+
+static bool texts_are(const Texts *texts, const char *const *wanted) {
+    for (size_t i = 0; i < texts->count; i++)
+        if (wanted[i] == NULL || strcmp(texts->at[i], wanted[i]) != 0)
+            return false;
+    return wanted[texts->count] == NULL;
+}
+
+// Nobody asked for the usual channels one by one: those of a damper are there if a damper is.
+static void drop_damper_channels(Texts *texts) {
+    size_t kept = 0;
+    for (size_t i = 0; i < texts->count; i++)
+        if (is_of_damper(texts->at[i]))
+            free(texts->at[i]);
+        else
+            texts->at[kept++] = texts->at[i];
+    texts->count = kept;
+}
+
+static Status check_channels(const Texts *texts, size_t dampers, const char *pointer,
+                             Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < texts->count && i < CHANNEL_COUNT; i++) {
+        char place[sizeof((Fault){0}.pointer)];
+        pointer_index(place, sizeof place, pointer, i);
+        if (dampers == 0 && is_of_damper(texts->at[i]))
+            status = problem_add(problem, STATUS_INVALID, place,
+                                 "%s needs a damper, the scene has none", texts->at[i]);
+        for (size_t j = 0; j < i; j++)
+            if (strcmp(texts->at[i], texts->at[j]) == 0)
+                status = problem_add(problem, STATUS_INVALID, place,
+                                     "%.64s is asked for twice, first at %s/%zu", texts->at[i],
+                                     pointer, j);
+    }
+    return status;
+}
+
+static Status check_overlap(const SpectrumRequest *psd, Problem *problem) {
+    if (psd->segment == COUNT_ABSENT || psd->segment == 0 || psd->overlap == COUNT_ABSENT ||
+        psd->overlap < psd->segment)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/output/psd/overlap", (double)psd->overlap,
+                            "samples", "must be less than the segment, %llu samples, is %llu",
+                            (unsigned long long)psd->segment, (unsigned long long)psd->overlap);
+}
+
+// `count` is 0 where the number of samples is not known because of another fault.
+static Status complete_psd(SpectrumRequest *psd, size_t count, Warnings *warnings,
+                           Problem *problem) {
+    if (psd->channels.count == 0) {
+        psd->segment = psd->overlap = COUNT_ABSENT;
+        psd->window = psd->detrend = CHOICE_ABSENT;
+        return STATUS_OK;
+    }
+    if (psd->window == CHOICE_ABSENT)
+        psd->window = WINDOW_HANN;
+    if (psd->detrend == CHOICE_ABSENT)
+        psd->detrend = DETREND_CONSTANT;
+    TRY(check_overlap(psd, problem));
+    if (count == 0)
+        return STATUS_OK;
+    if (psd->segment == COUNT_ABSENT)
+        psd->segment = count < SEGMENT ? count : SEGMENT;
+    if (psd->segment > count) {
+        const bool is_overlap_cut = psd->overlap != COUNT_ABSENT && psd->overlap >= count;
+        TRY(warnings_add(warnings, "/output/psd/segment",
+                         "is %llu samples, more than there are: cut to %zu%s",
+                         (unsigned long long)psd->segment, count,
+                         is_overlap_cut ? ", and its overlap to half of that" : ""));
+        psd->segment = count;
+        if (is_overlap_cut)
+            psd->overlap = COUNT_ABSENT;
+    }
+    if (psd->overlap == COUNT_ABSENT)
+        psd->overlap = psd->segment / 2;
+    return check_overlap(psd, problem);
+}
+
+static Status complete_output(Simulation *simulation, size_t count, Warnings *warnings,
+                              Problem *problem) {
+    const Scene *scene = &simulation->scene;
+    Output *output = &simulation->output;
+    // Dampers that could not be read are no reason to refuse their channels.
+    const size_t dampers = problem_concerns(problem, "/dampers") ? 1 : scene->dampers.count;
+    if (dampers == 0 && texts_are(&output->channels, usual_channels))
+        drop_damper_channels(&output->channels);
+    Status status = check_channels(&output->channels, dampers, "/output/channels", problem);
+    if (check_channels(&output->psd.channels, dampers, "/output/psd/channels", problem) !=
+        STATUS_OK)
+        status = STATUS_INVALID;
+    if (scene->duration > 0 && output->statistics_from > scene->duration &&
+        isfinite(output->statistics_from)) {
+        char duration[32], is[32];
+        status = problem_add_real(
+            problem, STATUS_INVALID, "/output/statistics_from", output->statistics_from, "s",
+            "must be within the duration, [0, %s] s, is %s", text_real(duration, scene->duration),
+            text_real(is, output->statistics_from));
+    }
+    const Status psd = complete_psd(&output->psd, count, warnings, problem);
+    return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
+}
+
+Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
+                           Warnings *warnings, Problem *problem) {
+    const size_t most_samples = limits != NULL ? limits->samples : 0;
+    const Status rows = fields_check(simulation_fields, simulation, "", problem);
+    const Status scene = scene_complete(&simulation->scene, most_samples, problem);
+    // Faults that the caller met before are among those of the problem.
+    const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
+    const size_t count = is_sound ? scene_sample_count(&simulation->scene) : 0;
+    Status status = complete_output(simulation, count, warnings, problem);
+    TRY(rows);
+    TRY(scene);
+    if (problem_concerns(problem, ""))
+        return problem->status;
+    if (status == STATUS_OK)
+        status = plausible_warn(simulation, warnings);
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for warnings")
+                                      : status;
+}

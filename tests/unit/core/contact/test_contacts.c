@@ -1,0 +1,47 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "core/contact/contact.h"
+
+static void the_walkers_table_is_the_list_with_auto_first(void **state) {
+    (void)state;
+    size_t i = 0;
+    for (; contacts[i] != NULL; i++)
+        assert_ptr_equal(contact_kinds.at(i), &contacts[i]->kind);
+    assert_null(contact_kinds.at(i));
+    assert_string_equal(contact_kinds.at(0)->name, "auto");
+    assert_string_equal(contact_kinds.tag, "model");
+}
+
+static void laws_are_found_by_name_and_know_their_form(void **state) {
+    (void)state;
+    assert_ptr_equal(kind_find(&contact_kinds, "impulse"), &contact_impulse.kind);
+    assert_ptr_equal(kind_find(&contact_kinds, "spring_damper"), &contact_spring_damper.kind);
+    assert_int_equal(contact_impulse.form, CONTACT_IMPULSIVE);
+    assert_int_equal(contact_spring_damper.form, CONTACT_LINEAR);
+    assert_int_equal(contact_auto.form, CONTACT_CHOSEN);
+}
+
+static void a_law_starts_with_zero_penetration(void **state) {
+    (void)state;
+    for (size_t i = 0; contacts[i] != NULL; i++) {
+        Variant *variant = variant_new(&contacts[i]->kind);
+        assert_non_null(variant);
+        const Contact *contact = (const Contact *)(const void *)variant;
+        assert_ptr_equal(contact_law(contact), contacts[i]);
+        assert_int_equal(contact->separation, SEPARATION_ZERO_PENETRATION);
+        variant_free(variant);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_walkers_table_is_the_list_with_auto_first),
+        cmocka_unit_test(laws_are_found_by_name_and_know_their_form),
+        cmocka_unit_test(a_law_starts_with_zero_penetration),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,60 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/plan/plan.h"
+
+static void warnings_are_added_with_their_own_texts(void **state) {
+    (void)state;
+    Warnings warnings = {NULL, 0};
+    char pointer[] = "/dampers/0/clearance";
+    assert_int_equal(warnings_add(&warnings, pointer, "is %d m", 15), STATUS_OK);
+    pointer[1] = 'x';
+    assert_int_equal(warnings.count, 1);
+    assert_string_equal(warnings.at[0].pointer, "/dampers/0/clearance");
+    assert_string_equal(warnings.at[0].detail, "is 15 m");
+    for (int i = 0; i < 1000; i++)
+        assert_int_equal(warnings_add(&warnings, "", "%01000d", i), STATUS_OK);
+    assert_int_equal(warnings.count, 256);
+    for (size_t i = 0; i < warnings.count; i++)
+        fields_clear(warning_fields, &warnings.at[i]);
+    free(warnings.at);
+    assert_int_equal(warnings_add(NULL, "", "nobody listens"), STATUS_OK);
+}
+
+static void a_report_is_cleared_by_its_rows(void **state) {
+    (void)state;
+    PlanReport report, copy;
+    assert_int_equal(fields_default(plan_report_fields, &report), STATUS_OK);
+    report.contact_model = strdup("spring_damper");
+    assert_int_equal(decisions_add(&report.decisions, "contact_model", "spring_damper", 0.025, "s",
+                                   "a contact time is %s", "known"),
+                     STATUS_OK);
+    assert_int_equal(
+        decisions_add(&report.decisions, "solver", "exact", (double)NAN, NULL, "it is linear"),
+        STATUS_OK);
+    report.derived.at = calloc(1, sizeof(Derived));
+    report.derived.count = 1;
+    assert_int_equal(fields_default(derived_fields, &report.derived.at[0]), STATUS_OK);
+    report.derived.at[0].material = strdup("sponge@1");
+    assert_int_equal(fields_copy(plan_report_fields, &report, &copy), STATUS_OK);
+    fields_clear(plan_report_fields, &report);
+    assert_int_equal(copy.decisions.count, 2);
+    assert_string_equal(copy.decisions.at[0].why, "a contact time is known");
+    assert_string_equal(copy.decisions.at[0].unit, "s");
+    assert_null(copy.decisions.at[1].unit);
+    assert_string_equal(copy.derived.at[0].material, "sponge@1");
+    assert_int_equal(copy.derived.at[0].side, CHOICE_ABSENT);
+    fields_clear(plan_report_fields, &copy);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(warnings_are_added_with_their_own_texts),
+        cmocka_unit_test(a_report_is_cleared_by_its_rows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

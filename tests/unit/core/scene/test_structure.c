@@ -1,0 +1,80 @@
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "core/scene/structure.h"
+#include "tests/support/fields.h"
+
+static Problem problem;
+
+static StructureSdof sdof(double damping, double ratio) {
+    return (StructureSdof){.structure = {{&structure_sdof}},
+                           .mass = 1.35,
+                           .stiffness = 865,
+                           .damping = damping,
+                           .damping_ratio = ratio};
+}
+
+static Status complete(StructureSdof *structure) {
+    problem_clear(&problem);
+    return structure_complete(&structure->structure, "/structure", &problem);
+}
+
+static void no_damping_is_damping_of_zero(void **state) {
+    (void)state;
+    StructureSdof structure = sdof((double)NAN, (double)NAN);
+    assert_int_equal(complete(&structure), STATUS_OK);
+    assert_true(structure.damping == 0);
+    assert_true(structure_damping(&structure) == 0);
+}
+
+static void damping_may_be_given_by_its_ratio(void **state) {
+    (void)state;
+    StructureSdof structure = sdof((double)NAN, 0.016);
+    assert_int_equal(complete(&structure), STATUS_OK);
+    assert_true(isnan(structure.damping));
+    assert_true(fabs(structure_damping(&structure) - 0.032 * sqrt(865 * 1.35)) < 1e-15);
+    structure = sdof(1.092, (double)NAN);
+    assert_true(structure_damping(&structure) == 1.092);
+    structure = sdof((double)NAN, 0.5);
+    structure.mass = 1e200;
+    structure.stiffness = 1e200;
+    assert_true(fabs(structure_damping(&structure) / 1e200 - 1) < 1e-15);
+}
+
+static void both_at_once_are_a_fault(void **state) {
+    (void)state;
+    StructureSdof structure = sdof(1, 0.016);
+    assert_int_equal(complete(&structure), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/structure/damping_ratio"),
+                        "excludes damping: give one of the two");
+    assert_string_equal(problem.faults[0].value, "0.016");
+}
+
+static void the_rows_refuse_what_is_no_structure(void **state) {
+    (void)state;
+    StructureSdof structure = sdof(-1, (double)NAN);
+    structure.mass = 0;
+    structure.stiffness = -865;
+    problem_clear(&problem);
+    fields_check(structure_sdof.fields, &structure, "/structure", &problem);
+    assert_int_equal(problem.count, 3);
+    assert_string_equal(detail_at(&problem, "/structure/mass"), "must be above 0 kg, is 0");
+    assert_string_equal(detail_at(&problem, "/structure/stiffness"),
+                        "must be at least 0 N/m, is -865");
+    assert_string_equal(detail_at(&problem, "/structure/damping"),
+                        "must be at least 0 N s/m, is -1");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_damping_is_damping_of_zero),
+        cmocka_unit_test(damping_may_be_given_by_its_ratio),
+        cmocka_unit_test(both_at_once_are_a_fault),
+        cmocka_unit_test(the_rows_refuse_what_is_no_structure),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,429 @@
+// Requests judged and completed to their canonical form.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/base/canonical.h"
+#include "core/simulation/accuracy.h"
+#include "core/simulation/simulation.h"
+#include "tests/support/fields.h"
+#include "tests/support/scenes.h"
+
+static Problem problem;
+static Warnings warnings;
+static const SimulationLimits limits = {1 << 25, 0};
+
+static Status complete_more(Simulation *simulation) {
+    return simulation_complete(simulation, &limits, &warnings, &problem);
+}
+
+static void forget_warnings(void) {
+    for (size_t i = 0; i < warnings.count; i++)
+        fields_clear(warning_fields, &warnings.at[i]);
+    free(warnings.at);
+    warnings = (Warnings){NULL, 0};
+}
+
+static Status complete(Simulation *simulation) {
+    problem_clear(&problem);
+    forget_warnings();
+    return complete_more(simulation);
+}
+
+static const char *warning_at(const char *pointer) {
+    for (size_t i = 0; i < warnings.count; i++)
+        if (strcmp(warnings.at[i].pointer, pointer) == 0)
+            return warnings.at[i].detail;
+    return "(no warning there)";
+}
+
+static void assert_begins(const char *text, const char *beginning) {
+    if (strncmp(text, beginning, strlen(beginning)) != 0)
+        fail_msg("\"%s\" should begin with \"%s\"", text, beginning);
+}
+
+static Damper *damper_of(Simulation *simulation) {
+    return &simulation->scene.dampers.at[0];
+}
+
+static StructureSdof *sdof_of(Simulation *simulation) {
+    return (StructureSdof *)(void *)simulation->scene.structure;
+}
+
+static void want(Texts *texts, size_t count, const char *const *names) {
+    for (size_t i = 0; i < texts->count; i++)
+        free(texts->at[i]);
+    free(texts->at);
+    *texts = texts_of(count, names);
+}
+
+typedef struct CanonicalBytes {
+    unsigned char at[4096];
+    size_t length;
+} CanonicalBytes;
+
+static void take(void *context, const void *bytes, size_t size) {
+    CanonicalBytes *all = context;
+    assert_true(size <= sizeof all->at - all->length);
+    memcpy(all->at + all->length, bytes, size);
+    all->length += size;
+}
+
+static CanonicalBytes canonical(const Simulation *simulation) {
+    CanonicalBytes all = {.length = 0};
+    canonical_write(simulation_fields, simulation, take, &all);
+    return all;
+}
+
+static bool same(const CanonicalBytes *a, const CanonicalBytes *b) {
+    return a->length == b->length && memcmp(a->at, b->at, a->length) == 0;
+}
+
+static void the_papers_scene_is_sound_and_complete(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(problem.count, 0);
+    assert_int_equal(warnings.count, 0);
+    assert_int_equal(simulation.output.channels.count, 5);
+    assert_int_equal(simulation.output.psd.segment, 4096);
+    assert_int_equal(simulation.output.psd.overlap, 2048);
+    assert_int_equal(simulation.output.psd.window, WINDOW_HANN);
+    assert_int_equal(simulation.output.psd.detrend, DETREND_CONSTANT);
+    assert_int_equal(damper_of(&simulation)->storey, 1);
+    assert_ptr_equal(simulation.accuracy->kind, &accuracy_auto);
+    simulation_clear(&simulation);
+}
+
+static void completing_twice_changes_nothing(void **state) {
+    (void)state;
+    for (int form = 0; form < 4; form++) {
+        Simulation simulation, copy;
+        if (form == 3)
+            scene_without_damper(&simulation);
+        else
+            scene_with_damper(&simulation, 0.61, form == 0 ? NAN : 0.025);
+        if (form == 2)
+            want(&simulation.output.psd.channels, 0, NULL);
+        assert_int_equal(complete(&simulation), STATUS_OK);
+        const CanonicalBytes once = canonical(&simulation);
+        assert_int_equal(fields_copy(simulation_fields, &simulation, &copy), STATUS_OK);
+        assert_int_equal(complete(&copy), STATUS_OK);
+        const CanonicalBytes twice = canonical(&copy);
+        assert_true(same(&once, &twice));
+        simulation_clear(&simulation);
+        simulation_clear(&copy);
+    }
+}
+
+static void scenes_that_mean_the_same_have_the_same_bytes(void **state) {
+    (void)state;
+    Simulation a, b;
+    scene_with_damper(&a, 0.61, NAN);
+    scene_with_damper(&b, 0.61, 0.025);
+    scene_choose(&a.scene.contact, &contact_kinds, "impulse");
+    scene_choose(&b.scene.contact, &contact_kinds, "impulse");
+    a.title = strdup("one");
+    b.labels = texts_of(1, (const char *const[]){"other"});
+    b.output.psd.segment = 4096;
+    damper_of(&b)->offset = -0.0;
+    assert_int_equal(complete(&a), STATUS_OK);
+    assert_int_equal(complete(&b), STATUS_OK);
+    CanonicalBytes first = canonical(&a), second = canonical(&b);
+    assert_true(same(&first, &second));
+    damper_of(&b)->offset = 1e-300;
+    second = canonical(&b);
+    assert_false(same(&first, &second));
+    simulation_clear(&a);
+    simulation_clear(&b);
+}
+
+static void all_faults_of_a_scene_are_told_at_once_and_each_once(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 1.3, 0);
+    sdof_of(&simulation)->mass = -1;
+    sdof_of(&simulation)->damping_ratio = 0.01;
+    damper_of(&simulation)->clearance = -0.5;
+    damper_of(&simulation)->position = 1;
+    simulation.scene.duration = 0;
+    simulation.output.statistics_from = -1;
+    want(&simulation.output.channels, 3, (const char *const[]){"velocity", "speed", "velocity"});
+    simulation.output.psd.segment = 0;
+    simulation.output.psd.overlap = 10;
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/structure/mass"), "must be above 0 kg, is -1");
+    assert_begins(detail_at(&problem, "/structure/damping_ratio"), "excludes damping");
+    assert_string_equal(detail_at(&problem, "/dampers/0/clearance"),
+                        "must be at least 0 m, is -0.5");
+    assert_string_equal(detail_at(&problem, "/dampers/0/buffer/restitution"),
+                        "must be within [0, 1], is 1.3");
+    assert_string_equal(detail_at(&problem, "/dampers/0/buffer/contact_time"),
+                        "must be above 0 s, is 0");
+    assert_string_equal(detail_at(&problem, "/duration"), "must be above 0 s, is 0");
+    assert_begins(detail_at(&problem, "/output/channels/1"), "must be one of displacement");
+    assert_begins(detail_at(&problem, "/output/channels/2"), "velocity is asked for twice");
+    assert_begins(detail_at(&problem, "/output/statistics_from"), "must be at least 0 s");
+    assert_begins(detail_at(&problem, "/output/psd/segment"), "must be at least 1");
+    assert_int_equal(problem.count, 10);
+    assert_string_equal(problem.detail, "/structure/mass: must be above 0 kg, is -1");
+    simulation_clear(&simulation);
+}
+
+static void a_fault_of_the_reader_fails_the_request_and_is_not_repeated(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    sdof_of(&simulation)->mass = (double)NAN;
+    problem_clear(&problem);
+    forget_warnings();
+    problem_add(&problem, STATUS_INVALID, "/structure/mass", "must be a number");
+    assert_int_equal(complete_more(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].detail, "must be a number");
+    sdof_of(&simulation)->mass = 1;
+    problem_clear(&problem);
+    problem_add(&problem, STATUS_INVALID, "/structur", "unknown key");
+    assert_int_equal(complete_more(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    simulation_clear(&simulation);
+}
+
+static void an_empty_request_names_what_is_missing(void **state) {
+    (void)state;
+    Simulation simulation;
+    assert_int_equal(fields_default(simulation_fields, &simulation), STATUS_OK);
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 3);
+    assert_string_equal(detail_at(&problem, "/structure"), "is required: the primary structure");
+    assert_string_equal(detail_at(&problem, "/duration"), "is required: simulated time [s]");
+    assert_string_equal(detail_at(&problem, "/sample_rate"),
+                        "is required: samples per second of simulated time [Hz]");
+    simulation_clear(&simulation);
+    // Also where it was never filled in at all.
+    memset(&simulation, 0, sizeof simulation);
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    simulation_clear(&simulation);
+    assert_int_equal(fields_default(simulation_fields, &simulation), STATUS_OK);
+    assert_int_equal(simulation_complete(&simulation, NULL, NULL, NULL), STATUS_INVALID);
+    simulation_clear(&simulation);
+}
+
+static void without_a_damper_its_usual_channels_are_left_out(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_without_damper(&simulation);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.channels.count, 3);
+    assert_string_equal(simulation.output.channels.at[2], "acceleration");
+    want(&simulation.output.channels, 2, (const char *const[]){"displacement", "contact_force"});
+    want(&simulation.output.psd.channels, 1, (const char *const[]){"penetration"});
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 2);
+    assert_string_equal(detail_at(&problem, "/output/channels/1"),
+                        "contact_force needs a damper, the scene has none");
+    assert_string_equal(detail_at(&problem, "/output/psd/channels/0"),
+                        "penetration needs a damper, the scene has none");
+    simulation_clear(&simulation);
+}
+
+static void no_channels_are_what_they_say(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    want(&simulation.output.channels, 0, NULL);
+    want(&simulation.output.psd.channels, 0, NULL);
+    simulation.output.psd.segment = 100;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.channels.count, 0);
+    assert_int_equal(simulation.output.psd.segment, COUNT_ABSENT);
+    assert_int_equal(simulation.output.psd.window, CHOICE_ABSENT);
+    const CanonicalBytes first = canonical(&simulation);
+    // As the reader leaves it where it meets "psd": null.
+    const Field *output = fields_find(simulation_fields, "output", NULL);
+    const Field *psd = fields_find(output->fields, "psd", NULL);
+    assert_true((psd->flags & FIELD_NULL_IS_EMPTY) != 0);
+    fields_clear(psd->fields, &simulation.output.psd);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    const CanonicalBytes second = canonical(&simulation);
+    assert_true(same(&first, &second));
+    simulation_clear(&simulation);
+}
+
+static void a_segment_is_no_longer_than_the_series(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    simulation.scene.duration = 1;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.psd.segment, 1001);
+    assert_int_equal(simulation.output.psd.overlap, 500);
+    assert_int_equal(warnings.count, 0);
+    simulation.output.psd.segment = 4096;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.psd.segment, 1001);
+    assert_int_equal(simulation.output.psd.overlap, 500);
+    assert_string_equal(warning_at("/output/psd/segment"),
+                        "is 4096 samples, more than there are: cut to 1001");
+    simulation.output.psd.segment = 4096;
+    simulation.output.psd.overlap = 3000;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.psd.overlap, 500);
+    simulation_clear(&simulation);
+}
+
+static void segments_overlap_by_less_than_themselves(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    simulation.output.psd.segment = 100;
+    simulation.output.psd.overlap = 100;
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(detail_at(&problem, "/output/psd/overlap"),
+                        "must be less than the segment, 100 samples, is 100");
+    simulation.output.psd.segment = COUNT_ABSENT;
+    simulation.output.psd.overlap = 5000;
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/output/psd/overlap"),
+                        "must be less than the segment, 4096 samples, is 5000");
+    simulation.output.psd.segment = 1;
+    simulation.output.psd.overlap = COUNT_ABSENT;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(simulation.output.psd.overlap, 0);
+    simulation_clear(&simulation);
+}
+
+static void statistics_begin_within_the_run(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    simulation.output.statistics_from = 10;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    simulation.output.statistics_from = 12;
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/output/statistics_from"),
+                        "must be within the duration, [0, 10] s, is 12");
+    simulation_clear(&simulation);
+}
+
+static void titles_and_labels_have_their_limits(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    simulation.title = malloc(202);
+    memset(simulation.title, 't', 201);
+    simulation.title[201] = '\0';
+    const char *labels[33];
+    for (size_t i = 0; i < COUNT(labels); i++)
+        labels[i] = "label";
+    simulation.labels = texts_of(COUNT(labels), labels);
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 2);
+    assert_string_equal(detail_at(&problem, "/title"), "must have at most 200, has 201 bytes");
+    assert_string_equal(detail_at(&problem, "/labels"), "must have at most 32, has 33 texts");
+    simulation_clear(&simulation);
+}
+
+static void two_dampers_are_one_too_many_for_now(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    Damper *two = realloc(simulation.scene.dampers.at, 2 * sizeof *two);
+    assert_non_null(two);
+    assert_int_equal(fields_copy(damper_fields, &two[0], &two[1]), STATUS_OK);
+    simulation.scene.dampers = (Dampers){two, 2};
+    assert_int_equal(complete(&simulation), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(detail_at(&problem, "/dampers"), "must have at most 1, has 2 elements");
+    simulation_clear(&simulation);
+}
+
+static void implausible_values_get_a_warning_each(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 25);
+    damper_of(&simulation)->clearance = 15;
+    damper_of(&simulation)->position = -2;
+    damper_of(&simulation)->mass = 110.7;
+    sdof_of(&simulation)->damping = (double)NAN;
+    sdof_of(&simulation)->damping_ratio = 1.6;
+    simulation.scene.duration = 0.1;
+    simulation.scene.sample_rate = 5;
+    ((Excitation *)(void *)simulation.scene.excitation)->displacement = -15;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_string_equal(warning_at("/dampers/0/clearance"),
+                        "is 15 m, more than 1 m: metres are meant, not millimetres");
+    assert_begins(warning_at("/dampers/0/position"), "is -2 m");
+    assert_string_equal(warning_at("/dampers/0/mass"),
+                        "is 110.7 kg, more than the structure's 1.35 kg");
+    assert_string_equal(warning_at("/dampers/0/buffer/contact_time"),
+                        "is 25 s, more than 1 s: seconds are meant, not milliseconds");
+    assert_string_equal(warning_at("/structure/damping_ratio"),
+                        "is 1.6, more than 1: a ratio is meant, not percent");
+    assert_begins(warning_at("/excitation/displacement"), "is -15 m, more than 1 m");
+    assert_begins(warning_at("/duration"), "is 0.1 s, less than one period");
+    assert_begins(warning_at("/sample_rate"), "is 5 Hz, fewer than two samples");
+    assert_int_equal(warnings.count, 8);
+    simulation_clear(&simulation);
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_choose(&simulation.scene.excitation, &excitation_kinds, "random");
+    Variant *random = simulation.scene.excitation;
+    *(Reals *)variant_member(random, "band") = reals_of(2, (const double[]){0, 15});
+    *(double *)variant_member(random, "rms") = 981;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_begins(warning_at("/excitation/rms"), "is 981 m/s^2, more than 100 m/s^2");
+    simulation_clear(&simulation);
+}
+
+static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    sdof_of(&simulation)->stiffness = 0;
+    simulation.scene.duration = 1e-3;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(warnings.count, 0);
+    simulation_clear(&simulation);
+}
+
+static void accuracy_is_chosen_by_its_solver(void **state) {
+    (void)state;
+    assert_string_equal(accuracy_kinds.tag, "solver");
+    assert_ptr_equal(accuracy_kinds.at(0), &accuracy_auto);
+    assert_ptr_equal(kind_find(&accuracy_kinds, "exact"), &accuracy_exact);
+    assert_null(accuracy_kinds.at(2));
+}
+
+static int teardown(void **state) {
+    (void)state;
+    forget_warnings();
+    return 0;
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_papers_scene_is_sound_and_complete),
+        cmocka_unit_test(completing_twice_changes_nothing),
+        cmocka_unit_test(scenes_that_mean_the_same_have_the_same_bytes),
+        cmocka_unit_test(all_faults_of_a_scene_are_told_at_once_and_each_once),
+        cmocka_unit_test(a_fault_of_the_reader_fails_the_request_and_is_not_repeated),
+        cmocka_unit_test(an_empty_request_names_what_is_missing),
+        cmocka_unit_test(without_a_damper_its_usual_channels_are_left_out),
+        cmocka_unit_test(no_channels_are_what_they_say),
+        cmocka_unit_test(a_segment_is_no_longer_than_the_series),
+        cmocka_unit_test(segments_overlap_by_less_than_themselves),
+        cmocka_unit_test(statistics_begin_within_the_run),
+        cmocka_unit_test(titles_and_labels_have_their_limits),
+        cmocka_unit_test(two_dampers_are_one_too_many_for_now),
+        cmocka_unit_test(implausible_values_get_a_warning_each),
+        cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
+        cmocka_unit_test(accuracy_is_chosen_by_its_solver),
+    };
+    return cmocka_run_group_tests(tests, NULL, teardown);
+}
