@@ -9,11 +9,11 @@
 #include "core/simulation/simulation.h"
 #include "server/api/job_document.h"
 #include "server/base/clock.h"
-#include "server/codec/write.h"
 #include "server/command/bar.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
 #include "server/encode/encoder.h"
+#include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
 #include "server/options.h"
 
@@ -66,10 +66,9 @@ static Status job_write(const Simulation *simulation, const Warnings *warnings,
                         const Outcome *outcome, const int64_t began_unix_ms, double took,
                         Bytes *bytes) {
     Bytes plan = {0}, summary = {0}, told = {0};
-    write_item(&plan, plan_report_fields, &outcome->plan, WRITE_REPORT);
-    write_item(&summary, summary_fields, &outcome->summary, WRITE_REPORT);
-    write_list(&told, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
-               WRITE_REPORT);
+    document_plan(&plan, &outcome->plan);
+    document_summary(&summary, &outcome->summary);
+    document_warnings(&told, warnings);
     JobShow show = {.id = "j-local",
                     .state = JOB_SUCCESSFUL,
                     .progress = 100,
