@@ -1,5 +1,5 @@
-// Four sources, one setter: each hands the text of a value and the name it was given under to option_set, weakest
-// source first, so that the last one stays.
+// Four sources, one setter: each hands the text of a value and the name it was given under to
+// option_set, weakest source first, so that the last one stays.
 #include "server/options.h"
 
 #include <ctype.h>
@@ -79,8 +79,8 @@ static Status range_check(const Reader *reader, const char *typed, const Field *
     return status == STATUS_OK ? STATUS_OK : STATUS_USAGE;
 }
 
-static Status option_set(const Reader *reader, const Field *row, const char *typed, const char *value,
-                         OptionOrigin origin) {
+static Status option_set(const Reader *reader, const Field *row, const char *typed,
+                         const char *value, OptionOrigin origin) {
     char *end = NULL;
     errno = 0;
     switch (row->kind) {
@@ -93,7 +93,8 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
     }
     case FIELD_KIND_COUNT: {
         const unsigned long long number = strtoull(value, &end, 10);
-        if (!isdigit((unsigned char)value[0]) || *end != '\0' || errno != 0 || number == COUNT_ABSENT)
+        if (!isdigit((unsigned char)value[0]) || *end != '\0' || errno != 0 ||
+            number == COUNT_ABSENT)
             return refuse(reader, typed, value, row, "a whole number of at least 0");
         *(uint64_t *)member(reader, row) = number;
         break;
@@ -148,7 +149,8 @@ static char *trimmed(char *text) {
 static Status file_read(const Reader *reader, const char *path) {
     FILE *file = fopen(path, "r");
     if (file == NULL)
-        return problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s", strerror(errno));
+        return problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
+                           strerror(errno));
     char line[LINE_SIZE], typed[NAME_SIZE];
     for (size_t number = 1; fgets(line, sizeof line, file) != NULL; number++) {
         for (char *c = line; *c != '\0'; c++)
@@ -185,7 +187,8 @@ static void environment_read(const Reader *reader, const char *prefix) {
     }
 }
 
-// The row that a flag names, and in *value what stands behind its "=". -o is the first row with that letter.
+// The row that a flag names, and in *value what stands behind its "=". -o is the first row with
+// that letter.
 static const Field *flag_row(const Reader *reader, const char *flag, char name[NAME_SIZE],
                              const char **value) {
     *value = NULL;
@@ -243,7 +246,8 @@ static void flags_read(const Reader *reader, int argc, char *const *argv) {
 }
 
 // The file is the weakest source but is named by a stronger one, so its name is looked up first.
-static const char *config_path(const Reader *reader, int argc, char *const *argv, const char *prefix) {
+static const char *config_path(const Reader *reader, int argc, char *const *argv,
+                               const char *prefix) {
     const Field *row = row_find(reader->fields, "config", strlen("config"));
     if (row == NULL)
         return NULL;
@@ -264,14 +268,15 @@ static const char *config_path(const Reader *reader, int argc, char *const *argv
     return path;
 }
 
-Status options_read(const Field *fields, void *item, int argc, char *const *argv, const char *prefix,
-                    Options *options, Problem *problem) {
+Status options_read(const Field *fields, void *item, int argc, char *const *argv,
+                    const char *prefix, Options *options, Problem *problem) {
     *options = (Options){0};
     size_t rows = 0;
     while (fields[rows].kind != FIELD_KIND_END)
         rows++;
     if (rows > OPTIONS_ROWS)
-        return problem_set(problem, STATUS_INTERNAL, "%zu settings, more than %d", rows, OPTIONS_ROWS);
+        return problem_set(problem, STATUS_INTERNAL, "%zu settings, more than %d", rows,
+                           OPTIONS_ROWS);
     // Faults are counted in a Problem of its own where the caller has none.
     Problem *own = problem == NULL ? calloc(1, sizeof *own) : NULL;
     const Reader reader = {fields, item, options, problem != NULL ? problem : own};
@@ -293,8 +298,6 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
 static void value_print(const Field *row, const void *item, FILE *file) {
     const void *at = (const char *)item + row->offset;
     char digits[32];
-    if (row->kind != FIELD_KIND_FLAG && field_is_absent(row, item))
-        return;
     if (row->kind == FIELD_KIND_REAL)
         fputs(text_real(digits, *(const double *)at), file);
     else if (row->kind == FIELD_KIND_COUNT)
@@ -309,8 +312,10 @@ static void value_print(const Field *row, const void *item, FILE *file) {
 
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
-        fprintf(file, "%s = ", row->name);
-        value_print(row, item, file);
+        const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
+        fprintf(file, "%s%s = ", is_set ? "" : "# ", row->name);
+        if (is_set)
+            value_print(row, item, file);
         fprintf(file, "  # %s\n", origin_names[options->origins[row - fields]]);
     }
 }

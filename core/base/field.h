@@ -89,6 +89,7 @@ typedef enum Presence {
 enum {
     FIELD_NOTE = 1,           // changes nothing: left out of the canonical form (title, labels)
     FIELD_NULL_IS_EMPTY = 2,  // ITEM: JSON null is allowed and makes every member absent (fields_clear)
+    FIELD_PAIRS = 4,          // TEXTS: a JSON object of strings is allowed too and kept as "key=value"
 };
 
 struct Field {

@@ -78,6 +78,7 @@ void plan_free(Plan *plan);
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+void warnings_clear(Warnings *warnings);
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value, const char *unit,
                      const char *format, ...) __attribute__((format(printf, 6, 7)));
 

@@ -142,13 +142,12 @@ static bool fly(Exact *exact) {
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
     if (exact->plan->has_damper) {
-        const double most = slice.omega > 0
-                                ? fabs(slice.value) + fabs(slice.slope)
-                                : fmax(fabs(slice.value), fabs(slice.value + slice.slope * exact->interval));
+        const double first = fabs(slice.value), last = fabs(slice.value + slice.slope * exact->interval);
+        const double most = slice.omega > 0 ? first + fabs(slice.slope) : first > last ? first : last;
         const double sag = flight_curvature(&exact->flight, &exact->state, most) * exact->interval *
                            exact->interval / 8;
-        const double right = exact_room(exact, SIDE_RIGHT), left = exact_room(exact, SIDE_LEFT);
-        if (!(fmin(right - fmax(exact->state.r, end.r), left + fmin(exact->state.r, end.r)) > sag))
+        const double nearest = exact_room(exact, SIDE_RIGHT) - sag, furthest = sag - exact_room(exact, SIDE_LEFT);
+        if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest && end.r > furthest))
             return false;
     }
     take_integrals(exact, &integrals);

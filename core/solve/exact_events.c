@@ -23,8 +23,7 @@ static void begin_contact(Exact *exact, Side side) {
 
 static void begin_rest(Exact *exact, Side side) {
     // What relative momentum is left goes over to both, conserved.
-    const double mass = exact_effective_mass(exact);
-    ledger_lose(&exact->ledger, 0.5 * mass * exact->state.w * exact->state.w);
+    const double mass = exact_effective_mass(exact), speed = fabs(exact->state.w);
     exact->state.v += exact->resting.share * exact->state.w;
     exact->state.w = 0;
     exact->state.r = 0;
@@ -32,6 +31,7 @@ static void begin_rest(Exact *exact, Side side) {
     exact->phase = RESTING;
     exact->side = side;
     ledger_open(&exact->ledger, IMPACT_RESTING, exact_time(exact), side, NAN);
+    ledger_stretch(&exact->ledger, 0, exact_sign(side) * mass * speed, 0.5 * mass * speed * speed);
     ledger_force(&exact->ledger, fabs(exact_force(exact)));
 }
 
@@ -83,7 +83,7 @@ void exact_release(Exact *exact) {
 
 // Finds the first event on the arc. In flight `side` is the stop that is reached.
 bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side) {
-    double gap[ROOT_DEGREE + 1];
+    double gap[ROOT_DEGREE + 1] = {0};
     *side = exact->side;
     if (exact->phase == RESTING) {
         // arc.push times the side's sign must stay positive.

@@ -209,7 +209,7 @@ static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, 
 
 const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *slice, double length, double sign,
                            double peak, State *end) {
-    if (!hold->is_usable)
+    if (!hold->is_usable || hold->count == 0)
         return NULL;
     const Split at = split(hold, start, slice->value);
     const double n = hold_force(&hold->motion, start);

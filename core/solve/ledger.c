@@ -2,6 +2,11 @@
 
 #include <stdlib.h>
 
+// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught elsewhere.
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
 void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy) {
     *ledger = (Ledger){.response = response, .most = most};
     ledger->energy.initial = energy->kinetic + energy->strain;
@@ -50,8 +55,8 @@ void ledger_stretch(Ledger *ledger, double length, double impulse, double lost) 
 
 void ledger_force(Ledger *ledger, double magnitude) {
     Peaks *peaks = &ledger->response->peaks;
-    ledger->open.peak_force = fmax(ledger->open.peak_force, magnitude);
-    peaks->contact_force = fmax(peaks->contact_force, magnitude);
+    ledger->open.peak_force = larger(ledger->open.peak_force, magnitude);
+    peaks->contact_force = larger(peaks->contact_force, magnitude);
 }
 
 void ledger_close(Ledger *ledger, double time, double separation) {
@@ -81,10 +86,6 @@ void ledger_bounce(Ledger *ledger, double time, Side side, double approach, doub
     add(ledger, &impact);
 }
 
-void ledger_lose(Ledger *ledger, double lost) {
-    ledger->energy.contact += lost;
-}
-
 void ledger_work(Ledger *ledger, double input, double structural_damping) {
     ledger->energy.input += input;
     ledger->energy.structural_damping += structural_damping;
@@ -95,21 +96,21 @@ void ledger_balance(Ledger *ledger, const EnergyState *state) {
     const double held = state->kinetic + state->strain;
     const double balance =
         held - energy->initial - energy->input + energy->structural_damping + energy->contact;
-    ledger->largest_energy = fmax(ledger->largest_energy, fmax(held, fabs(energy->input)));
-    ledger->largest_balance = fmax(ledger->largest_balance, fabs(balance));
+    ledger->largest_energy = larger(ledger->largest_energy, larger(held, fabs(energy->input)));
+    ledger->largest_balance = larger(ledger->largest_balance, fabs(balance));
 }
 
 void ledger_peaks(Ledger *ledger, const Moment *at) {
     Peaks *peaks = &ledger->response->peaks;
-    peaks->displacement = fmax(peaks->displacement, fabs(at->x));
-    peaks->velocity = fmax(peaks->velocity, fabs(at->v));
-    peaks->acceleration = fmax(peaks->acceleration, fabs(at->acceleration));
-    peaks->damper_displacement = fmax(peaks->damper_displacement, fabs(at->damper_x));
+    peaks->displacement = larger(peaks->displacement, fabs(at->x));
+    peaks->velocity = larger(peaks->velocity, fabs(at->v));
+    peaks->acceleration = larger(peaks->acceleration, fabs(at->acceleration));
+    peaks->damper_displacement = larger(peaks->damper_displacement, fabs(at->damper_x));
 }
 
 void ledger_acceleration(Ledger *ledger, double acceleration) {
     Peaks *peaks = &ledger->response->peaks;
-    peaks->acceleration = fmax(peaks->acceleration, fabs(acceleration));
+    peaks->acceleration = larger(peaks->acceleration, fabs(acceleration));
 }
 
 Status ledger_status(const Ledger *ledger, Problem *problem) {

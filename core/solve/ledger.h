@@ -37,7 +37,6 @@ void ledger_force(Ledger *ledger, double magnitude);  // a candidate for the pea
 void ledger_close(Ledger *ledger, double time, double separation);
 // An instantaneous impact of two bodies with effective mass `mass`.
 void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation, double mass);
-void ledger_lose(Ledger *ledger, double lost);  // in contacts, outside any row
 
 void ledger_work(Ledger *ledger, double input, double structural_damping);
 void ledger_balance(Ledger *ledger, const EnergyState *energy);

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "server/api/app.h"
+#include "server/api/job_document.h"
 #include "server/base/clock.h"
-#include "server/codec/write.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
@@ -15,64 +15,6 @@
 static const double wait_initial = 2, wait_most = 30; // [s]
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
-
-// --- writing
-// ------------------------------------------------------------------------------------------------
-
-static void write_time(Bytes *bytes, const char *name, int64_t unix_ms) {
-    char text[32];
-    if (unix_ms > 0)
-        clock_rfc3339(unix_ms, text);
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, unix_ms > 0 ? text : NULL);
-}
-
-// A member whose value is JSON already.
-static void write_raw(Bytes *bytes, const char *name, const char *json) {
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_text(bytes, json != NULL ? json : "null");
-}
-
-static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result) {
-    bytes_format(bytes, ", \"links\": {\"self\": \"/v1/jobs/%s\"", id);
-    if (has_result)
-        bytes_format(bytes,
-                     ", \"result\": \"/v1/results/%s\", \"series\": \"/v1/results/%s/series.json\"",
-                     result, result);
-    bytes_text(bytes, "}}");
-}
-
-// `is_whole`: with plan, summary and warnings, as one job is shown; without, as in a list.
-static void write_job(Bytes *bytes, const JobShow *show, bool is_whole) {
-    const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
-    bytes_text(bytes, "{\"id\": ");
-    bytes_json_string(bytes, show->id);
-    if (show->title != NULL) {
-        bytes_text(bytes, ", \"title\": ");
-        bytes_json_string(bytes, show->title);
-    }
-    bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
-    bytes_real(bytes, show->progress);
-    bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
-    bytes_json_string(bytes, has_result ? show->result : NULL);
-    write_time(bytes, "created", show->created_unix_ms);
-    write_time(bytes, "started", show->started_unix_ms);
-    write_time(bytes, "finished", show->finished_unix_ms);
-    write_raw(bytes, "problem", show->problem);
-    if (is_whole) {
-        write_raw(bytes, "plan", show->plan);
-        write_raw(bytes, "summary", show->summary);
-        write_raw(bytes, "warnings", show->warnings != NULL ? show->warnings : "[]");
-    }
-    bytes_text(bytes, ", \"timing\": {\"queued\": ");
-    bytes_real(bytes, show->queued);
-    bytes_text(bytes, ", \"run\": ");
-    bytes_real(bytes, show->run);
-    bytes_text(bytes, ", \"total\": ");
-    bytes_real(bytes, show->total);
-    bytes_text(bytes, "}");
-    write_links(bytes, show->id, show->result, has_result);
-}
 
 // Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
@@ -91,7 +33,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     if (!is_finished)
         reply->retry_after = 1;
     Bytes bytes = {.most = app->reply_most};
-    write_job(&bytes, &show, true);
+    job_put(&bytes, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS);
     bytes_text(&bytes, "\n");
     job_show_clear(&show);
     return reply_bytes(reply, code, type_json, &bytes, problem);
@@ -147,20 +89,8 @@ static Status dry_run(App *app, const Request *request, Reply *reply, Problem *p
         return status;
     }
     Bytes bytes = {.most = app->reply_most};
-    bytes_text(&bytes, "{\"dry_run\": true, \"scene\": ");
-    write_item(&bytes, simulation_fields, &run.simulation, WRITE_SCENE);
-    bytes_format(&bytes, ", \"result\": \"%s\", \"cached\": %s, \"plan\": ", run.result,
-                 run.is_cached ? "true" : "false");
-    write_item(&bytes, plan_report_fields, &run.plan, WRITE_REPORT);
-    bytes_format(&bytes, ", \"samples\": %zu, \"cost\": {\"cpu_seconds\": ",
-                 scene_sample_count(&run.simulation.scene));
-    bytes_real(&bytes, run.cpu_seconds);
-    bytes_text(&bytes, ", \"bytes\": ");
-    bytes_real(&bytes, run.cost.bytes);
-    bytes_text(&bytes, "}, \"warnings\": ");
-    write_list(&bytes, warning_fields, run.warnings.at, run.warnings.count, sizeof *run.warnings.at,
-               WRITE_REPORT);
-    bytes_text(&bytes, "}\n");
+    job_put_dry_run(&bytes, &run);
+    bytes_text(&bytes, "\n");
     dry_run_clear(&run);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
@@ -230,7 +160,7 @@ static void list_row(App *app, Bytes *bytes, const JobRow *row) {
         const Status status = job_show(job, &show);
         job_drop(job);
         if (status == STATUS_OK)
-            write_job(bytes, &show, false);
+            job_put(bytes, &show, JOB_PUT_LINKS);
         job_show_clear(&show);
         if (status == STATUS_OK)
             return;
@@ -248,7 +178,7 @@ static void list_row(App *app, Bytes *bytes, const JobRow *row) {
                      .title = row->title};
     text_fit(show.id, sizeof show.id, row->id);
     text_fit(show.result, sizeof show.result, row->result);
-    write_job(bytes, &show, false); // borrows the row's texts
+    job_put(bytes, &show, JOB_PUT_LINKS); // borrows the row's texts
 }
 
 Status jobs_list(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -1,4 +1,5 @@
-// The tables themselves are made while building; here is only the way through them. They are short, a walk does.
+// The tables themselves are made while building; here is only the way through them. They are short,
+// a walk does.
 #include "server/base/embedded.h"
 
 #include <string.h>

@@ -9,11 +9,14 @@
 // A whole schema document, indented, ending in a newline. Units stand under "x-unit".
 void describe_schema(Bytes *bytes, const char *id, const char *title, const Field *fields);
 
-// The documents that exist: "scene", "material" ...; at(NULL-terminated). One line each in describe.c.
+// The documents that exist: "scene", "material" ... One line each in describe.c.
 typedef struct SchemaDocument {
     const char *name, *title;
     const Field *fields;
 } SchemaDocument;
 extern const SchemaDocument schema_documents[];  // ends with name == NULL
+
+// The document's schema under "/schemas/NAME": what schema/NAME.schema.json holds.
+void describe_document(Bytes *bytes, const SchemaDocument *document);
 
 #endif

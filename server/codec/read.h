@@ -14,7 +14,7 @@ enum { READ_DEPTH = 32 };
 // fields_check and others can add theirs to the same problem.
 Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
-// The same for rows that must also be allowed beside `extra` top-level keys (NULL-terminated; skipped). May be NULL.
+// The same, passing over the top-level keys in `extra` (NULL-terminated; may be NULL), which are another's to read.
 Status read_json_beside(const char *text, size_t size, const Field *fields, void *item,
                         const char *const *extra, Problem *problem);
 

@@ -50,7 +50,8 @@ static const char overview[] =
 static const char exits[] =
     "\n"
     "impactd help COMMAND tells more. Exit codes: 0 ok, 1 the job failed, 2 usage, 3 bad scene,\n"
-    "4 not found, 5 not allowed, 7 server unreachable, 8 timed out while the job goes on, 130 interrupted.\n";
+    "4 not found, 5 not allowed, 7 server unreachable, 8 timed out while the job goes on, 130 "
+    "interrupted.\n";
 
 const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)

@@ -1,5 +1,6 @@
-// Ctrl-C must stop at once, also in the middle of a transform or of writing, and leave nothing half done. All this
-// program holds outside its memory is the one temporary file, so the signal's handler can end it there and then.
+// Ctrl-C must stop at once, also in the middle of a transform or of writing, and leave nothing half
+// done. All this program holds outside its memory is the one temporary file, so the signal's
+// handler can end it there and then.
 #include "server/command/output.h"
 
 #include <errno.h>
@@ -71,7 +72,8 @@ Status output_write(const void *bytes, size_t size, Problem *problem) {
         if (done < 0 && errno == EINTR)
             continue;
         if (done < 0)
-            return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path, strerror(errno));
+            return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path,
+                               strerror(errno));
         at += done;
         size -= (size_t)done;
     }
@@ -94,7 +96,8 @@ Status output_close(Problem *problem) {
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
     output_drop();
     if (!is_named)
-        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path, strerror(error));
+        return problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path,
+                           strerror(error));
     return STATUS_OK;
 }
 

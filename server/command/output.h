@@ -1,5 +1,5 @@
-// A file that appears whole or not at all: written beside its name, renamed at the end, removed when the program is
-// interrupted. Not a stream to a terminal. Used by run.c.
+// A file that appears whole or not at all: written beside its name, renamed at the end, removed
+// when the program is interrupted. Not a stream to a terminal. Used by run.c.
 #ifndef SERVER_COMMAND_OUTPUT_H
 #define SERVER_COMMAND_OUTPUT_H
 
@@ -15,7 +15,8 @@ Status output_close(Problem *problem);
 // Removes what was written so far; fine if nothing is open.
 void output_drop(void);
 
-// From here on Ctrl-C and SIGTERM remove the open output and end the program at once with exit code 130.
+// From here on Ctrl-C and SIGTERM remove the open output and end the program at once with exit code
+// 130.
 void output_guard(void);
 
 #endif

@@ -15,7 +15,7 @@ Status scene_file_read(const char *path, Bytes *text, Problem *problem) {
     FILE *file = is_input ? stdin : fopen(path, "rb");
     if (file == NULL)
         return problem_set(problem,
-                           errno == ENOENT    ? STATUS_NOT_FOUND
+                           errno == ENOENT   ? STATUS_NOT_FOUND
                            : errno == EACCES ? STATUS_FORBIDDEN
                                              : STATUS_IO,
                            "cannot be read: %s", strerror(errno));

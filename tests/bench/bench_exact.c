@@ -95,9 +95,7 @@ int main(void) {
         printf("%-20s %9.2f %10.2f %8zu %10.2f %12.2f\n", cases[c].name, run_ns, run_ns / set_ns, impacts,
                plan_ns / 1e3, base_ns);
         simulation_clear(&simulation);
-        for (size_t i = 0; i < warnings.count; i++)
-            fields_clear(warning_fields, &warnings.at[i]);
-        free(warnings.at);
+        warnings_clear(&warnings);
     }
     free(block);
     free(copy);

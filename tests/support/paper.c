@@ -5,6 +5,7 @@
 
 #include "core/excite/random.h"
 #include "core/excite/sine.h"
+#include "tests/support/scenes.h"
 
 const PaperBuffer paper_buffers[5] = {
     {"sponge", 0.61, 0.025, 1.65e3, 4.05},      {"soft_rubber", 0.44, 0.019, 2.99e3, 8.80},
@@ -13,44 +14,18 @@ const PaperBuffer paper_buffers[5] = {
 };
 
 void paper_scene(Simulation *simulation, double restitution, double contact_time, double duration) {
-    if (fields_default(simulation_fields, simulation) != STATUS_OK)
-        abort();
-    simulation->scene.structure = variant_new(&structure_sdof);
-    if (simulation->scene.structure == NULL)
-        abort();
-    StructureSdof *structure = (StructureSdof *)(void *)simulation->scene.structure;
-    structure->mass = 1.35;
-    structure->stiffness = 865;
-    structure->damping = 1.092;
-    Dampers *dampers = &simulation->scene.dampers;
-    dampers->at = malloc(sizeof *dampers->at);
-    if (dampers->at == NULL || fields_default(damper_fields, dampers->at) != STATUS_OK)
-        abort();
-    dampers->count = 1;
-    dampers->at[0].mass = 0.1107;
-    dampers->at[0].clearance = 0.015;
-    dampers->at[0].buffer.restitution = restitution;
-    dampers->at[0].buffer.contact_time = contact_time;
+    scene_with_damper(simulation, restitution, contact_time);
     simulation->scene.duration = duration;
-    simulation->scene.sample_rate = 1000;
-    paper_free(simulation, 0.015);
-}
-
-static Excitation *replace_excitation(Simulation *simulation, const Kind *kind) {
-    variant_free(simulation->scene.excitation);
-    simulation->scene.excitation = variant_new(kind);
-    if (simulation->scene.excitation == NULL)
-        abort();
-    return (Excitation *)(void *)simulation->scene.excitation;
 }
 
 void paper_free(Simulation *simulation, double displacement) {
-    replace_excitation(simulation, &excitation_free.kind)->displacement = displacement;
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "free");
+    ((Excitation *)(void *)simulation->scene.excitation)->displacement = displacement;
 }
 
 void paper_random(Simulation *simulation, double rms, uint64_t seed) {
-    ExcitationRandom *random = (ExcitationRandom *)(void *)replace_excitation(simulation, &excitation_random.kind);
-    free(random->band.at);
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "random");
+    ExcitationRandom *random = (ExcitationRandom *)(void *)simulation->scene.excitation;
     random->band.at = malloc(2 * sizeof *random->band.at);
     if (random->band.at == NULL)
         abort();
@@ -62,16 +37,14 @@ void paper_random(Simulation *simulation, double rms, uint64_t seed) {
 }
 
 void paper_sine(Simulation *simulation, double amplitude, double frequency) {
-    ExcitationSine *sine = (ExcitationSine *)(void *)replace_excitation(simulation, &excitation_sine.kind);
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "sine");
+    ExcitationSine *sine = (ExcitationSine *)(void *)simulation->scene.excitation;
     sine->amplitude = amplitude;
     sine->frequency = frequency;
 }
 
 void paper_model(Simulation *simulation, const char *model) {
-    variant_free(simulation->scene.contact);
-    simulation->scene.contact = variant_new(kind_find(&contact_kinds, model));
-    if (simulation->scene.contact == NULL)
-        abort();
+    scene_choose(&simulation->scene.contact, &contact_kinds, model);
 }
 
 static void texts_free(Texts *texts) {

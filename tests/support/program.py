@@ -1,21 +1,19 @@
-"""What the Python tests share: where the program is, how to start the daemon, how to ask it, how to count.
+"""What the Python tests share: where the program is, how to run it, what a test file does as a whole.
 
 Not a test framework: a test is a function whose name begins with test_ and whose first line of
 documentation is the sentence it proves. Used by every tests/**/test_*.py."""
 
 import argparse
-import http.client
+import contextlib
 import json
 import os
 import re
-import select
-import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 import time
 import traceback
+
+from daemon import Daemon
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 EXAMPLES = os.path.join(SOURCE, "schema", "examples")
@@ -53,135 +51,28 @@ def examples():
     return sorted(f[:-5] for f in os.listdir(EXAMPLES) if f.endswith(".json"))
 
 
-class Answer:
-    def __init__(self, response, body):
-        self.status, self.headers, self.body = response.status, response.headers, body
+@contextlib.contextmanager
+def daemon(*arguments, **options):
+    """A running daemon; afterwards it must end well, within its time, and no sanitizer may have spoken."""
+    with Daemon(build, *arguments, **options) as running:
+        yield running
+        assert running.is_alive(), f"the daemon ended by itself: {running.stderr()}"
+        code, seconds = running.stop(60)
+        assert code == 0, f"the daemon ended with {code}: {running.stderr()}"
+        assert seconds < 5 or is_sanitized(), f"SIGTERM took {seconds:.1f} s"
+        spoken = re.findall(r".*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer).*", running.stderr())
+        assert not spoken, spoken
 
-    def json(self):
-        return json.loads(self.body)
 
-
-class Daemon:
-    """impactd serve on a free port with a data folder of its own, which goes with it."""
-
-    def __init__(self, *arguments, directory=None):
-        self.arguments = arguments
-        self.is_own_directory = directory is None
-        self.directory = directory or tempfile.mkdtemp(prefix="impactd-test-")
-        self.process = None
-
-    def start(self):
-        # Port 0: the system picks a free one and the daemon prints it.
-        self.errors = open(os.path.join(self.directory, "stderr"), "ab")
-        self.process = subprocess.Popen(
-            [impactd(), "serve", "--listen", "127.0.0.1:0", "--data",
-             os.path.join(self.directory, "data"), *self.arguments],
-            stdout=subprocess.PIPE, stderr=self.errors)
-        text, limit = b"", time.monotonic() + 30
-        while time.monotonic() < limit:
-            if select.select([self.process.stdout], [], [], 0.2)[0]:
-                piece = os.read(self.process.stdout.fileno(), 4096)
-                if not piece:
-                    break
-                text += piece
-            found = re.search(rb"http://127\.0\.0\.1:(\d+)", text)
-            if found:
-                self.port = int(found.group(1))
-                self.wait_ready(limit)
-                return self
-        self.kill()
-        with open(self.errors.name, encoding="utf-8", errors="replace") as errors:
-            raise AssertionError(f"the daemon did not start: {text!r} {errors.read()!r}")
-
-    def wait_ready(self, limit):
-        while time.monotonic() < limit:
-            try:
-                if self.get("/health/ready").status == 200:
-                    return
-            except OSError:
-                pass
-            time.sleep(0.02)
-        raise AssertionError("the daemon did not become ready")
-
-    def ask(self, method, target, body=None, timeout=120, **headers):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
-        try:
-            connection.request(method, target, body,
-                               {name.replace("_", "-"): value for name, value in headers.items()})
-            response = connection.getresponse()
-            return Answer(response, response.read())
-        finally:
-            connection.close()
-
-    def get(self, target, **headers):
-        return self.ask("GET", target, **headers)
-
-    def post(self, scene_or_text, target="/v1/jobs", **headers):
-        body = scene_or_text if isinstance(scene_or_text, (str, bytes)) else json.dumps(scene_or_text)
-        return self.ask("POST", target, body, Content_Type="application/json", **headers)
-
-    def finish(self, job, limit=300):
-        """Waits for a job (its document); returns the finished document."""
-        end = time.monotonic() + limit
-        while job["status"] in ("accepted", "running"):
-            assert time.monotonic() < end, f"{job['id']} is still {job['status']} after {limit} s"
-            job = self.get(job["links"]["self"] + "?wait=10").json()
-        return job
-
-    def run(self, scene_or_text):
-        """Submits and waits; returns the job, which must be successful."""
-        answer = self.post(scene_or_text, Prefer="wait=30")
-        assert answer.status in (200, 202), (answer.status, answer.body[:2000])
-        job = self.finish(answer.json())
-        assert job["status"] == "successful", job["problem"]
-        return job
-
-    def kill(self):
-        """Ends it as a power cut would."""
-        self.process.kill()
-        self.process.wait()
-        self.close()
-
-    def stop(self):
-        """Ends it as a service manager would; returns the exit code. It has 5 s by contract."""
-        self.process.send_signal(signal.SIGTERM)
-        try:
-            code = self.process.wait(timeout=30 if is_sanitized() else 6)
-        except subprocess.TimeoutExpired:
-            self.kill()
-            raise AssertionError("SIGTERM did not end the daemon within 5 s") from None
-        self.close()
-        return code
-
-    def close(self):
-        self.process.stdout.close()
-        self.errors.close()
-        self.process = None
-
-    def complaints(self):
-        """What it wrote to stderr that a sanitizer or a crash would write."""
-        with open(os.path.join(self.directory, "stderr"), encoding="utf-8", errors="replace") as file:
-            return re.findall(r".*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer).*", file.read())
-
-    def __enter__(self):
-        return self.start()
-
-    def __exit__(self, kind, value, trace):
-        try:
-            if self.process is not None and self.process.poll() is not None:
-                code = self.process.returncode
-                self.close()
-                if kind is None:
-                    raise AssertionError(f"the daemon ended by itself with {code}: {self.complaints()}")
-            elif self.process is not None:
-                code = self.stop()
-                if kind is None:
-                    assert code == 0, f"the daemon ended with {code}: {self.complaints()}"
-            if kind is None:
-                assert not self.complaints(), self.complaints()
-        finally:
-            if self.is_own_directory:
-                shutil.rmtree(self.directory, ignore_errors=True)
+def finished(running, scene):
+    """Submits and waits; the job's document, which must be of a successful one."""
+    reply = running.submit(scene, wait=30)
+    assert reply.status in (200, 202), reply
+    job = reply.json()
+    if job["status"] in ("accepted", "running"):
+        job = running.finished(job["id"], 300)
+    assert job["status"] == "successful", job
+    return job
 
 
 def main(namespace):

@@ -14,6 +14,7 @@
 #include "core/excite/sine.h"
 #include "core/math/fourier.h"
 #include "tests/support/paper.h"
+#include "tests/support/scenes.h"
 
 static const double TURN = 6.283185307179586;
 
@@ -26,9 +27,7 @@ static Outcome *run(Simulation *simulation) {
     if (simulation_complete(simulation, NULL, &warnings, &problem) != STATUS_OK ||
         simulation_run(simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].pointer : "");
-    for (size_t i = 0; i < warnings.count; i++)
-        fields_clear(warning_fields, &warnings.at[i]);
-    free(warnings.at);
+    warnings_clear(&warnings);
     simulation_clear(simulation);
     return outcome;
 }
@@ -145,9 +144,7 @@ static void sponge_contacts_in_free_vibration_last_as_long_as_published(void **s
 }
 
 static void constant_base(Simulation *simulation, double acceleration, double duration) {
-    variant_free(simulation->scene.excitation);
-    simulation->scene.excitation = variant_new(&excitation_record.kind);
-    assert_non_null(simulation->scene.excitation);
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "record");
     ExcitationRecord *record = (ExcitationRecord *)(void *)simulation->scene.excitation;
     record->samples.at = malloc(2 * sizeof *record->samples.at);
     assert_non_null(record->samples.at);

@@ -1,0 +1,326 @@
+// Rows to JSON Schema: every row becomes a property, in table order, so the same table prints the
+// same bytes.
+#include "server/codec/describe.h"
+
+#include <stdio.h>
+
+#include "core/simulation/simulation.h"
+
+// clang-format off
+const SchemaDocument schema_documents[] = {
+    {"scene", "A scene: what impactd is asked to simulate", simulation_fields},
+    {NULL, NULL, NULL},
+};
+// clang-format on
+
+// Where the text stands: inside how many brackets, and whether the innermost one has a member yet.
+typedef struct Printer {
+    Bytes *bytes;
+    int depth;
+    bool has_member;
+} Printer;
+
+static void begin_line(Printer *printer) {
+    bytes_text(printer->bytes, printer->has_member ? ",\n" : "\n");
+    for (int i = 0; i < printer->depth; i++)
+        bytes_text(printer->bytes, "  ");
+    printer->has_member = true;
+}
+
+static void open_bracket(Printer *printer, const char *bracket) {
+    bytes_text(printer->bytes, bracket);
+    printer->depth++;
+    printer->has_member = false;
+}
+
+static void close_bracket(Printer *printer, const char *bracket) {
+    printer->depth--;
+    if (printer->has_member) {
+        printer->has_member = false;
+        begin_line(printer);
+    }
+    bytes_text(printer->bytes, bracket);
+    printer->has_member = true;
+}
+
+static void name_member(Printer *printer, const char *name) {
+    begin_line(printer);
+    bytes_json_string(printer->bytes, name);
+    bytes_text(printer->bytes, ": ");
+}
+
+static void open_member(Printer *printer, const char *name, const char *bracket) {
+    name_member(printer, name);
+    open_bracket(printer, bracket);
+}
+
+static void text_member(Printer *printer, const char *name, const char *text) {
+    name_member(printer, name);
+    bytes_json_string(printer->bytes, text);
+}
+
+static void word_member(Printer *printer, const char *name, const char *word) {
+    name_member(printer, name);
+    bytes_text(printer->bytes, word);
+}
+
+static void real_member(Printer *printer, const char *name, double value) {
+    name_member(printer, name);
+    bytes_real(printer->bytes, value);
+}
+
+static void count_member(Printer *printer, const char *name, size_t value) {
+    name_member(printer, name);
+    bytes_format(printer->bytes, "%zu", value);
+}
+
+static void texts_member(Printer *printer, const char *name, const char *const *texts) {
+    name_member(printer, name);
+    bytes_text(printer->bytes, "[");
+    for (size_t i = 0; texts != NULL && texts[i] != NULL; i++) {
+        bytes_text(printer->bytes, i > 0 ? ", " : "");
+        bytes_json_string(printer->bytes, texts[i]);
+    }
+    bytes_text(printer->bytes, "]");
+}
+
+static void print_object(Printer *printer, const Field *fields, const KindTable *kinds,
+                         const Kind *kind);
+
+static void print_range(Printer *printer, const Range *range) {
+    if (!isinf(range->least))
+        real_member(printer, range->is_open_below ? "exclusiveMinimum" : "minimum", range->least);
+    if (!isinf(range->most))
+        real_member(printer, range->is_open_above ? "exclusiveMaximum" : "maximum", range->most);
+}
+
+static void print_length(Printer *printer, const Field *field) {
+    if (field->presence == PRESENCE_REQUIRED)
+        count_member(printer, "minItems", 1);
+    if (field->most > 0)
+        count_member(printer, "maxItems", field->most);
+}
+
+// A count is never negative, whatever its row says.
+static Range count_range(const Field *field) {
+    Range range = field->range;
+    if (range.least < 0)
+        range = (Range){0, range.most, false, range.is_open_above};
+    return range;
+}
+
+static void print_texts(Printer *printer, const Field *field) {
+    const bool has_pairs = (field->flags & FIELD_PAIRS) != 0;
+    if (has_pairs) {
+        open_member(printer, "anyOf", "[");
+        begin_line(printer);
+        open_bracket(printer, "{");
+    }
+    text_member(printer, "type", "array");
+    open_member(printer, "items", "{");
+    text_member(printer, "type", "string");
+    if (field->choices != NULL)
+        texts_member(printer, "enum", field->choices);
+    close_bracket(printer, "}");
+    print_length(printer, field);
+    if (has_pairs) {
+        close_bracket(printer, "}");
+        begin_line(printer);
+        open_bracket(printer, "{");
+        text_member(printer, "type", "object");
+        open_member(printer, "additionalProperties", "{");
+        text_member(printer, "type", "string");
+        close_bracket(printer, "}");
+        if (field->most > 0)
+            count_member(printer, "maxProperties", field->most);
+        close_bracket(printer, "}");
+        close_bracket(printer, "]");
+    }
+    if (field->presence == PRESENCE_DEFAULT)
+        texts_member(printer, "default", field->initial_texts);
+}
+
+// An object, or in its place a string (of the row it stands for) or null.
+static void print_item(Printer *printer, const Field *field) {
+    const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
+    if (field->shorthand == NULL && !takes_null) {
+        print_object(printer, field->fields, NULL, NULL);
+        return;
+    }
+    open_member(printer, "anyOf", "[");
+    begin_line(printer);
+    open_bracket(printer, "{");
+    print_object(printer, field->fields, NULL, NULL);
+    close_bracket(printer, "}");
+    if (field->shorthand != NULL) {
+        const Field *row = fields_find(field->fields, field->shorthand, NULL);
+        begin_line(printer);
+        open_bracket(printer, "{");
+        text_member(printer, "type", "string");
+        if (row->most > 0)
+            count_member(printer, "maxLength", row->most);
+        text_member(printer, "description", row->doc);
+        close_bracket(printer, "}");
+    }
+    if (takes_null) {
+        begin_line(printer);
+        open_bracket(printer, "{");
+        text_member(printer, "type", "null");
+        close_bracket(printer, "}");
+    }
+    close_bracket(printer, "]");
+}
+
+// One schema per kind. Only the default kind may stand without its tag, so exactly one of them
+// fits.
+static void print_variant(Printer *printer, const Field *field) {
+    open_member(printer, "oneOf", "[");
+    const Kind *kind;
+    for (size_t i = 0; (kind = field->kinds->at(i)) != NULL; i++) {
+        begin_line(printer);
+        open_bracket(printer, "{");
+        text_member(printer, "title", kind->name);
+        text_member(printer, "description", kind->doc);
+        print_object(printer, kind->fields, field->kinds, kind);
+        close_bracket(printer, "}");
+    }
+    close_bracket(printer, "]");
+    if (field->presence == PRESENCE_DEFAULT) {
+        open_member(printer, "default", "{");
+        text_member(printer, field->kinds->tag, field->kinds->at(0)->name);
+        close_bracket(printer, "}");
+    }
+}
+
+static void print_value(Printer *printer, const Field *field) {
+    const bool has_default = field->presence == PRESENCE_DEFAULT;
+    Range range;
+    switch (field->kind) {
+    case FIELD_KIND_REAL:
+        text_member(printer, "type", "number");
+        print_range(printer, &field->range);
+        if (has_default)
+            real_member(printer, "default", field->initial);
+        break;
+    case FIELD_KIND_COUNT:
+        text_member(printer, "type", "integer");
+        range = count_range(field);
+        print_range(printer, &range);
+        if (has_default)
+            real_member(printer, "default", field->initial);
+        break;
+    case FIELD_KIND_FLAG:
+        text_member(printer, "type", "boolean");
+        if (has_default)
+            word_member(printer, "default", field->initial != 0 ? "true" : "false");
+        break;
+    case FIELD_KIND_TEXT:
+        text_member(printer, "type", "string");
+        if (field->most > 0)
+            count_member(printer, "maxLength", field->most);
+        break;
+    case FIELD_KIND_CHOICE:
+        texts_member(printer, "enum", field->choices);
+        if (has_default)
+            text_member(printer, "default", field->choices[(int)field->initial]);
+        break;
+    case FIELD_KIND_REALS:
+        text_member(printer, "type", "array");
+        open_member(printer, "items", "{");
+        text_member(printer, "type", "number");
+        print_range(printer, &field->range);
+        close_bracket(printer, "}");
+        print_length(printer, field);
+        break;
+    case FIELD_KIND_TEXTS:
+        print_texts(printer, field);
+        break;
+    case FIELD_KIND_ITEM:
+        print_item(printer, field);
+        break;
+    case FIELD_KIND_LIST:
+        text_member(printer, "type", "array");
+        open_member(printer, "items", "{");
+        print_object(printer, field->fields, NULL, NULL);
+        close_bracket(printer, "}");
+        print_length(printer, field);
+        if (has_default)
+            word_member(printer, "default", "[]");
+        break;
+    case FIELD_KIND_VARIANT:
+        print_variant(printer, field);
+        break;
+    case FIELD_KIND_BASE:
+    case FIELD_KIND_END:
+        break;
+    }
+}
+
+static void print_properties(Printer *printer, const Field *fields) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (field->kind == FIELD_KIND_BASE) {
+            print_properties(printer, field->fields);
+            continue;
+        }
+        open_member(printer, field->name, "{");
+        if (field->doc != NULL)
+            text_member(printer, "description", field->doc);
+        print_value(printer, field);
+        if (field->unit != NULL)
+            text_member(printer, "x-unit", field->unit);
+        close_bracket(printer, "}");
+    }
+}
+
+static void print_required(Printer *printer, const Field *fields, size_t *count) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (field->kind == FIELD_KIND_BASE) {
+            print_required(printer, field->fields, count);
+        } else if (field->presence == PRESENCE_REQUIRED) {
+            bytes_text(printer->bytes, (*count)++ > 0 ? ", " : "");
+            bytes_json_string(printer->bytes, field->name);
+        }
+    }
+}
+
+// The members of an object's schema; `kind` is NULL for a plain object, else one of `kinds`, named
+// by their tag.
+static void print_object(Printer *printer, const Field *fields, const KindTable *kinds,
+                         const Kind *kind) {
+    text_member(printer, "type", "object");
+    open_member(printer, "properties", "{");
+    if (kind != NULL) {
+        open_member(printer, kinds->tag, "{");
+        text_member(printer, "const", kind->name);
+        close_bracket(printer, "}");
+    }
+    print_properties(printer, fields);
+    close_bracket(printer, "}");
+    name_member(printer, "required");
+    bytes_text(printer->bytes, "[");
+    size_t count = 0;
+    if (kind != NULL && kind != kinds->at(0)) {
+        bytes_json_string(printer->bytes, kinds->tag);
+        count++;
+    }
+    print_required(printer, fields, &count);
+    bytes_text(printer->bytes, "]");
+    word_member(printer, "additionalProperties", "false");
+}
+
+void describe_schema(Bytes *bytes, const char *id, const char *title, const Field *fields) {
+    Printer printer = {.bytes = bytes};
+    open_bracket(&printer, "{");
+    text_member(&printer, "$schema", "https://json-schema.org/draft/2020-12/schema");
+    text_member(&printer, "$id", id);
+    text_member(&printer, "title", title);
+    print_object(&printer, fields, NULL, NULL);
+    close_bracket(&printer, "}");
+    bytes_text(bytes, "\n");
+}
+
+void describe_document(Bytes *bytes, const SchemaDocument *document) {
+    char id[64];
+    snprintf(id, sizeof id, "/schemas/%s", document->name);
+    describe_schema(bytes, id, document->title, document->fields);
+}

@@ -1,0 +1,161 @@
+// The path to a byte is a stack of frames, one per open bracket: in an array the index, in an
+// object where the text of the last key stands. Strings are skipped, so that brackets within them
+// do not count. Keys are decoded only when a pointer is wanted.
+#include "server/codec/scan.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/base/field.h"
+#include "server/codec/read.h"
+
+enum { KEY_SIZE = 512 }; // more of a key fits into no pointer
+
+typedef struct Frame {
+    bool is_array;
+    bool has_key;
+    size_t index;
+    size_t key, key_end; // the text between the quotes
+} Frame;
+
+typedef struct Scan {
+    const char *text;
+    size_t at;
+    size_t depth, containers;
+    bool is_key_next;
+    Frame frames[READ_DEPTH];
+} Scan;
+
+static bool is_too_deep(const Scan *scan) {
+    return scan->depth > READ_DEPTH;
+}
+
+static void open_container(Scan *scan, bool is_array) {
+    if (scan->depth < READ_DEPTH)
+        scan->frames[scan->depth] = (Frame){.is_array = is_array};
+    scan->depth++;
+    scan->containers++;
+    scan->is_key_next = !is_array;
+}
+
+static void skip_string(Scan *scan, size_t stop) {
+    const size_t start = ++scan->at;
+    while (scan->at < stop && scan->text[scan->at] != '"')
+        scan->at += scan->text[scan->at] == '\\' ? 2 : 1;
+    if (scan->at > stop)
+        scan->at = stop;
+    if (scan->is_key_next && scan->depth > 0) {
+        Frame *frame = &scan->frames[scan->depth - 1];
+        frame->has_key = true;
+        frame->key = start;
+        frame->key_end = scan->at;
+        scan->is_key_next = false;
+    }
+    if (scan->at < stop)
+        scan->at++;
+}
+
+// Goes on by one token, never beyond `stop`.
+static void step(Scan *scan, size_t stop) {
+    switch (scan->text[scan->at]) {
+    case '"':
+        skip_string(scan, stop);
+        return;
+    case '{':
+    case '[':
+        open_container(scan, scan->text[scan->at] == '[');
+        break;
+    case '}':
+    case ']':
+        scan->depth -= scan->depth > 0 ? 1 : 0;
+        scan->is_key_next = false;
+        break;
+    case ',': {
+        if (scan->depth == 0)
+            break;
+        Frame *frame = &scan->frames[scan->depth - 1];
+        frame->index++;
+        frame->has_key = false;
+        scan->is_key_next = !frame->is_array;
+        break;
+    }
+    default:
+        break;
+    }
+    scan->at++;
+}
+
+bool scan_allows(const char *text, size_t size, size_t *position, const char **sentence) {
+    const char *nul = memchr(text, '\0', size);
+    if (nul != NULL) {
+        *position = (size_t)(nul - text);
+        *sentence = "there is a NUL byte; the text must be UTF-8";
+        return false;
+    }
+    Scan scan = {.text = text};
+    while (scan.at < size) {
+        step(&scan, size);
+        if (is_too_deep(&scan)) {
+            *position = scan.at - 1;
+            *sentence = "objects and arrays are nested more than 32 deep";
+            return false;
+        }
+        if (scan.containers > SCAN_CONTAINERS) {
+            *position = scan.at - 1;
+            *sentence = "there are more than 131072 objects and arrays";
+            return false;
+        }
+    }
+    return true;
+}
+_Static_assert(READ_DEPTH == 32 && SCAN_CONTAINERS == 131072, "the sentences name these numbers");
+
+// The key as people know it: escapes decoded by the parser itself, or left where they are none.
+static void key_name(const Scan *scan, const Frame *frame, char name[KEY_SIZE]) {
+    size_t length = frame->key_end - frame->key;
+    if (length > KEY_SIZE - 1)
+        length = KEY_SIZE - 1;
+    memcpy(name, scan->text + frame->key, length);
+    name[length] = '\0';
+    if (memchr(name, '\\', length) == NULL)
+        return;
+    char document[KEY_SIZE + 4];
+    snprintf(document, sizeof document, "[\"%s\"]", name);
+    json_t *parsed = json_loads(document, 0, NULL);
+    const char *decoded = json_string_value(json_array_get(parsed, 0));
+    if (decoded != NULL)
+        text_fit(name, KEY_SIZE, decoded);
+    json_decref(parsed);
+}
+
+void scan_place(const char *text, size_t size, size_t position, ScanPlace *place) {
+    Scan scan = {.text = text};
+    const size_t stop = position < size ? position : size;
+    while (scan.at < stop && !is_too_deep(&scan))
+        step(&scan, stop);
+
+    place->line = place->column = 1;
+    for (size_t i = 0; i < stop; i++) {
+        if (text[i] == '\n') {
+            place->line++;
+            place->column = 1;
+        } else if (((unsigned char)text[i] & 0xC0) != 0x80) {
+            place->column++;
+        }
+    }
+
+    place->pointer[0] = '\0';
+    for (size_t i = 0; i < scan.depth && i < READ_DEPTH; i++) {
+        const Frame *frame = &scan.frames[i];
+        char base[sizeof place->pointer];
+        memcpy(base, place->pointer, sizeof base);
+        char name[KEY_SIZE];
+        if (frame->is_array)
+            pointer_index(place->pointer, sizeof place->pointer, base, frame->index);
+        else if (frame->has_key) {
+            key_name(&scan, frame, name);
+            pointer_join(place->pointer, sizeof place->pointer, base, name);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+// One pass over the rows; nothing is built in between. ", " parts members, "," elements of arrays
+// of numbers.
+#include "server/codec/write.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+                        size_t *count);
+
+static void put_name(Bytes *bytes, const char *name, size_t *count) {
+    if ((*count)++ > 0)
+        bytes_text(bytes, ", ");
+    bytes_json_string(bytes, name);
+    bytes_text(bytes, ": ");
+}
+
+static void put_reals(Bytes *bytes, const Reals *reals) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < reals->count; i++) {
+        if (i > 0)
+            bytes_put(bytes, ",", 1);
+        bytes_real(bytes, reals->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_texts(Bytes *bytes, const Texts *texts) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < texts->count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        bytes_json_string(bytes, texts->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_variant(Bytes *bytes, const KindTable *kinds, const Variant *variant,
+                        WriteStyle style) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_name(bytes, kinds->tag, &count);
+    bytes_json_string(bytes, variant->kind->name);
+    put_members(bytes, variant->kind->fields, variant, style, &count);
+    bytes_text(bytes, "}");
+}
+
+static void put_value(Bytes *bytes, const Field *field, const void *member, WriteStyle style) {
+    switch (field->kind) {
+    case FIELD_KIND_REAL:
+        bytes_real(bytes, *(const double *)member);
+        break;
+    case FIELD_KIND_COUNT:
+        bytes_format(bytes, "%" PRIu64, *(const uint64_t *)member);
+        break;
+    case FIELD_KIND_FLAG:
+        bytes_text(bytes, *(const bool *)member ? "true" : "false");
+        break;
+    case FIELD_KIND_TEXT:
+        bytes_json_string(bytes, *(char *const *)member);
+        break;
+    case FIELD_KIND_CHOICE:
+        bytes_json_string(bytes, field->choices[*(const int *)member]);
+        break;
+    case FIELD_KIND_REALS:
+        put_reals(bytes, member);
+        break;
+    case FIELD_KIND_TEXTS:
+        put_texts(bytes, member);
+        break;
+    case FIELD_KIND_ITEM:
+        write_item(bytes, field->fields, member, style);
+        break;
+    case FIELD_KIND_LIST: {
+        List list;
+        memcpy(&list, member, sizeof list);
+        write_list(bytes, field->fields, list.at, list.count, field->size, style);
+        break;
+    }
+    case FIELD_KIND_VARIANT:
+        put_variant(bytes, field->kinds, *(Variant *const *)member, style);
+        break;
+    case FIELD_KIND_BASE:
+    case FIELD_KIND_END:
+        break;
+    }
+}
+
+// An item that null empties, and that is empty: left out it would come back with its defaults.
+static bool is_emptied(const Field *field, const void *item) {
+    Field optional = *field;
+    optional.presence = PRESENCE_OPTIONAL;
+    return field->kind == FIELD_KIND_ITEM && (field->flags & FIELD_NULL_IS_EMPTY) != 0 &&
+           field->presence == PRESENCE_DEFAULT && field_is_absent(&optional, item);
+}
+
+static bool is_array(const Field *field) {
+    return field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_TEXTS ||
+           field->kind == FIELD_KIND_LIST;
+}
+
+static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,
+                        size_t *count) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *member = (const char *)item + field->offset;
+        if (field->kind == FIELD_KIND_BASE) {
+            put_members(bytes, field->fields, member, style, count);
+            continue;
+        }
+        const bool is_absent = field_is_absent(field, item);
+        if (is_absent && style == WRITE_SCENE)
+            continue;
+        put_name(bytes, field->name, count);
+        if ((is_absent && !is_array(field)) || is_emptied(field, item))
+            bytes_text(bytes, "null");
+        else
+            put_value(bytes, field, member, style);
+    }
+}
+
+size_t write_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+    size_t count = 0;
+    put_members(bytes, fields, item, style, &count);
+    return count;
+}
+
+void write_item(Bytes *bytes, const Field *fields, const void *item, WriteStyle style) {
+    bytes_text(bytes, "{");
+    write_members(bytes, fields, item, style);
+    bytes_text(bytes, "}");
+}
+
+void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
+                WriteStyle style) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        write_item(bytes, fields, (const char *)at + i * size, style);
+    }
+    bytes_text(bytes, "]");
+}
+
+static void put_text_member(Bytes *bytes, const char *name, const char *text, size_t *count) {
+    put_name(bytes, name, count);
+    bytes_json_string(bytes, text);
+}
+
+static void put_fault(Bytes *bytes, const Fault *fault) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_text_member(bytes, "pointer", fault->pointer, &count);
+    put_name(bytes, "value", &count);
+    bytes_text(bytes, fault->value[0] != '\0' ? fault->value : "null");
+    put_text_member(bytes, "detail", fault->detail, &count);
+    if (fault->unit[0] != '\0')
+        put_text_member(bytes, "unit", fault->unit, &count);
+    if (fault->did_you_mean[0] != '\0')
+        put_text_member(bytes, "did_you_mean", fault->did_you_mean, &count);
+    bytes_text(bytes, "}");
+}
+
+void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
+    size_t count = 0;
+    bytes_text(bytes, "{");
+    put_name(bytes, "type", &count);
+    bytes_format(bytes, "\"/problems/%s\"", status_slug(problem->status));
+    put_name(bytes, "title", &count);
+    if (problem->status == STATUS_INVALID && problem->count > 0)
+        bytes_format(bytes, "\"The scene has %zu fault%s\"", problem->count,
+                     problem->count == 1 ? "" : "s");
+    else
+        bytes_json_string(bytes, status_title(problem->status));
+    put_name(bytes, "status", &count);
+    bytes_format(bytes, "%d", status_code);
+    const char *detail = problem->detail;
+    if (detail[0] == '\0')
+        detail = problem->count > 0 ? problem->faults[0].detail : status_title(problem->status);
+    put_text_member(bytes, "detail", detail, &count);
+    if (instance != NULL)
+        put_text_member(bytes, "instance", instance, &count);
+    if (problem->count > 0) {
+        put_name(bytes, "errors", &count);
+        bytes_text(bytes, "[");
+        for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+            bytes_text(bytes, i > 0 ? ", " : "");
+            put_fault(bytes, &problem->faults[i]);
+        }
+        bytes_text(bytes, "]");
+    }
+    if (problem->count > PROBLEM_FAULTS) {
+        put_name(bytes, "more", &count);
+        bytes_format(bytes, "%zu", problem->count - PROBLEM_FAULTS);
+    }
+    bytes_text(bytes, "}");
+}

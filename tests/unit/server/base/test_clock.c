@@ -1,0 +1,52 @@
+// Dates against known ones, and clocks that go forward.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/base/status.h"
+#include "server/base/clock.h"
+
+static void dates_are_rfc_3339_in_utc(void **state) {
+    (void)state;
+    static const struct {
+        int64_t unix_ms;
+        const char *text;
+    } cases[] = {
+        {0, "1970-01-01T00:00:00.000Z"},
+        {951782400123, "2000-02-29T00:00:00.123Z"},
+        {1795251600000, "2026-11-21T09:00:00.000Z"},
+        {-1, "1969-12-31T23:59:59.999Z"},
+        {253402300799999, "9999-12-31T23:59:59.999Z"},
+        {253402300800000, ""},
+        {INT64_MAX, ""},
+        {INT64_MIN, ""},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char text[32];
+        clock_rfc3339(cases[i].unix_ms, text);
+        assert_string_equal(text, cases[i].text);
+    }
+}
+
+static void clocks_go_forward_in_their_units(void **state) {
+    (void)state;
+    const int64_t started = clock_monotonic_ns(), cpu = clock_thread_cpu_ns();
+    const int64_t day = clock_unix_ms();
+    volatile double sum = 0;
+    while (clock_monotonic_ns() - started < 20000000)
+        sum = sum + 1;
+    assert_true(clock_thread_cpu_ns() > cpu);
+    assert_true(clock_unix_ms() - day >= 15 && clock_unix_ms() - day < 10000);
+    assert_true(day > 1700000000000);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(dates_are_rfc_3339_in_utc),
+        cmocka_unit_test(clocks_go_forward_in_their_units),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
