@@ -1,13 +1,11 @@
 // impactd serve: the daemon. Opens store, intake and listener in this order, waits for SIGTERM or
 // SIGINT, and closes them so that nobody meets a room that is gone: first no more requests, then no
 // more work, then what sleepers used.
-#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/api/app.h"
@@ -77,25 +75,6 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     return STATUS_OK;
 }
 
-// Makes the folder and those above it.
-static Status make_folder(const char *path, Problem *problem) {
-    char part[4096];
-    text_fit(part, sizeof part, path);
-    for (char *at = part + 1;; at++) {
-        if (*at != '/' && *at != '\0')
-            continue;
-        const char end = *at;
-        *at = '\0';
-        if (mkdir(part, 0700) != 0 && errno != EEXIST)
-            return problem_set(problem, STATUS_IO,
-                               "cannot make the folder %s: %s; choose another with --data DIR",
-                               part, strerror(errno));
-        *at = end;
-        if (end == '\0')
-            return STATUS_OK;
-    }
-}
-
 // --- running
 // ------------------------------------------------------------------------------------------------
 
@@ -113,13 +92,13 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     Dispatcher dispatcher = {&app, routes};
     ListenerSettings door = {
         .body_most = settings->max_body, .answer = dispatch, .context = &dispatcher};
-    const IntakeSettings work = {.workers = settings->workers,
-                                 .queue_most = settings->queue,
-                                 .cache_bytes = settings->cache_bytes,
-                                 .limits = {settings->max_samples, settings->max_impacts}};
+    const IntakeSettings work = {
+        .workers = settings->workers,
+        .queue_most = settings->queue,
+        .cache_bytes = settings->cache_bytes,
+        .limits = {.samples = settings->max_samples, .impacts = settings->max_impacts}};
     Listener *listener = NULL;
     TRY(address_read(settings->listen, &door.address, problem));
-    TRY(make_folder(settings->data, problem));
     TRY(store_open(settings->data, &app.store, problem));
     Status status = intake_open(app.store, &work, &app.intake, problem);
     if (status == STATUS_OK)
