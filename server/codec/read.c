@@ -519,7 +519,8 @@ static Status unreadable(Problem *problem, const char *text, size_t size, size_t
 
 static Status refuse_parse(Problem *problem, const char *text, size_t size,
                            const json_error_t *error) {
-    const size_t position = error->position > 0 ? (size_t)error->position : 0;
+    // The parser's position is behind the token it stumbled over; ours is the token's last byte.
+    const size_t position = error->position > 0 ? (size_t)error->position - 1 : 0;
     const char *sentence = error->text;
     switch (json_error_code(error)) {
     case json_error_out_of_memory:
