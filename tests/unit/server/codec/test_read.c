@@ -285,11 +285,11 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
     check_unreadable("{\"parts\": [{}, {}, {\"a\": 1, \"\\u0061\": 2}]}", "/parts/2/a",
                      "line 1, column 36: the key stands twice");
     check_unreadable("{\"title\": \"\xC3\xBC\xFF\"}", "/title",
-                     "line 1, column 12: unable to decode");
+                     "line 1, column 13: the text is not UTF-8");
     check_unreadable("{\"title\": \"a\\u0000\"}", "/title", "line 1, column");
     check_unreadable("{\"title\": 1} x", "", "line 1, column 14: the document is complete");
     check_unreadable("{\"samples\": [1, 2, 0x3]}", "/samples/2", "line 1, column");
-    check_unreadable("{\"mass\": 1,}", "", "line 1, column 11: string or '}' expected");
+    check_unreadable("{\"mass\": 1,}", "", "line 1, column 12: string or '}' expected");
     const char nul[] = "{\"mass\":\0 1}";
     assert_int_equal(read_json(nul, sizeof nul - 1, whole_fields, &whole, &problem),
                      STATUS_UNREADABLE);
