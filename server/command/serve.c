@@ -17,7 +17,7 @@
 
 typedef struct ServeSettings {
     char *listen, *data, *config;
-    uint64_t workers, queue, max_body, max_samples, max_impacts, cache_bytes;
+    uint64_t workers, queue, max_body, max_samples, max_impacts, max_steps, cache_bytes;
     bool print_config;
 } ServeSettings;
 
@@ -34,6 +34,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 1e7, "impacts a run may have before it is stopped"),
+    FIELD_COUNT(ServeSettings, max_steps, NULL, WITHIN(1, 1e15), 1e9, "solver steps after which a run is stopped"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
@@ -92,11 +93,12 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     Dispatcher dispatcher = {&app, routes};
     ListenerSettings door = {
         .body_most = settings->max_body, .answer = dispatch, .context = &dispatcher};
-    const IntakeSettings work = {
-        .workers = settings->workers,
-        .queue_most = settings->queue,
-        .cache_bytes = settings->cache_bytes,
-        .limits = {.samples = settings->max_samples, .impacts = settings->max_impacts}};
+    const IntakeSettings work = {.workers = settings->workers,
+                                 .queue_most = settings->queue,
+                                 .cache_bytes = settings->cache_bytes,
+                                 .limits = {.samples = settings->max_samples,
+                                            .impacts = settings->max_impacts,
+                                            .steps = (double)settings->max_steps}};
     Listener *listener = NULL;
     TRY(address_read(settings->listen, &door.address, problem));
     TRY(store_open(settings->data, &app.store, problem));
