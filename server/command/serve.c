@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/math/fourier.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/command/serve.h"
@@ -100,6 +101,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                             .impacts = settings->max_impacts,
                                             .steps = (double)settings->max_steps}};
     Listener *listener = NULL;
+    fourier_start();
     TRY(address_read(settings->listen, &door.address, problem));
     TRY(store_open(settings->data, &app.store, problem));
     Status status = intake_open(app.store, &work, &app.intake, problem);
