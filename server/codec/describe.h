@@ -14,7 +14,7 @@ typedef struct SchemaDocument {
     const char *name, *title;
     const Field *fields;
 } SchemaDocument;
-extern const SchemaDocument schema_documents[];  // ends with name == NULL
+extern const SchemaDocument schema_documents[]; // ends with name == NULL
 
 // The document's schema under "/schemas/NAME": what schema/NAME.schema.json holds.
 void describe_document(Bytes *bytes, const SchemaDocument *document);

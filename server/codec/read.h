@@ -1,6 +1,6 @@
 // JSON text to plain structs by their Field rows; every fault with its JSON Pointer, all at once.
-// Judges types, unknown and missing names; ranges are core/base/field.h's. jansson lives in this room alone.
-// Used by http/body.c, the store and the commands.
+// Judges types, unknown and missing names; ranges are core/base/field.h's. jansson lives in this
+// room alone. Used by http/body.c, the store and the commands.
 #ifndef SERVER_CODEC_READ_H
 #define SERVER_CODEC_READ_H
 
@@ -8,13 +8,15 @@
 
 enum { READ_DEPTH = 32 };
 
-// Reads `text[size]` into `item`, which gets its defaults first (so it may be uninitialised; on failure it is
-// still clearable by fields_clear). STATUS_UNREADABLE: not JSON, duplicate keys, NaN, too deep, not UTF-8, with
-// line, column and where known a pointer. STATUS_INVALID: the faults; what could be read has been read, so that
-// fields_check and others can add theirs to the same problem.
+// Reads `text[size]` into `item`, which gets its defaults first (so it may be uninitialised; on
+// failure it is still clearable by fields_clear). STATUS_UNREADABLE: not JSON, duplicate keys, NaN,
+// too deep, not UTF-8, with line, column and where known a pointer. STATUS_INVALID: the faults;
+// what could be read has been read, so that fields_check and others can add theirs to the same
+// problem.
 Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
-// The same, passing over the top-level keys in `extra` (NULL-terminated; may be NULL), which are another's to read.
+// The same, passing over the top-level keys in `extra` (NULL-terminated; may be NULL), which are
+// another's to read.
 Status read_json_beside(const char *text, size_t size, const Field *fields, void *item,
                         const char *const *extra, Problem *problem);
 

@@ -1,6 +1,6 @@
-// One pass over JSON text without reading it: how deep it nests, and which member a byte belongs to.
-// Not a parser: it takes any bytes, and is right up to the first byte that is not JSON. Memory is bounded by READ_DEPTH.
-// Used by read.c alone.
+// One pass over JSON text without reading it: how deep it nests, and which member a byte belongs
+// to. Not a parser: it takes any bytes, and is right up to the first byte that is not JSON. Memory
+// is bounded by READ_DEPTH. Used by read.c alone.
 #ifndef SERVER_CODEC_SCAN_H
 #define SERVER_CODEC_SCAN_H
 
@@ -8,13 +8,14 @@
 #include <stddef.h>
 
 enum {
-    // A parsed container costs some hundred bytes where its text takes two: the number of them is bounded too.
+    // A parsed container costs some hundred bytes where its text takes two: the number of them is
+    // bounded too.
     SCAN_CONTAINERS = 1 << 17,
 };
 
 typedef struct ScanPlace {
-    size_t line, column;  // from 1; characters, not bytes
-    char pointer[256];    // of the value or the key at that byte, cut to fit
+    size_t line, column; // from 1; characters, not bytes
+    char pointer[256];   // of the value or the key at that byte, cut to fit
 } ScanPlace;
 
 // The place of text[position].

@@ -7,14 +7,17 @@
 #include "server/base/bytes.h"
 
 typedef enum WriteStyle {
-    WRITE_REPORT,  // absent members are null: results, plans
-    WRITE_SCENE,   // absent members are left out: canonical scenes, anything that can be submitted again
+    WRITE_REPORT, // absent members are null: results, plans
+    WRITE_SCENE,  // absent members are left out: canonical scenes, anything that can be submitted
+                  // again
 } WriteStyle;
 
 void write_item(Bytes *bytes, const Field *fields, const void *item, WriteStyle style);
-// Only "name": value, ... without braces, to put rows beside other members. Returns the number of members.
+// Only "name": value, ... without braces, to put rows beside other members. Returns the number of
+// members.
 size_t write_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style);
-void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size, WriteStyle style);
+void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
+                WriteStyle style);
 
 // problem+json (RFC 9457). `status_code` is HTTP's; `instance` may be NULL.
 void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance);

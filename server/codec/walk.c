@@ -1,0 +1,393 @@
+// The walk goes by the document's keys, so that every unknown one is met; what is missing is
+// fields_check's to say. What cannot be read leaves its member as it was.
+#include "server/codec/walk.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/base/shortest.h"
+
+enum { POINTER_SIZE = sizeof((Fault){0}.pointer), KINDS_SHOWN = 64 };
+
+static void out_of_memory(Reader *reader) {
+    reader->is_out_of_memory = true;
+}
+
+// --- one value ---
+
+static double number_of(const json_t *value) {
+    return json_number_value(value) + 0.0; // -0 becomes 0
+}
+
+static void read_count(Reader *reader, const json_t *value, const Field *field, uint64_t *target,
+                       const char *pointer) {
+    if (!json_is_number(value)) {
+        refuse_type(reader, pointer, value, field, "a whole number");
+        return;
+    }
+    if (json_is_integer(value) && json_integer_value(value) >= 0) {
+        *target = (uint64_t)json_integer_value(value);
+        return;
+    }
+    const double number = number_of(value);
+    if (number >= 0 && number < 0x1p63 && floor(number) == number) {
+        *target = (uint64_t)number;
+        return;
+    }
+    char least[32], most[32], is[SHORTEST_SIZE + 1];
+    text_real(least, field->range.least > 0 ? field->range.least : 0);
+    text_real(most, field->range.most < 0x1p63 ? field->range.most : 0x1p63);
+    refuse_text(value, is, sizeof is);
+    if (isinf(field->range.most))
+        refuse_value(reader, pointer, value, field->unit, NULL,
+                     "must be a whole number of at least %s, is %s", least, is);
+    else
+        refuse_value(reader, pointer, value, field->unit, NULL,
+                     "must be a whole number within [%s, %s], is %s", least, most, is);
+}
+
+static void read_text(Reader *reader, const json_t *value, const Field *field, char **target,
+                      const char *pointer) {
+    if (!json_is_string(value)) {
+        refuse_type(reader, pointer, value, field, "a string");
+        return;
+    }
+    const size_t length = json_string_length(value);
+    if (field->most > 0 && length > field->most) {
+        refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu bytes, has %zu",
+                     field->most, length);
+        return;
+    }
+    char *text = strdup(json_string_value(value));
+    if (text == NULL) {
+        out_of_memory(reader);
+        return;
+    }
+    free(*target);
+    *target = text;
+}
+
+static void read_choice(Reader *reader, const json_t *value, const Field *field, int *target,
+                        const char *pointer) {
+    if (!json_is_string(value)) {
+        refuse_type(reader, pointer, value, field, "a string");
+        return;
+    }
+    for (int i = 0; field->choices[i] != NULL; i++) {
+        if (strcmp(field->choices[i], json_string_value(value)) == 0) {
+            *target = i;
+            return;
+        }
+    }
+    refuse_name(reader, pointer, value, field->choices);
+}
+
+// --- many values ---
+
+static bool allows_length(Reader *reader, const json_t *value, const Field *field, size_t has,
+                          const char *what, const char *pointer) {
+    if (field->most == 0 || has <= field->most)
+        return true;
+    refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
+                 field->most, what, has);
+    return false;
+}
+
+// A number that the row allows, in place of one that could not be read, so that it is not judged a
+// second time.
+static double allowed_number(const Range *range) {
+    if (!isinf(range->least))
+        return range->is_open_below ? nextafter(range->least, (double)INFINITY) : range->least;
+    if (!isinf(range->most))
+        return range->is_open_above ? nextafter(range->most, -(double)INFINITY) : range->most;
+    return 0;
+}
+
+static void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *target,
+                       const char *pointer) {
+    if (!json_is_array(value)) {
+        refuse_type(reader, pointer, value, field, "an array of numbers");
+        return;
+    }
+    const size_t count = json_array_size(value);
+    if (!allows_length(reader, value, field, count, "numbers", pointer))
+        return;
+    double *at = count > 0 ? malloc(count * sizeof *at) : NULL;
+    if (at == NULL && count > 0) {
+        out_of_memory(reader);
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const json_t *element = json_array_get(value, i);
+        if (json_is_number(element)) {
+            at[i] = number_of(element);
+            continue;
+        }
+        at[i] = allowed_number(&field->range);
+        if (!refuse_wants_detail(reader))
+            continue;
+        char place[POINTER_SIZE];
+        pointer_index(place, sizeof place, pointer, i);
+        refuse_type(reader, place, element, field, "a number");
+    }
+    free(target->at);
+    *target = (Reals){at, count};
+}
+
+// "key=value", or `value` alone without a key.
+static char *pair_text(const char *key, const char *value) {
+    if (key == NULL)
+        return strdup(value);
+    const size_t size = strlen(key) + 1 + strlen(value) + 1;
+    char *text = malloc(size);
+    if (text != NULL)
+        snprintf(text, size, "%s=%s", key, value);
+    return text;
+}
+
+// What is no string is told and its place kept by an allowed text, so that those behind it keep
+// theirs.
+static void add_text(Reader *reader, const json_t *value, const char *key, const Field *field,
+                     Texts *texts, const char *place) {
+    const char *content = json_string_value(value);
+    if (content == NULL) {
+        refuse_type(reader, place, value, NULL, "a string");
+        content = field->choices != NULL ? field->choices[0] : "";
+    }
+    char *text = pair_text(key, content);
+    if (text == NULL)
+        out_of_memory(reader);
+    else
+        texts->at[texts->count++] = text;
+}
+
+static void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *target,
+                       const char *pointer) {
+    const bool is_pairs = json_is_object(value) && (field->flags & FIELD_PAIRS) != 0;
+    if (!json_is_array(value) && !is_pairs) {
+        refuse_type(reader, pointer, value, field,
+                    (field->flags & FIELD_PAIRS) != 0 ? "an array or an object of strings"
+                                                      : "an array of strings");
+        return;
+    }
+    const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
+    if (!allows_length(reader, value, field, count, "texts", pointer))
+        return;
+    Texts texts = {count > 0 ? calloc(count, sizeof *texts.at) : NULL, 0};
+    if (texts.at == NULL && count > 0) {
+        out_of_memory(reader);
+        return;
+    }
+    char place[POINTER_SIZE];
+    if (is_pairs) {
+        const char *key;
+        json_t *element;
+        json_object_foreach((json_t *)value, key, element) {
+            pointer_join(place, sizeof place, pointer, key);
+            add_text(reader, element, key, field, &texts, place);
+        }
+    } else {
+        for (size_t i = 0; i < count; i++) {
+            pointer_index(place, sizeof place, pointer, i);
+            add_text(reader, json_array_get(value, i), NULL, field, &texts, place);
+        }
+    }
+    for (size_t i = 0; i < target->count; i++)
+        free(target->at[i]);
+    free(target->at);
+    *target = texts;
+}
+
+static void read_list(Reader *reader, const json_t *value, const Field *field, void *target,
+                      const char *pointer) {
+    if (!json_is_array(value)) {
+        refuse_type(reader, pointer, value, field, "an array of objects");
+        return;
+    }
+    const size_t count = json_array_size(value);
+    if (count == 0 || !allows_length(reader, value, field, count, "elements", pointer))
+        return;
+    List list = {calloc(count, field->size), 0};
+    if (list.at == NULL) {
+        out_of_memory(reader);
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        void *element = (char *)list.at + i * field->size;
+        list.count = i + 1;
+        if (fields_default(field->fields, element) != STATUS_OK) {
+            out_of_memory(reader);
+            break;
+        }
+        char place[POINTER_SIZE];
+        pointer_index(place, sizeof place, pointer, i);
+        const json_t *object = json_array_get(value, i);
+        if (json_is_object(object))
+            walk_object(reader, object, field->fields, element, place, NULL, NULL);
+        else
+            refuse_type(reader, place, object, NULL, "an object");
+    }
+    // A typed twin of List is written as bytes, as field.c reads it. Lists have no default elements
+    // to free.
+    memcpy(target, &list, sizeof list);
+}
+
+// --- objects ---
+
+// A string under a shorthand is short for an object of that one member.
+static void read_item(Reader *reader, const json_t *value, const Field *field, void *target,
+                      const char *pointer) {
+    const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
+    const bool is_short = json_is_string(value) && field->shorthand != NULL;
+    if (json_is_null(value) && takes_null) {
+        fields_clear(field->fields, target);
+        return;
+    }
+    if (!json_is_object(value) && !is_short) {
+        refuse_type(reader, pointer, value, NULL,
+                    takes_null                 ? "an object or null"
+                    : field->shorthand != NULL ? "an object or a string"
+                                               : "an object");
+        return;
+    }
+    // What stays absent as a whole has its members' defaults only once it is there.
+    if (field->presence != PRESENCE_DEFAULT && fields_default(field->fields, target) != STATUS_OK) {
+        out_of_memory(reader);
+    } else if (is_short) {
+        size_t offset = 0;
+        const Field *row = fields_find(field->fields, field->shorthand, &offset);
+        read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
+                  pointer);
+    } else {
+        walk_object(reader, value, field->fields, target, pointer, NULL, NULL);
+    }
+}
+
+// The kind that the tag names. Where it names none that is told, and *is_known false: the kind is
+// then the nearest, or NULL where none is near.
+static const Kind *read_kind(Reader *reader, const json_t *object, const KindTable *kinds,
+                             const char *pointer, bool *is_known) {
+    const json_t *tag = json_object_get(object, kinds->tag);
+    *is_known = true;
+    if (tag == NULL)
+        return kinds->at(0);
+    const Kind *kind = json_is_string(tag) ? kind_find(kinds, json_string_value(tag)) : NULL;
+    if (kind != NULL)
+        return kind;
+    *is_known = false;
+    char place[POINTER_SIZE];
+    pointer_join(place, sizeof place, pointer, kinds->tag);
+    if (!json_is_string(tag)) {
+        refuse_type(reader, place, tag, NULL, "a string");
+        return NULL;
+    }
+    const char *names[KINDS_SHOWN + 1] = {NULL};
+    for (size_t i = 0; i < KINDS_SHOWN && kinds->at(i) != NULL; i++)
+        names[i] = kinds->at(i)->name;
+    const char *meant = refuse_name(reader, place, tag, names);
+    return meant != NULL ? kind_find(kinds, meant) : NULL;
+}
+
+// Under a kind that was not named rightly its members are read all the same, so that they are not
+// said to be missing, but nothing is said against them.
+static void read_variant(Reader *reader, const json_t *value, const Field *field, Variant **target,
+                         const char *pointer) {
+    if (!json_is_object(value)) {
+        refuse_type(reader, pointer, value, NULL, "an object");
+        return;
+    }
+    bool is_known;
+    const Kind *kind = read_kind(reader, value, field->kinds, pointer, &is_known);
+    Variant *variant = variant_new(kind != NULL ? kind : field->kinds->at(0));
+    if (variant == NULL) {
+        out_of_memory(reader);
+        return;
+    }
+    variant_free(*target);
+    *target = variant;
+    Reader silent = {0};
+    walk_object(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
+                field->kinds->tag, NULL);
+    if (silent.is_out_of_memory)
+        out_of_memory(reader);
+}
+
+static void read_value(Reader *reader, const json_t *value, const Field *field, void *member,
+                       const char *pointer) {
+    switch (field->kind) {
+    case FIELD_KIND_REAL:
+        if (json_is_number(value))
+            *(double *)member = number_of(value);
+        else
+            refuse_type(reader, pointer, value, field, "a number");
+        break;
+    case FIELD_KIND_COUNT:
+        read_count(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_FLAG:
+        if (json_is_boolean(value))
+            *(bool *)member = json_is_true(value);
+        else
+            refuse_type(reader, pointer, value, field, "true or false");
+        break;
+    case FIELD_KIND_TEXT:
+        read_text(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_CHOICE:
+        read_choice(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_REALS:
+        read_reals(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_TEXTS:
+        read_texts(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_LIST:
+        read_list(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_ITEM:
+        read_item(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_VARIANT:
+        read_variant(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_BASE:
+    case FIELD_KIND_END:
+        break;
+    }
+}
+
+static bool texts_hold(const char *const *texts, const char *text) {
+    for (; texts != NULL && *texts != NULL; texts++)
+        if (strcmp(*texts, text) == 0)
+            return true;
+    return false;
+}
+
+// The nearest row's name, else the tag if that is near.
+static const char *nearest_key(const Field *fields, const char *tag, const char *key) {
+    const char *meant = fields_nearest(fields, key);
+    return meant != NULL || tag == NULL ? meant
+                                        : texts_nearest((const char *const[]){tag, NULL}, key);
+}
+
+void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
+                 const char *pointer, const char *tag, const char *const *extra) {
+    const char *key;
+    json_t *value;
+    json_object_foreach((json_t *)object, key, value) {
+        if ((tag != NULL && strcmp(tag, key) == 0) || texts_hold(extra, key))
+            continue;
+        size_t offset = 0;
+        const Field *field = fields_find(fields, key, &offset);
+        if (field == NULL && !refuse_wants_detail(reader))
+            continue;
+        char place[POINTER_SIZE];
+        pointer_join(place, sizeof place, pointer, key);
+        if (field == NULL)
+            refuse_value(reader, place, value, NULL, nearest_key(fields, tag, key), "unknown key");
+        else
+            read_value(reader, value, field, (char *)item + offset + field->offset, place);
+    }
+}
