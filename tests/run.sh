@@ -19,6 +19,8 @@ esac
 server/packages.sh server/packages.txt tests/packages.txt || exit 1
 
 export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
+# Debian's python3, which has the packages, whatever else is in PATH.
+python=/usr/bin/python3
 passed=0
 failed=0
 log=$(mktemp)
@@ -59,7 +61,7 @@ done
 # FILE PRESET: runs one Python test of a build and adds its count.
 ask() {
     echo "-- $1 ($2)"
-    python3 "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
+    "$python" "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
     # "tests/contract/test_includes.py: 3 passed, 0 failed"
     if read -r good bad < <(sed -n '$s/.*: \([0-9]*\) passed, \([0-9]*\) failed.*/\1 \2/p' "$log"); then
         passed=$((passed + good))
