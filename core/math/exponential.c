@@ -45,18 +45,22 @@ static void increment_small(const long double *A, size_t n, long double h, long 
 }
 
 // (I + T)^2 - I = 2 T + T T.
-static void increment_double(long double *T, size_t n) {
+void exponential_double(size_t n, long double *increment) {
     long double square[SIZE];
-    multiply(T, T, n, square);
+    multiply(increment, increment, n, square);
     for (size_t i = 0; i < n * n; i++)
-        T[i] = 2 * T[i] + square[i];
+        increment[i] = 2 * increment[i] + square[i];
+}
+
+void exponential_increment(const long double *A, size_t n, long double h, long double *increment) {
+    const int count = halvings(A, n, h);
+    increment_small(A, n, ldexpl(h, -count), increment);
+    for (int i = 0; i < count; i++)
+        exponential_double(n, increment);
 }
 
 void exponential(const long double *A, size_t n, long double h, long double *transition) {
-    const int count = halvings(A, n, h);
-    increment_small(A, n, ldexpl(h, -count), transition);
-    for (int i = 0; i < count; i++)
-        increment_double(transition, n);
+    exponential_increment(A, n, h, transition);
     for (size_t i = 0; i < n; i++)
         transition[i * n + i] += 1;
 }
@@ -115,23 +119,28 @@ void exponential_form(const long double *A, size_t n, long double h, const long 
             for (size_t j = 0; j < n; j++)
                 form[i * n + j] += weight[q] * small * (a[i] * b[j] + a[j] * b[i]) / 2;
     }
-    // The integral over twice the time is this one's plus the same from where the first half ends.
-    long double T[SIZE], E[SIZE], product[SIZE], second[SIZE];
+    long double T[SIZE];
     increment_small(A, n, small, T);
     for (int pass = 0; pass < count; pass++) {
-        memcpy(E, T, n * n * sizeof *E);
-        for (size_t i = 0; i < n; i++)
-            E[i * n + i] += 1;
-        multiply(form, E, n, product);
-        for (size_t i = 0; i < n; i++)
-            for (size_t j = 0; j < n; j++) {
-                long double sum = 0;
-                for (size_t k = 0; k < n; k++)
-                    sum += E[k * n + i] * product[k * n + j];
-                second[i * n + j] = sum;
-            }
-        for (size_t i = 0; i < n * n; i++)
-            form[i] += second[i];
-        increment_double(T, n);
+        exponential_form_double(n, T, form);
+        exponential_double(n, T);
     }
+}
+
+// The integral over twice the time is this one's plus the same from where the first half ends:
+// F + (I + T)' F (I + T).
+void exponential_form_double(size_t n, const long double *increment, long double *form) {
+    long double E[SIZE], product[SIZE], second[SIZE];
+    memcpy(E, increment, n * n * sizeof *E);
+    for (size_t i = 0; i < n; i++)
+        E[i * n + i] += 1;
+    multiply(form, E, n, product);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            second[i * n + j] = 0;
+            for (size_t k = 0; k < n; k++)
+                second[i * n + j] += E[k * n + i] * product[k * n + j];
+        }
+    for (size_t i = 0; i < n * n; i++)
+        form[i] += second[i];
 }

@@ -94,23 +94,43 @@ static void pick_form(const long double *form, double target[HOLD_FORM]) {
             target[n++] = (double)(form[i * SIZE + j] * (i == j ? 1 : 2));
 }
 
-static void make_level(const long double *system, double length, HoldLevel *level) {
-    const long double v[SIZE] = {[V] = 1}, w[SIZE] = {[W] = 1}, a[SIZE] = {[A] = 1};
-    long double transition[SIZE * SIZE], form[SIZE * SIZE];
+enum { FORM_VV, FORM_WW, FORM_AV, FORM_AW, FORMS };
+
+static void pick_level(const long double *increment, long double forms[FORMS][SIZE * SIZE], double length,
+                       HoldLevel *level) {
+    long double transition[SIZE * SIZE];
+    memcpy(transition, increment, sizeof transition);
+    for (int i = 0; i < SIZE; i++)
+        transition[i * SIZE + i] += 1;
     level->length = length;
-    exponential(system, SIZE, length, transition);
     for (int row = X; row <= W; row++)
         pick_row(transition, row, level->state[row]);
     pick_row(transition, SUM_A, level->base);
     pick_row(transition, SUM_N, level->force);
-    exponential_form(system, SIZE, length, v, v, form);
-    pick_form(form, level->vv);
-    exponential_form(system, SIZE, length, w, w, form);
-    pick_form(form, level->ww);
-    exponential_form(system, SIZE, length, a, v, form);
-    pick_form(form, level->av);
-    exponential_form(system, SIZE, length, a, w, form);
-    pick_form(form, level->aw);
+    pick_form(forms[FORM_VV], level->vv);
+    pick_form(forms[FORM_WW], level->ww);
+    pick_form(forms[FORM_AV], level->av);
+    pick_form(forms[FORM_AW], level->aw);
+}
+
+// From the shortest level up, each one the last one doubled.
+static void make_levels(Hold *hold, const long double *system, double interval) {
+    const long double v[SIZE] = {[V] = 1}, w[SIZE] = {[W] = 1}, a[SIZE] = {[A] = 1};
+    const long double *const pairs[FORMS][2] = {{v, v}, {w, w}, {a, v}, {a, w}};
+    long double increment[SIZE * SIZE], forms[FORMS][SIZE * SIZE];
+    for (size_t i = hold->count; i-- > 0;) {
+        const double length = ldexp(interval, -(int)i);
+        if (i + 1 == hold->count) {
+            exponential_increment(system, SIZE, length, increment);
+            for (int f = 0; f < FORMS; f++)
+                exponential_form(system, SIZE, length, pairs[f][0], pairs[f][1], forms[f]);
+        } else {
+            for (int f = 0; f < FORMS; f++)
+                exponential_form_double(SIZE, increment, forms[f]);
+            exponential_double(SIZE, increment);
+        }
+        pick_level(increment, forms, length, &hold->levels[i]);
+    }
 }
 
 void hold_make(Hold *hold, const Motion *motion, double base_omega, double interval) {
@@ -142,7 +162,8 @@ void hold_make(Hold *hold, const Motion *motion, double base_omega, double inter
     system[SUM_N * SIZE + R] = k;
     system[SUM_N * SIZE + W] = c;
     for (double length = interval; hold->count < HOLD_LEVELS && length * motion->rate > 4; length /= 2)
-        make_level(system, length, &hold->levels[hold->count++]);
+        hold->count++;
+    make_levels(hold, system, interval);
 }
 
 static State transit(const HoldLevel *level, const State *start, const Slice *slice) {

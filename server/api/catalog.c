@@ -112,10 +112,8 @@ Status schemas_show(App *app, const Request *request, Reply *reply, Problem *pro
     for (const SchemaDocument *document = schema_documents; document->name != NULL; document++) {
         if (!is_named || strlen(document->name) != size || strncmp(document->name, name, size) != 0)
             continue;
-        char id[96];
-        snprintf(id, sizeof id, "/schemas/%s", document->name);
         Bytes bytes = {.most = app->reply_most};
-        describe_schema(&bytes, id, document->title, document->fields);
+        describe_document(&bytes, document);
         return reply_bytes(reply, 200, "application/schema+json", &bytes, problem);
     }
     return problem_set(problem, STATUS_NOT_FOUND,

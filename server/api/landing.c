@@ -25,7 +25,7 @@ static const Step steps[] = {
                                    "@- @/v1/jobs | grep -o '\"result\": "
                                    "\"r-[0-9a-f]*' | cut -d'\"' -f4)"},
     {"The impacts, the time series, the spectrum:", "curl -s @/v1/results/$R/impacts.json"},
-    {NULL, "curl -s '@/v1/results/$R/series.csv?channels=displacement&to=0.1'"},
+    {NULL, "curl -s \"@/v1/results/$R/series.csv?channels=displacement&to=0.1\""},
     {NULL, "curl -s -O @/v1/results/$R/series.npy"},
     {NULL, "curl -s @/v1/results/$R/psd.json"},
     {"Check a scene and see its plan without running it:",

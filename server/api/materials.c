@@ -1,5 +1,6 @@
 // Buffer materials, read only: the list, a slug's head, one revision.
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -82,7 +83,7 @@ Status materials_show_revision(App *app, const Request *request, Reply *reply, P
     const size_t size = strlen(text);
     unsigned long long revision = 0;
     if (size > 0 && size <= 9 && strspn(text, "0123456789") == size)
-        sscanf(text, "%llu", &revision);
+        revision = strtoull(text, NULL, 10);
     if (revision == 0)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is no revision \"%.20s\"; they count from 1", text);

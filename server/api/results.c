@@ -135,7 +135,7 @@ static void write_used(App *app, Bytes *bytes, const char *name, bool is_first) 
     const size_t size = strcspn(name, "@");
     MaterialRevision material = {0};
     if (name[size] == '@')
-        sscanf(name + size + 1, "%9llu", &revision);
+        revision = strtoull(name + size + 1, NULL, 10);
     bytes_text(bytes, is_first ? "" : ", ");
     if (size < sizeof slug) {
         memcpy(slug, name, size);

@@ -237,6 +237,8 @@ static void print_value(Printer *printer, const Field *field) {
         break;
     case FIELD_KIND_ITEM:
         print_item(printer, field);
+        if (has_default)
+            word_member(printer, "default", "{}");
         break;
     case FIELD_KIND_LIST:
         text_member(printer, "type", "array");

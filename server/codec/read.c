@@ -120,9 +120,8 @@ static const char *refuse_name(Reader *reader, const char *pointer, const json_t
     return meant;
 }
 
-static bool out_of_memory(Reader *reader) {
+static void out_of_memory(Reader *reader) {
     reader->is_out_of_memory = true;
-    return false;
 }
 
 static void read_object(Reader *reader, const json_t *object, const Field *fields, void *item,
@@ -350,27 +349,32 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
 // --- objects
 // ---------------------------------------------------------------------------------------------
 
+// A string under a shorthand is short for an object of that one member.
 static void read_item(Reader *reader, const json_t *value, const Field *field, void *target,
                       const char *pointer) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
-    if (json_is_object(value)) {
-        if (field->presence != PRESENCE_DEFAULT &&
-            fields_default(field->fields, target) != STATUS_OK)
-            out_of_memory(reader);
-        else
-            read_object(reader, value, field->fields, target, pointer, NULL, NULL);
-    } else if (json_is_string(value) && field->shorthand != NULL) {
-        size_t offset = 0;
-        const Field *row = fields_find(field->fields, field->shorthand, &offset);
-        read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
-                  pointer);
-    } else if (json_is_null(value) && takes_null) {
+    const bool is_short = json_is_string(value) && field->shorthand != NULL;
+    if (json_is_null(value) && takes_null) {
         fields_clear(field->fields, target);
-    } else {
+        return;
+    }
+    if (!json_is_object(value) && !is_short) {
         refuse_type(reader, pointer, value, NULL,
                     takes_null                 ? "an object or null"
                     : field->shorthand != NULL ? "an object or a string"
                                                : "an object");
+        return;
+    }
+    // What stays absent as a whole has its members' defaults only once it is there.
+    if (field->presence != PRESENCE_DEFAULT && fields_default(field->fields, target) != STATUS_OK) {
+        out_of_memory(reader);
+    } else if (is_short) {
+        size_t offset = 0;
+        const Field *row = fields_find(field->fields, field->shorthand, &offset);
+        read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
+                  pointer);
+    } else {
+        read_object(reader, value, field->fields, target, pointer, NULL, NULL);
     }
 }
 
@@ -519,7 +523,11 @@ static Status unreadable(Problem *problem, const char *text, size_t size, size_t
 
 static Status refuse_parse(Problem *problem, const char *text, size_t size,
                            const json_error_t *error) {
-    const size_t position = error->position > 0 ? (size_t)error->position : 0;
+    // The parser's position is behind the token it stumbled over; ours is the token's last byte. A
+    // byte that is no UTF-8 it does not get to pass.
+    size_t position = error->position > 0 ? (size_t)error->position : 0;
+    if (position > 0 && json_error_code(error) != json_error_invalid_utf8)
+        position--;
     const char *sentence = error->text;
     switch (json_error_code(error)) {
     case json_error_out_of_memory:
@@ -536,6 +544,9 @@ static Status refuse_parse(Problem *problem, const char *text, size_t size,
         break;
     case json_error_end_of_input_expected:
         sentence = "the document is complete before this; nothing may follow";
+        break;
+    case json_error_invalid_utf8:
+        sentence = "the text is not UTF-8 here";
         break;
     case json_error_null_character:
         sentence = "\\u0000 is not allowed";

@@ -14,6 +14,7 @@
 #include "server/command/scene_file.h"
 #include "server/encode/encoder.h"
 #include "server/jobs/documents.h"
+#include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
 #include "server/options.h"
 

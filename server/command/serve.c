@@ -1,13 +1,11 @@
 // impactd serve: the daemon. Opens store, intake and listener in this order, waits for SIGTERM or
 // SIGINT, and closes them so that nobody meets a room that is gone: first no more requests, then no
 // more work, then what sleepers used.
-#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/api/app.h"
@@ -19,7 +17,7 @@
 
 typedef struct ServeSettings {
     char *listen, *data, *config;
-    uint64_t workers, queue, max_body, max_samples, max_impacts, cache_bytes;
+    uint64_t workers, queue, max_body, max_samples, max_impacts, max_steps, cache_bytes;
     bool print_config;
 } ServeSettings;
 
@@ -36,6 +34,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 1e7, "impacts a run may have before it is stopped"),
+    FIELD_COUNT(ServeSettings, max_steps, NULL, WITHIN(1, 1e15), 1e9, "solver steps after which a run is stopped"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
@@ -77,25 +76,6 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     return STATUS_OK;
 }
 
-// Makes the folder and those above it.
-static Status make_folder(const char *path, Problem *problem) {
-    char part[4096];
-    text_fit(part, sizeof part, path);
-    for (char *at = part + 1;; at++) {
-        if (*at != '/' && *at != '\0')
-            continue;
-        const char end = *at;
-        *at = '\0';
-        if (mkdir(part, 0700) != 0 && errno != EEXIST)
-            return problem_set(problem, STATUS_IO,
-                               "cannot make the folder %s: %s; choose another with --data DIR",
-                               part, strerror(errno));
-        *at = end;
-        if (end == '\0')
-            return STATUS_OK;
-    }
-}
-
 // --- running
 // ------------------------------------------------------------------------------------------------
 
@@ -116,10 +96,11 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
-                                 .limits = {settings->max_samples, settings->max_impacts}};
+                                 .limits = {.samples = settings->max_samples,
+                                            .impacts = settings->max_impacts,
+                                            .steps = (double)settings->max_steps}};
     Listener *listener = NULL;
     TRY(address_read(settings->listen, &door.address, problem));
-    TRY(make_folder(settings->data, problem));
     TRY(store_open(settings->data, &app.store, problem));
     Status status = intake_open(app.store, &work, &app.intake, problem);
     if (status == STATUS_OK)

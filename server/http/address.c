@@ -22,7 +22,7 @@ Status address_read(const char *text, Address *address, Problem *problem) {
         const bool is_bracketed = text[0] == '[' && colon > text && colon[-1] == ']';
         const char *from = is_bracketed ? text + 1 : text;
         const size_t size = (size_t)(colon - from) - (is_bracketed ? 1 : 0);
-        if (size >= sizeof host ||
+        if (size >= sizeof host || (is_bracketed && size == 0) ||
             (!is_bracketed && memchr(text, ':', (size_t)(colon - text)) != NULL))
             return problem_set(problem, STATUS_USAGE,
                                "\"%.60s\" is not HOST:PORT; write 127.0.0.1:8080 or [::1]:8080",

@@ -272,8 +272,7 @@ static bool find_known(Intake *intake, Job *job) {
         return true;
     }
     ResultRow row = {0};
-    if (!store_result_exists(intake->store, job->row.result) ||
-        store_result_load(intake->store, job->row.result, &row, NULL) != STATUS_OK) {
+    if (store_result_head(intake->store, job->row.result, &row, NULL) != STATUS_OK) {
         result_row_clear(&row);
         return false;
     }
@@ -446,7 +445,7 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     }
     ResultRow result = {0};
     if (job->row.state == JOB_SUCCESSFUL &&
-        store_result_load(intake->store, job->row.result, &result, NULL) == STATUS_OK) {
+        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK) {
         job->plan = result.plan;
         job->summary = result.summary;
         result.plan = result.summary = NULL;

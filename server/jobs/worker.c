@@ -50,7 +50,8 @@ static Status describe(const Computation *computation, Findings *findings) {
     document_summary(&summary, &outcome->summary);
     document_energy(&energy, &outcome->response.energy);
     document_impacts(&impacts, &outcome->response.impacts);
-    document_psd(&psd, &outcome->spectrum);
+    if (outcome->spectrum.densities.count > 0)
+        document_psd(&psd, &outcome->spectrum);
     text_fit(row->id, sizeof row->id, computation->result);
     row->engine = strdup(engine_version);
     row->scene = strdup(computation->scene);
@@ -59,7 +60,8 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->summary = take(&summary, &status);
     row->energy = take(&energy, &status);
     row->impacts = take(&impacts, &status);
-    row->psd = take(&psd, &status);
+    if (outcome->spectrum.densities.count > 0)
+        row->psd = take(&psd, &status);
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
@@ -119,11 +121,8 @@ static size_t close_jobs(Computation *computation, const Findings *findings, Job
 
 static Status save(Intake *intake, const Findings *findings, const JobRow *const *rows, size_t count,
                    Problem *problem) {
-    if (findings->status == STATUS_OK)
-        return store_result_save(intake->store, &findings->result, rows, count, problem);
-    for (size_t i = 0; i < count; i++)
-        TRY(store_job_update(intake->store, rows[i], problem));
-    return STATUS_OK;
+    const ResultRow *result = findings->status == STATUS_OK ? &findings->result : NULL;
+    return store_result_save(intake->store, result, rows, count, problem);
 }
 
 // With the lock held: the jobs are what the store says they are. If it could not be told, they are failed here and

@@ -75,7 +75,7 @@ static void random_polynomials_agree_with_a_scan(void **state) {
         double c[9];
         const size_t degree = 2 + (size_t)(rand() % 7);
         for (size_t i = 0; i <= degree; i++)
-            c[i] = ((double)rand() / RAND_MAX * 2 - 1) * pow(4, i % 4);
+            c[i] = ((double)rand() / RAND_MAX * 2 - 1) * pow(4, (int)(i % 4));
         c[0] = fabs(c[0]) + 1e-3;
         double s = 2, seen = 2;
         const bool is_found = root_first_crossing(c, degree, &s);

@@ -64,7 +64,7 @@ static void no_step_passes_over_an_end(void **context) {
     (void)context;
     srand(5);
     int taken = 0, refused = 0;
-    for (int trial = 0; trial < 3000; trial++) {
+    for (int trial = 0; trial < 1000; trial++) {
         const double e = 0.05 + 0.9 * rand() / RAND_MAX, T = 1e-5 * pow(10, -1.0 * rand() / RAND_MAX);
         const Motion motion = stiff_motion(T, e);
         Hold hold = {0};
@@ -86,7 +86,7 @@ static void no_step_passes_over_an_end(void **context) {
         (void)by_arcs(&motion, start, &slice, level->length, &least);
         assert_true(least > 0);
     }
-    assert_true(taken > 300 && refused > 300);
+    assert_true(taken > 100 && refused > 100);
 }
 
 static void a_soft_contact_is_left_to_arcs(void **context) {
