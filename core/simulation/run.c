@@ -41,6 +41,21 @@ static int channel_find(const char *name) {
     return -1;
 }
 
+// A part of the journey tells its own 0 to 1; the watcher sees the whole.
+typedef struct Stage {
+    const Watch *whole;
+    double from, share;
+} Stage;
+
+static bool stage_advance(void *context, double fraction) {
+    const Stage *stage = context;
+    return watch_advance(stage->whole, stage->from + stage->share * fraction);
+}
+
+static Watch stage_watch(Stage *stage) {
+    return (Watch){stage, stage_advance};
+}
+
 // The journey's luggage: everything that must be put down again at its end.
 typedef struct Journey {
     const Simulation *simulation;
@@ -90,9 +105,11 @@ static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) 
         columns->at[i].values = run->columns[channel];
         units[i] = channels[channel].psd_unit;
     }
+    Stage stage = {journey->watch, 0.9, 0.1};
+    const Watch watch = stage_watch(&stage);
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap, request->window,
                                        request->detrend};
-    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, journey->watch,
+    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
                           &journey->outcome->spectrum, problem);
 }
 
@@ -131,10 +148,12 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(make_plan(simulation, &journey->plan, problem));
     const Span span = {scene->duration, scene->sample_rate, journey->limits == NULL ? 0 : journey->limits->samples};
     const Excitation *excitation = scene_excitation(scene);
-    TRY(excitation_kind(excitation)->make(excitation, &span, journey->watch, &journey->base, problem));
+    Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
+    const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
+    TRY(excitation_kind(excitation)->make(excitation, &span, &making_watch, &journey->base, problem));
     Run run = {.plan = journey->plan,
                .base = &journey->base,
-               .watch = journey->watch,
+               .watch = &solving_watch,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
@@ -192,10 +211,15 @@ size_t outcome_bytes(const Outcome *outcome) {
 }
 
 Cost simulation_cost(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
-    const double channels_kept = (double)simulation->output.channels.count;
     const bool has_damper = simulation->scene.dampers.count > 0;
-    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
-    return (Cost){.steps = samples * (has_damper ? 1.1 : 1),
-                  .bytes = sizeof(Outcome) + samples * channels_kept * sizeof(double)};
+    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A transformed sample
+    // costs about as much as a third of a step, and overlap transforms it several times.
+    double steps = samples * (has_damper ? 1.1 : 1);
+    if (psd->channels.count > 0 && psd->segment > psd->overlap)
+        steps += samples * (double)psd->channels.count * (double)psd->segment /
+                 (double)(psd->segment - psd->overlap) / 3;
+    return (Cost){.steps = steps,
+                  .bytes = sizeof(Outcome) + samples * (double)simulation->output.channels.count * sizeof(double)};
 }
