@@ -3,9 +3,12 @@
 //   request line -> head: the gate -> body: collected up to its cap -> answer, which may sleep and
 //   go on -> sent
 //
-// Each pool thread serves fewer than 120 connections: libmicrohttpd 0.9.75 stalls when exactly a
-// multiple of 128 are ready at once. A reply queued before the body is read closes the connection,
-// which is what refusals want.
+// A pool thread is held while a job's row is made durable, so there are many, for commits to be
+// shared. Each serves far fewer than 120 connections: libmicrohttpd 0.9.75 stalls when a multiple
+// of 128 are ready at once. A reply queued before the body is read closes the connection, which is
+// what refusals want. What the library answers by itself (a head over its memory, a line that is no
+// HTTP, a Content-Length past 2^64) is no problem document, and a NUL in a header's value is cut
+// before we see it.
 #include "server/http/listener.h"
 
 #include <errno.h>
@@ -26,8 +29,8 @@
 #include "server/http/seat.h"
 
 enum {
-    THREADS = 8,
-    CONNECTIONS = THREADS * 112,
+    THREADS = 32,
+    CONNECTIONS = THREADS * 32,
     CONNECTION_MEMORY = 32 * 1024,
     IDLE_MS = 60000, // from the connection or the last reply to the next request line
     HEAD_MS = 10000, // from there to the end of the head
@@ -55,8 +58,6 @@ typedef struct Exchange {
     Bytes body;
     size_t received;
     char *target;
-    char prefer[128]; // all Prefer headers in one
-    const char *expect;
     void (*forget)(void *kept);
     bool is_begun, is_counted, sleeps, is_busy;
 } Exchange;
@@ -124,27 +125,9 @@ static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const
                                    size_t name_size, const char *value, size_t value_size) {
     (void)kind;
     Exchange *exchange = context;
-    Request *request = &exchange->request;
     gate_header(&exchange->gate, name, name_size, value, value_size);
-    if (value == NULL)
-        return MHD_YES;
-    if (strcasecmp(name, "Prefer") == 0) {
-        const size_t used = strlen(exchange->prefer);
-        snprintf(exchange->prefer + used, sizeof exchange->prefer - used, "%s%s",
-                 used > 0 ? ", " : "", value);
-        request->prefer = exchange->prefer;
-        return MHD_YES;
-    }
-    const struct {
-        const char *name;
-        const char **target;
-    } wanted[] = {{"Host", &request->host},         {"Content-Type", &request->content_type},
-                  {"Accept", &request->accept},     {"If-None-Match", &request->if_none_match},
-                  {"If-Range", &request->if_range}, {"Range", &request->range},
-                  {"Expect", &exchange->expect}};
-    for (size_t i = 0; i < COUNT(wanted); i++)
-        if (strcasecmp(name, wanted[i].name) == 0 && *wanted[i].target == NULL)
-            *wanted[i].target = value;
+    if (value != NULL)
+        request_header(&exchange->request, name, value);
     return MHD_YES;
 }
 
@@ -176,8 +159,8 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     const unsigned long long body_size = length != NULL ? strtoull(length, NULL, 10) : 0;
     const size_t most = listener->settings.body_most;
     const bool waits_for_leave =
-        exchange->expect != NULL && strcasecmp(exchange->expect, "100-continue") == 0;
-    if (code == 0 && exchange->expect != NULL && !waits_for_leave) {
+        request->expect != NULL && strcasecmp(request->expect, "100-continue") == 0;
+    if (code == 0 && request->expect != NULL && !waits_for_leave) {
         code = 417;
         problem_set(&problem, STATUS_USAGE, "the only expectation understood is 100-continue");
     }
@@ -312,8 +295,7 @@ static void *on_target(void *context, const char *target, struct MHD_Connection 
 static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *url,
                                   const char *method, const char *version, const char *data,
                                   size_t *size, void **state) {
-    (void)context;
-    (void)url; // decoded and cut at a NUL; the target is what counts
+    (void)context, (void)url; // the url is decoded and cut at a NUL; the target is what counts
     Exchange *exchange = *state;
     if (exchange == NULL)
         return MHD_NO;
@@ -329,8 +311,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
 
 static void on_completed(void *context, struct MHD_Connection *connection, void **state,
                          enum MHD_RequestTerminationCode code) {
-    (void)connection;
-    (void)code;
+    (void)connection, (void)code;
     Listener *listener = context;
     Exchange *exchange = *state;
     if (exchange == NULL)
@@ -346,11 +327,11 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     atomic_fetch_sub(&listener->exchanges, 1);
 }
 
-static void suspend_connection(void *connection) {
+static void suspend(void *connection) {
     MHD_suspend_connection(connection);
 }
 
-static void resume_connection(void *connection) {
+static void resume(void *connection) {
     MHD_resume_connection(connection);
 }
 
@@ -365,7 +346,7 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
     made->settings = *settings;
     made->first_id = (uint64_t)clock_unix_ms() << 16;
     int descriptor = -1;
-    const HallCalls calls = {suspend_connection, resume_connection};
+    const HallCalls calls = {suspend, resume};
     Status status = hall_open(&calls, &made->hall, problem);
     if (status == STATUS_OK)
         status = address_open(&made->settings.address, &descriptor, problem);

@@ -3,8 +3,10 @@
 #include "server/http/request.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static int hex_digit(char c) {
     if (c >= '0' && c <= '9')
@@ -87,6 +89,27 @@ Status request_open(Request *request, const char *target, Problem *problem) {
 void request_close(Request *request) {
     free(request->storage);
     request->storage = NULL;
+}
+
+void request_header(Request *request, const char *name, const char *value) {
+    if (strcasecmp(name, "Prefer") == 0) {
+        // One preference may stand in several headers (RFC 7240, section 2).
+        const size_t used = strlen(request->prefers);
+        snprintf(request->prefers + used, sizeof request->prefers - used, "%s%s",
+                 used > 0 ? ", " : "", value);
+        request->prefer = request->prefers;
+        return;
+    }
+    const struct {
+        const char *name;
+        const char **target;
+    } kept[] = {{"Host", &request->host},         {"Content-Type", &request->content_type},
+                {"Accept", &request->accept},     {"If-None-Match", &request->if_none_match},
+                {"If-Range", &request->if_range}, {"Range", &request->range},
+                {"Expect", &request->expect}};
+    for (size_t i = 0; i < COUNT(kept); i++)
+        if (*kept[i].target == NULL && strcasecmp(name, kept[i].name) == 0)
+            *kept[i].target = value;
 }
 
 const char *request_query(const Request *request, const char *name) {

@@ -30,7 +30,9 @@ typedef struct Request {
     size_t body_most;  // that limit
     const char *host;  // as the client names us, else our address
     const char *content_type, *accept, *prefer, *if_none_match, *if_range,
-        *range;         // NULL if absent
+        *range; // NULL if absent
+    const char *expect;
+    char prefers[128];  // all Prefer headers in one: `prefer` points here
     char id[24];        // for the client and the journal
     int64_t started_ns; // monotonic
     bool is_woken;      // the handler asked to wait and is called again
@@ -45,6 +47,9 @@ typedef struct Request {
 // request_close in any case.
 Status request_open(Request *request, const char *target, Problem *problem);
 void request_close(Request *request);
+
+// Keeps the headers named above, the first of each kind; `value` must outlive the request.
+void request_header(Request *request, const char *name, const char *value);
 
 const char *request_query(const Request *request, const char *name); // NULL if absent
 

@@ -77,6 +77,24 @@ static void numbers_in_queries_have_bounds(void **state) {
     request_close(&request);
 }
 
+static void headers_are_kept_once_and_preferences_joined(void **state) {
+    (void)state;
+    Request request = {0};
+    request_header(&request, "accept", "text/csv");
+    request_header(&request, "Accept", "text/html");
+    request_header(&request, "PREFER", "respond-async");
+    request_header(&request, "Prefer", "wait=3");
+    request_header(&request, "X-Other", "x");
+    assert_string_equal(request.accept, "text/csv");
+    assert_string_equal(request.prefer, "respond-async, wait=3");
+    assert_null(request.range);
+    char text[300];
+    memset(text, 'a', sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    request_header(&request, "Prefer", text); // cut, not overrun
+    assert_int_equal(strlen(request.prefer), sizeof request.prefers - 1);
+}
+
 static void addresses_on_loopback_are_read(void **state) {
     (void)state;
     static const struct {
@@ -129,6 +147,7 @@ int main(void) {
         cmocka_unit_test(broken_queries_are_refused),
         cmocka_unit_test(more_queries_than_there_is_room_for_are_refused),
         cmocka_unit_test(numbers_in_queries_have_bounds),
+        cmocka_unit_test(headers_are_kept_once_and_preferences_joined),
         cmocka_unit_test(addresses_on_loopback_are_read),
         cmocka_unit_test(other_addresses_are_refused_with_the_reason),
     };
