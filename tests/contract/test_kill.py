@@ -2,6 +2,7 @@
 """A job that was accepted is finished, once, whatever happens to the daemon in between."""
 
 import concurrent.futures
+import json
 import os
 import shutil
 import sqlite3
@@ -13,14 +14,22 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 JOBS, ROUNDS = 200, 10
+RUN = 0.05  # [s] of CPU a job
 
 
-def long_scene(number):
+def long_scene(number, duration):
     """A long scene of which only the summary is wanted, each different."""
     scene = program.scene("paper_sine_aluminium")
-    scene.update(duration=200, output={"channels": [], "psd": None})
+    scene.update(duration=duration, output={"channels": [], "psd": None})
     scene["dampers"][0]["clearance"] = 0.012 + 0.00002 * number
     return scene
+
+
+def fitting_duration():
+    """How long a scene takes RUN seconds here, so that 200 of them outlast their being submitted."""
+    took = min(json.loads(program.run("run", "-", text=json.dumps(long_scene(0, 500)))[1])["timing"]["run"]
+               for _ in range(3))
+    return round(500 * RUN / took)
 
 
 def rows(folder, query):
@@ -36,8 +45,8 @@ def rows(folder, query):
             connection.close()
 
 
-def submit(daemon, number):
-    reply = daemon.submit(long_scene(number), headers={"Prefer": "respond-async"})
+def submit(daemon, scene):
+    reply = daemon.submit(scene, headers={"Prefer": "respond-async"})
     assert reply.status == 202, reply
     return reply.json()["id"]
 
@@ -53,12 +62,12 @@ def listed(daemon):
     return found
 
 
-def one_round(number):
+def one_round(number, duration):
     folder = tempfile.mkdtemp(prefix="impactd-")
     try:
         with program.Daemon(program.build, "--workers", "2", data=folder) as daemon:
             with concurrent.futures.ThreadPoolExecutor(4) as pool:
-                ids = list(pool.map(lambda i: submit(daemon, i), range(JOBS)))
+                ids = list(pool.map(lambda i: submit(daemon, long_scene(i, duration)), range(JOBS)))
             time.sleep(0.05 * number)  # not always at the same moment
             daemon.kill()
         assert len(set(ids)) == JOBS
@@ -85,7 +94,8 @@ def one_round(number):
 
 def test_accepted_jobs_survive_a_kill():
     """kill -9 with 200 jobs accepted, at least half unfinished: afterwards all finish, none twice, none lost; 10 rounds."""
-    unfinished = [one_round(number) for number in range(ROUNDS)]
+    duration = fitting_duration()
+    unfinished = [one_round(number, duration) for number in range(ROUNDS)]
     print(f"      unfinished at the kill: {unfinished}")
 
 
