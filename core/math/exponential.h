@@ -15,10 +15,11 @@ void exponential(const long double *A, size_t n, long double h, long double *tra
 void exponential_increment(const long double *A, size_t n, long double h, long double *increment);
 void exponential_double(size_t n, long double *increment);
 
-// The integral over 0 <= t <= h of (c' exp(A t))' (d' exp(A t)): the quadratic form whose value at
-// y is the integral of (c'y(t)) (d'y(t)) along y' = A y from y(0) = y. form[n * n], symmetric.
-void exponential_form(const long double *A, size_t n, long double h, const long double *c,
-                      const long double *d, long double *form);
+// For each pair (c, d) the integral over 0 <= t <= h of (c' exp(A t))' (d' exp(A t)): the quadratic
+// form whose value at y is the integral of (c'y(t)) (d'y(t)) along y' = A y from y(0) = y.
+// forms[count * n * n], each symmetric.
+void exponential_forms(const long double *A, size_t n, long double h, size_t count,
+                       const long double *const pairs[][2], long double *forms);
 
 // What the form is over twice the time; `increment` is the single time's.
 void exponential_form_double(size_t n, const long double *increment, long double *form);

@@ -44,7 +44,7 @@ void flight_make(Flight *flight, const Motion *motion, double base_omega, double
     } else {
         system[A * SIZE + B] = 1;
     }
-    long double transition[SIZE * SIZE], form[SIZE * SIZE];
+    long double transition[SIZE * SIZE], forms[2][SIZE * SIZE];
     exponential(system, SIZE, length, transition);
     pick_row(transition, X, flight->x);
     pick_row(transition, V, flight->v);
@@ -53,10 +53,10 @@ void flight_make(Flight *flight, const Motion *motion, double base_omega, double
     flight->a[0] = (double)transition[SUM * SIZE + A];
     flight->a[1] = (double)transition[SUM * SIZE + B];
     const long double v_row[SIZE] = {[V] = 1}, a_row[SIZE] = {[A] = 1};
-    exponential_form(system, SIZE, length, v_row, v_row, form);
-    pick_form(form, flight->vv);
-    exponential_form(system, SIZE, length, a_row, v_row, form);
-    pick_form(form, flight->av);
+    const long double *const pairs[2][2] = {{v_row, v_row}, {a_row, v_row}};
+    exponential_forms(system, SIZE, length, 2, pairs, forms[0]);
+    pick_form(forms[0], flight->vv);
+    pick_form(forms[1], flight->av);
     flight->length = length;
     flight->omega = sqrt(motion->omega2);
     flight->curvature = motion->damping + flight->omega;

@@ -125,8 +125,7 @@ static void make_levels(Hold *hold, const long double *system, double interval) 
         const double length = ldexp(interval, -(int)i);
         if (i + 1 == hold->count) {
             exponential_increment(system, SIZE, length, increment);
-            for (int f = 0; f < FORMS; f++)
-                exponential_form(system, SIZE, length, pairs[f][0], pairs[f][1], forms[f]);
+            exponential_forms(system, SIZE, length, FORMS, pairs, forms[0]);
         } else {
             for (int f = 0; f < FORMS; f++)
                 exponential_form_double(SIZE, increment, forms[f]);

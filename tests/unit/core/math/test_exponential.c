@@ -47,9 +47,9 @@ static void a_form_is_the_integral_of_the_product(void **state) {
     const long double A[4] = {0, 1, -1, 0}, one[2] = {1, 0}, two[2] = {0, 1};
     for (long double h = 1e-3L; h < 100; h *= 3) {
         long double form[4];
-        exponential_form(A, 2, h, one, one, form);
+        exponential_forms(A, 2, h, 1, (const long double *const[1][2]){{one, one}}, form);
         assert_true(fabsl(form[0] - (h / 2 + sinl(2 * h) / 4)) < 1e-17L * (10 + h * h));
-        exponential_form(A, 2, h, one, two, form);
+        exponential_forms(A, 2, h, 1, (const long double *const[1][2]){{one, two}}, form);
         assert_true(fabsl(form[0] + sinl(h) * sinl(h) / 2) < 1e-17L * (10 + h * h));
     }
 }

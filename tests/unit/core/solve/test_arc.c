@@ -138,7 +138,9 @@ static void integrals_are_exact(void **state) {
             const int pairs[4][2] = {{0, 0}, {1, 1}, {2, 0}, {2, 1}};
             const double values[4] = {integrals.vv, integrals.ww, integrals.av, integrals.aw};
             for (int p = 0; p < 4; p++) {
-                exponential_form(system, SIZE, length, rows[pairs[p][0]], rows[pairs[p][1]], form);
+                exponential_forms(
+                    system, SIZE, length, 1,
+                    (const long double *const[1][2]){{rows[pairs[p][0]], rows[pairs[p][1]]}}, form);
                 long double sum = 0;
                 for (int i = 0; i < SIZE; i++)
                     for (int j = 0; j < SIZE; j++)
