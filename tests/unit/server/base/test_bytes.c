@@ -20,7 +20,7 @@ static void what_is_put_stands_there_with_a_nul(void **state) {
     char expected[40001] = "";
     for (int i = 0; i < 10000; i++) {
         bytes_format(&bytes, "%04d", i);
-        snprintf(expected + 4 * i, 5, "%04d", i);
+        snprintf(expected + 4 * i, sizeof expected - 4 * (size_t)i, "%04d", i);
     }
     assert_int_equal(bytes.count, 40000);
     assert_string_equal(bytes.at, expected);
