@@ -2,16 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/excitation.h"
+#include "core/excite/record.h"
 
 enum { RECORD_SAMPLES = 1 << 22 };
-
-typedef struct ExcitationRecord {
-    Excitation excitation;
-    Reals samples;   // [m/s^2] before scaling
-    double interval; // [s]
-    double scale;    // [-]
-} ExcitationRecord;
 
 // clang-format off
 static const Field record_fields[] = {

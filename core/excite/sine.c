@@ -2,18 +2,10 @@
 // of the latter the acceleration is a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
 #include <string.h>
 
-#include "core/excite/excitation.h"
+#include "core/excite/sine.h"
 
-typedef enum SineQuantity { SINE_ACCELERATION, SINE_DISPLACEMENT } SineQuantity;
 static const char *const quantity_names[] = {
     [SINE_ACCELERATION] = "acceleration", [SINE_DISPLACEMENT] = "displacement", NULL};
-
-typedef struct ExcitationSine {
-    Excitation excitation;
-    double frequency; // [Hz]
-    double amplitude; // [m/s^2] or [m]
-    int quantity;     // SineQuantity
-} ExcitationSine;
 
 // clang-format off
 static const Field sine_fields[] = {

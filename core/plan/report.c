@@ -75,6 +75,13 @@ Status warnings_add(Warnings *warnings, const char *pointer, const char *format,
     return STATUS_OK;
 }
 
+void warnings_clear(Warnings *warnings) {
+    for (size_t i = 0; i < warnings->count; i++)
+        fields_clear(warning_fields, &warnings->at[i]);
+    free(warnings->at);
+    *warnings = (Warnings){NULL, 0};
+}
+
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
                      const char *unit, const char *format, ...) {
     if (decisions == NULL || decisions->count >= REPORT_LINES)

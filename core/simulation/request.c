@@ -3,9 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/accuracy.h"
 #include "core/simulation/plausible.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/solvers.h"
 
 enum { LABELS = 32, TITLE_BYTES = 200, SEGMENT = 4096 };
 
@@ -32,7 +32,7 @@ static const Field output_fields[] = {
 
 const Field simulation_fields[] = {
     FIELD_BASE(Simulation, scene, scene_fields),
-    FIELD_VARIANT(Simulation, accuracy, &accuracy_kinds, PRESENCE_DEFAULT, "how it is solved"),
+    FIELD_VARIANT(Simulation, accuracy, &solver_kinds, PRESENCE_DEFAULT, "how it is solved"),
     FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "what is wanted of it"),
     FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; changes nothing"),
     FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; change nothing"),

@@ -25,7 +25,7 @@ int64_t clock_thread_cpu_ns(void) {
 void clock_rfc3339(int64_t unix_ms, char target[32]) {
     // Towards the past, also before 1970.
     const int64_t ms = (unix_ms % 1000 + 1000) % 1000;
-    const time_t seconds = (time_t)(unix_ms / 1000 - (unix_ms % 1000 < 0 ? 1 : 0));
+    const time_t seconds = (time_t)(unix_ms / 1000 - (unix_ms % 1000 < 0));
     struct tm date;
     if (gmtime_r(&seconds, &date) == NULL || date.tm_year < -1900 || date.tm_year > 9999 - 1900) {
         target[0] = '\0';

@@ -1,5 +1,5 @@
-// One HTTP request as plain values, and the reply to it. No libmicrohttpd here (listener.c has it alone).
-// Used by http/ and api/.
+// One HTTP request as plain values, and the reply to it. No libmicrohttpd here (listener.c has it
+// alone). Not a parser of header values: that is header.h. Used by http/ and api/.
 #ifndef SERVER_HTTP_REQUEST_H
 #define SERVER_HTTP_REQUEST_H
 
@@ -10,46 +10,77 @@
 #include "core/base/status.h"
 #include "server/jobs/job.h"
 
-enum { REQUEST_PARAMETERS = 4, REQUEST_QUERIES = 32 };
+enum { REQUEST_PARAMETERS = 4, REQUEST_QUERIES = 32, REQUEST_TARGET_MOST = 4096 };
 
 typedef struct RequestPair {
-    const char *name, *value;  // decoded
+    const char *name, *value; // decoded
 } RequestPair;
 
 typedef struct Request {
-    const char *method;       // "GET"; HEAD is shown as GET, the listener drops the body
-    const char *target;       // path and query as sent
-    const char *path;         // as sent, without query
-    const char *parameters[REQUEST_PARAMETERS];  // what {..} in the route's pattern matched, in order, decoded
+    const char *method; // "GET"; HEAD is shown as GET, the listener drops the body
+    const char *target; // path and query as sent
+    const char *path;   // as sent, without query
+    const char *parameters[REQUEST_PARAMETERS]; // what {..} in the route's pattern matched, in
+                                                // order, decoded
     RequestPair queries[REQUEST_QUERIES];
     size_t query_count;
-    const char *body;
+    const char *body; // NUL-terminated behind body_size bytes; NULL if there is none
     size_t body_size;
-    const char *content_type, *accept, *prefer, *if_none_match, *range;  // NULL if absent
-    int64_t started_ns;       // monotonic
-    bool is_woken;            // the handler asked to wait and is called again
-    bool is_expired;          // ... because the time was up
-    Waker waker;              // wakes this request; see reply_wait
+    bool is_too_large; // the body was over its limit and is not here
+    size_t body_most;  // that limit
+    const char *host;  // as the client names us, else our address
+    const char *content_type, *accept, *prefer, *if_none_match, *if_range,
+        *range; // NULL if absent
+    const char *expect;
+    char prefers[128];  // all Prefer headers in one: `prefer` points here
+    char id[24];        // for the client and the journal
+    int64_t started_ns; // monotonic
+    bool is_woken;      // the handler asked to wait and is called again
+    bool is_expired;    // ... because the time was up
+    void *kept;         // what the handler kept when it asked to wait; see Reply
+    const Waker *waker; // wakes this request; outlives it, so that a late call does no harm
+    char *storage;      // what the texts above point into
 } Request;
 
-const char *request_query(const Request *request, const char *name);  // NULL if absent
+// Takes `target` apart: path, queries, percent-decoded. The rest of `request` stays. STATUS_USAGE
+// for a broken escape, a NUL, a query named twice or more than REQUEST_QUERIES of them. Closed by
+// request_close in any case.
+Status request_open(Request *request, const char *target, Problem *problem);
+void request_close(Request *request);
+
+// Keeps the headers named above, the first of each kind; `value` must outlive the request.
+void request_header(Request *request, const char *name, const char *value);
+
+const char *request_query(const Request *request, const char *name); // NULL if absent
+
+// Decodes %XX in place; '+' is a space if `is_query`. False for a broken escape or %00.
+bool request_decode(char *text, bool is_query);
+
+// A number within [least, most] from a query, `initial` if it is absent. STATUS_USAGE says what
+// would be right.
+Status request_number(const Request *request, const char *name, double least, double most,
+                      double initial, double *value, Problem *problem);
 
 typedef struct Reply {
-    int code;                  // HTTP status
+    int code; // HTTP status
     const char *content_type;
     const void *body;
     size_t body_size;
-    void (*release)(void *context);  // called once when the body was sent or given up; may be NULL
+    void (*release)(void *context); // called once when the body was sent or given up; may be NULL
     void *context;
-    char location[128];        // "" for none
-    char etag[96];             // with quotes, "" for none
+    char location[128]; // "" for none
+    char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[160];
+    char link[192];
     char preference_applied[48];
     char allow[64];
-    int retry_after;           // seconds, -1 for none
+    char content_range[80];
+    int retry_after; // seconds, -1 for none
     bool accepts_ranges;
-    int wait_ms;               // > 0: not a reply yet; call the handler again when woken or after so long
+    bool varies_by_accept; // the same path has several representations
+    int wait_ms; // > 0: not a reply yet; call the handler again when woken or after so long
+    void *keep;  // with wait_ms: handed back as request->kept; `forget` frees it, always, after the
+    void (*forget)(void *keep); // next call of the handler or when the client has gone
 } Reply;
 
 #endif

@@ -1,5 +1,6 @@
-// The database as the rest of the server sees it: jobs, results, materials. One writer thread commits whatever is
-// queued (durable when a call returns), each reader has its own connection. No SQL outside this room.
+// The database as the rest of the server sees it: jobs, results, materials. One writer thread
+// commits whatever is queued (durable when a call returns), each reader has its own connection. No
+// SQL outside this room.
 #ifndef SERVER_STORE_STORE_H
 #define SERVER_STORE_STORE_H
 
@@ -12,12 +13,13 @@
 
 typedef struct Store Store;
 
-// Opens (and makes or migrates) DIR/impactd.db; `directory` NULL is a private database in memory, for `impactd run`.
-// STATUS_CONFLICT if another daemon has it open.
+// Opens (and makes or migrates) DIR/impactd.db, DIR too if it is missing; `directory` NULL is a
+// private database in memory, for `impactd run`. STATUS_CONFLICT if another daemon has the folder,
+// or the database is a newer program's.
 Status store_open(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
 
-// --- materials -------------------------------------------------------------------------------------------
+// --- materials ---------------------------------------------------------------------------------
 typedef struct MaterialRevision {
     char *slug, *name, *status, *source;
     uint64_t revision;
@@ -28,50 +30,64 @@ typedef struct MaterialRevisions {
     size_t count;
 } MaterialRevisions;
 extern const Field material_fields[];
-// revision 0: the approved head, else the newest draft. STATUS_NOT_FOUND. Cleared by fields_clear(material_fields).
+// revision 0: the approved head, else the newest draft. STATUS_NOT_FOUND. Cleared by
+// fields_clear(material_fields). A member that is not known is NAN.
 Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
                       Problem *problem);
+// The head of every material, by slug; of those that are all deprecated the newest revision.
 Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
-// --- jobs ------------------------------------------------------------------------------------------------
+// --- jobs --------------------------------------------------------------------------------------
 typedef struct JobRow {
     char id[40];
-    int state;        // JobState
+    int state; // JobState
     char result[72];
     bool is_cached;
     int64_t created_unix_ms, started_unix_ms, finished_unix_ms;
-    double queued, run, total;  // [s]
-    char *scene;      // canonical JSON, resolved
+    double queued, run, total; // [s]
+    char *scene;               // canonical JSON, resolved
     char *problem, *warnings, *title;
 } JobRow;
 void job_row_clear(JobRow *row);
+// `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
-Status store_job_update(Store *store, const JobRow *row, Problem *problem);  // state, times, problem, result
+// State, is_cached, times, problem, result. STATUS_NOT_FOUND.
+Status store_job_update(Store *store, const JobRow *row, Problem *problem);
+// All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
+// uninitialised.
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
-// Newest first; `before` is an id to go on after, or NULL.
+// Newest first; `before` is an id to go on after (STATUS_NOT_FOUND), or NULL.
 typedef struct JobRows {
     JobRow *at;
     size_t count;
 } JobRows;
-Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows, Problem *problem);
-Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem);  // oldest first
+Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows,
+                      Problem *problem);
+Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
-// --- results ---------------------------------------------------------------------------------------------
+// --- results -----------------------------------------------------------------------------------
 // Everything of a result but its series, which is computed anew when asked for.
 typedef struct ResultRow {
     char id[72];
-    char *engine, *scene, *plan, *summary, *warnings, *energy, *impacts, *psd;  // JSON documents
-    uint64_t count;       // samples
+    char *engine;
+    char *scene, *plan, *summary, *warnings, *energy, *impacts; // JSON documents
+    char *psd;      // JSON; NULL where none was asked for
+    uint64_t count; // samples
     double sample_rate;
     int64_t created_unix_ms;
 } ResultRow;
 void result_row_clear(ResultRow *row);
-// Saves the result and the finished job in one transaction; a result already there stays as it is.
-Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs, size_t job_count,
-                         Problem *problem);
+// Saves the result (NULL: none) and the finished jobs in one transaction; a result already there
+// stays as it is.
+Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, Problem *problem);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
+// The same without scene, energy, impacts and psd, which may be long.
+Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
+// Id, engine and scene alone: what computing it anew takes.
+Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
 
 #endif

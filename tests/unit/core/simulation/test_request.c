@@ -8,14 +8,14 @@
 #include <cmocka.h>
 
 #include "core/base/canonical.h"
-#include "core/simulation/accuracy.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/solvers.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
 static Problem problem;
 static Warnings warnings;
-static const SimulationLimits limits = {1 << 25, 0};
+static const SimulationLimits limits = {.samples = 1 << 25};
 
 static Status complete_more(Simulation *simulation) {
     return simulation_complete(simulation, &limits, &warnings, &problem);
@@ -96,7 +96,7 @@ static void the_papers_scene_is_sound_and_complete(void **state) {
     assert_int_equal(simulation.output.psd.window, WINDOW_HANN);
     assert_int_equal(simulation.output.psd.detrend, DETREND_CONSTANT);
     assert_int_equal(damper_of(&simulation)->storey, 1);
-    assert_ptr_equal(simulation.accuracy->kind, &accuracy_auto);
+    assert_ptr_equal(simulation.accuracy->kind, solvers[0]);
     simulation_clear(&simulation);
 }
 
@@ -394,10 +394,10 @@ static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) 
 
 static void accuracy_is_chosen_by_its_solver(void **state) {
     (void)state;
-    assert_string_equal(accuracy_kinds.tag, "solver");
-    assert_ptr_equal(accuracy_kinds.at(0), &accuracy_auto);
-    assert_ptr_equal(kind_find(&accuracy_kinds, "exact"), &accuracy_exact);
-    assert_null(accuracy_kinds.at(2));
+    assert_string_equal(solver_kinds.tag, "solver");
+    assert_ptr_equal(solver_kinds.at(0), solvers[0]);
+    assert_ptr_equal(kind_find(&solver_kinds, "exact"), &solver_exact.kind);
+    assert_null(solver_kinds.at(2));
 }
 
 static int teardown(void **state) {

@@ -1,0 +1,236 @@
+// From a completed simulation to its outcome: plan, base, solver, spectra, summary.
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/simulation.h"
+#include "core/solve/solver.h"
+#include "core/solve/solvers.h"
+
+// The part nobody outside sees: how many hold it.
+typedef struct Held {
+    Outcome outcome; // first, so that an Outcome's address is its Held's
+    atomic_size_t holds;
+} Held;
+
+static const Solver *chosen_solver(const Simulation *simulation) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    return solver->run != NULL ? solver : &solver_exact;
+}
+
+static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
+    return plan_new(&simulation->scene, simulation->accuracy->kind->name,
+                    chosen_solver(simulation)->kind.name, plan, problem);
+}
+
+Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
+    Plan *plan;
+    memset(report, 0, sizeof *report);
+    TRY(make_plan(simulation, &plan, problem));
+    *report = plan->report;
+    memset(&plan->report, 0, sizeof plan->report);
+    plan_free(plan);
+    return STATUS_OK;
+}
+
+static int channel_find(const char *name) {
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        if (strcmp(channels[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+// A part of the journey tells its own 0 to 1; the watcher sees the whole.
+typedef struct Stage {
+    const Watch *whole;
+    double from, share;
+} Stage;
+
+static bool stage_advance(void *context, double fraction) {
+    const Stage *stage = context;
+    return watch_advance(stage->whole, stage->from + stage->share * fraction);
+}
+
+static Watch stage_watch(Stage *stage) {
+    return (Watch){stage, stage_advance};
+}
+
+// The journey's luggage: everything that must be put down again at its end.
+typedef struct Journey {
+    const Simulation *simulation;
+    const SimulationLimits *limits;
+    const Watch *watch;
+    Plan *plan;
+    Base base;
+    Columns hidden;      // channels that only a spectrum wants
+    Columns transformed; // borrowed values of the spectrum's channels
+    Outcome *outcome;
+} Journey;
+
+// Columns for `wanted` that no earlier request has, entered into the run.
+static Status make_columns(const Journey *journey, const Texts *wanted, Columns *columns, Run *run,
+                           Problem *problem) {
+    int missing[CHANNEL_COUNT];
+    size_t count = 0;
+    for (size_t i = 0; i < wanted->count; i++) {
+        const int channel = channel_find(wanted->at[i]);
+        if (channel >= 0 && run->columns[channel] == NULL)
+            missing[count++] = channel;
+    }
+    if (count == 0)
+        return STATUS_OK;
+    TRY(columns_make(columns, count, journey->plan->count, 0, problem));
+    for (size_t i = 0; i < count; i++) {
+        columns_name(columns, i, channels[missing[i]].name, channels[missing[i]].unit);
+        run->columns[missing[i]] = columns->at[i].values;
+    }
+    return STATUS_OK;
+}
+
+static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) {
+    const SpectrumRequest *request = &journey->simulation->output.psd;
+    const char *units[CHANNEL_COUNT];
+    if (request->channels.count == 0)
+        return STATUS_OK;
+    Columns *columns = &journey->transformed;
+    columns->at = calloc(request->channels.count, sizeof *columns->at);
+    if (columns->at == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the spectra");
+    columns->count = request->channels.count;
+    columns->rows = journey->plan->count;
+    for (size_t i = 0; i < columns->count; i++) {
+        const int channel = channel_find(request->channels.at[i]);
+        columns_name(columns, i, channels[channel].name, channels[channel].unit);
+        columns->at[i].values = run->columns[channel];
+        units[i] = channels[channel].psd_unit;
+    }
+    Stage stage = {journey->watch, 0.9, 0.1};
+    const Watch watch = stage_watch(&stage);
+    const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
+                                       request->window, request->detrend};
+    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
+                          &journey->outcome->spectrum, problem);
+}
+
+static void summarize(Outcome *outcome) {
+    const Response *response = &outcome->response;
+    const double count = (double)response->statistics_count;
+    uint64_t impacts = 0;
+    for (size_t i = 0; i < response->impacts.count; i++)
+        impacts += response->impacts.at[i].kind == IMPACT_IMPACT;
+    outcome->summary =
+        (Summary){.peak_displacement = response->peaks.displacement,
+                  .rms_displacement = sqrt(response->sum_squares_displacement / count),
+                  .peak_acceleration = response->peaks.acceleration,
+                  .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
+                  .impacts = impacts,
+                  .peak_contact_force = response->peaks.contact_force,
+                  .energy_residual = response->energy.residual,
+                  .error_estimate = NAN,
+                  .trust_horizon = NAN};
+}
+
+// Finite inputs can still be too large for their products.
+static Status check_finite(const Outcome *outcome, Problem *problem) {
+    const Summary *summary = &outcome->summary;
+    const double all = summary->peak_displacement + summary->rms_displacement +
+                       summary->peak_acceleration + summary->rms_acceleration +
+                       summary->peak_contact_force + summary->energy_residual;
+    if (isfinite(all))
+        return STATUS_OK;
+    return problem_set(problem, STATUS_UNSTABLE,
+                       "the scene's numbers are too large: peaks or energies leave what double "
+                       "precision can hold");
+}
+
+static Status travel(Journey *journey, Problem *problem) {
+    const Simulation *simulation = journey->simulation;
+    const Scene *scene = &simulation->scene;
+    Outcome *outcome = journey->outcome;
+    TRY(make_plan(simulation, &journey->plan, problem));
+    const Span span = {scene->duration, scene->sample_rate,
+                       journey->limits == NULL ? 0 : journey->limits->samples};
+    const Excitation *excitation = scene_excitation(scene);
+    Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
+    const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
+    TRY(excitation_kind(excitation)
+            ->make(excitation, &span, &making_watch, &journey->base, problem));
+    Run run = {.plan = journey->plan,
+               .base = &journey->base,
+               .watch = &solving_watch,
+               .statistics_from = simulation->output.statistics_from,
+               .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
+               .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
+    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, &run,
+                     problem));
+    TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, &run, problem));
+    TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
+    outcome->cost = run.steps;
+    summarize(outcome);
+    TRY(check_finite(outcome, problem));
+    TRY(make_spectrum(journey, &run, problem));
+    outcome->plan = journey->plan->report;
+    memset(&journey->plan->report, 0, sizeof journey->plan->report);
+    return STATUS_OK;
+}
+
+Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
+                      const Watch *watch, Outcome **outcome, Problem *problem) {
+    *outcome = NULL;
+    Held *held = calloc(1, sizeof *held);
+    if (held == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
+    atomic_init(&held->holds, 1);
+    Journey journey = {
+        .simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
+    const Status status = travel(&journey, problem);
+    free(journey.transformed.at); // its values are the other columns'
+    columns_clear(&journey.hidden);
+    base_clear(&journey.base);
+    plan_free(journey.plan);
+    if (status != STATUS_OK) {
+        outcome_drop(&held->outcome);
+        return status;
+    }
+    *outcome = &held->outcome;
+    return STATUS_OK;
+}
+
+Outcome *outcome_hold(Outcome *outcome) {
+    atomic_fetch_add(&((Held *)outcome)->holds, 1);
+    return outcome;
+}
+
+void outcome_drop(Outcome *outcome) {
+    if (outcome == NULL || atomic_fetch_sub(&((Held *)outcome)->holds, 1) != 1)
+        return;
+    fields_clear(plan_report_fields, &outcome->plan);
+    response_clear(&outcome->response);
+    spectrum_clear(&outcome->spectrum);
+    free(outcome);
+}
+
+size_t outcome_bytes(const Outcome *outcome) {
+    const Columns *series = &outcome->response.series, *densities = &outcome->spectrum.densities;
+    return sizeof(Held) +
+           sizeof(double) *
+               (series->count * series->rows + (densities->count + 1) * densities->rows) +
+           outcome->response.impacts.count * sizeof(Impact);
+}
+
+Cost simulation_cost(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
+    const double samples = (double)scene_sample_count(&simulation->scene);
+    const bool has_damper = simulation->scene.dampers.count > 0;
+    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
+    // transformed sample costs about as much as a third of a step, and overlap transforms it
+    // several times.
+    double steps = samples * (has_damper ? 1.1 : 1);
+    if (psd->channels.count > 0 && psd->segment > psd->overlap)
+        steps += samples * (double)psd->channels.count * (double)psd->segment /
+                 (double)(psd->segment - psd->overlap) / 3;
+    return (Cost){.steps = steps,
+                  .bytes = sizeof(Outcome) +
+                           samples * (double)simulation->output.channels.count * sizeof(double)};
+}

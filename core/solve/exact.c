@@ -1,0 +1,294 @@
+// The exact solver. Between events the scene is a linear system:
+//
+//              gap closes                    p back at 0 (linear contact)
+//     FLIGHT ------------> CONTACT(side) ------------------------------> FLIGHT
+//        |   gap closes                    bounce shorter than the clock
+//        +--(impulse)--> u' -> -e u' ----------------------------------> RESTING(side)
+//                                                 push becomes tensile -> FLIGHT
+//
+// Flight over a whole sample interval is one matrix step where a bound on the gap's curvature
+// proves that no stop can be reached; everything else goes by arcs (arc.h), whose polynomials
+// locate events to rounding. Time is a sample's number and an offset from it, so that short
+// contacts keep their digits late in a run.
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/solve/exact_events.h"
+#include "core/solve/exact_state.h"
+#include "core/solve/solver.h"
+
+enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
+
+static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
+    const Plan *plan = exact->plan;
+    ledger_work(&exact->ledger,
+                -plan->mass * integrals->av - plan->damper_mass * (integrals->av + integrals->aw),
+                plan->damping * integrals->vv);
+    recorder_base(&exact->recorder, integrals->a);
+}
+
+// What a stretch of contact or rest adds to its row of the ledger.
+static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integrals) {
+    const double mass = exact_effective_mass(exact);
+    double s = -1;
+    const double peak = arc_peak_force(arc, exact->ledger.open.peak_force / mass, &s);
+    ledger_force(&exact->ledger, mass * peak);
+    if (s >= 0) {
+        const State middle = arc_at(arc, s);
+        const double n = root_value(arc->force, arc->degree - 1, s) / (arc->length * arc->length);
+        const double own = exact->flying.damping * middle.v + exact->flying.omega2 * middle.x;
+        ledger_acceleration(&exact->ledger, exact->resting.share * n - own);
+    }
+    ledger_stretch(&exact->ledger, arc->length, mass * arc_impulse(arc),
+                   exact->phase == CONTACT ? exact->plan->stops[exact->side].damping * integrals->ww
+                                           : 0);
+}
+
+// After an arc of free flight: has the gap opened beyond rounding yet?
+static void leave(Exact *exact) {
+    const double sign = exact_sign((Side)exact->origin);
+    if (sign * exact->state.r < 0 && sign * exact->state.w < 0)
+        exact->is_leaving = false;
+    else
+        exact->state.r = exact->state.w = 0;
+}
+
+static Status keep_going(Exact *exact) {
+    const State *state = &exact->state;
+    exact->arcs = 0;
+    if (!isfinite(state->x) || !isfinite(state->v) || !isfinite(state->r) || !isfinite(state->w))
+        return problem_set(exact->problem, STATUS_UNSTABLE,
+                           "the motion left what double precision can hold at t = %.6g s",
+                           exact_time(exact));
+    if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
+        return problem_set(exact->problem, STATUS_LIMIT,
+                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
+                           exact->run->steps_most, exact_time(exact), exact->plan->duration);
+    if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
+        return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                           exact_time(exact));
+    return STATUS_OK;
+}
+
+// A long step of a contact that has lasted for many arcs. False: it must go by arcs.
+static bool hold(Exact *exact, const Slice *slice, double length) {
+    Hold *held = exact->holds[exact->side];
+    if (held == NULL && (held = exact->holds[exact->side] = calloc(1, sizeof *held)) == NULL)
+        return false;
+    if (!held->is_made)
+        hold_make(held, &exact->touching[exact->side], slice->omega, exact->interval);
+    const double mass = exact_effective_mass(exact);
+    State end;
+    const HoldLevel *level = hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
+                                       exact->ledger.open.peak_force / mass, &end);
+    if (level == NULL)
+        return false;
+    double impulse;
+    const ArcIntegrals integrals = hold_integrals(level, &exact->state, slice, &impulse);
+    take_integrals(exact, &integrals);
+    exact->state = end;
+    exact->offset += level->length;
+    ledger_force(&exact->ledger, fabs(exact_force(exact)));
+    ledger_stretch(&exact->ledger, level->length, mass * impulse,
+                   exact->plan->stops[exact->side].damping * integrals.ww);
+    return true;
+}
+
+// One arc, at most `length` long, up to its end or the first event.
+static Status advance(Exact *exact, double length) {
+    const Motion *system = exact_motion(exact);
+    Slice slice;
+    const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
+    length = fmin(length, knot);
+    exact->run->steps++;
+    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
+        hold(exact, &slice, length))
+        return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+    length = fmin(length, 1 / system->rate);
+    Arc arc;
+    arc_make(&arc, system, &exact->state, &slice, length);
+    double s;
+    Side side;
+    const bool is_event = exact_find_event(exact, &arc, &s, &side);
+    if (is_event)
+        arc_cut(&arc, s);
+    if (arc.length > 0) {
+        const ArcIntegrals integrals = arc_integrals(&arc);
+        take_integrals(exact, &integrals);
+        if (exact->phase != FLIGHT)
+            take_contact(exact, &arc, &integrals);
+        exact->state = arc_end(&arc);
+        exact->offset += arc.length;
+        exact->still_events = 0;
+        if (exact->is_leaving && exact->phase == FLIGHT)
+            leave(exact);
+    }
+    if (is_event) {
+        if (++exact->still_events > STILL_EVENTS)
+            return problem_set(exact->problem, STATUS_UNSTABLE,
+                               "more than %d contact events at one instant, t = %.17g s",
+                               STILL_EVENTS, exact_time(exact));
+        if (exact->phase == FLIGHT)
+            exact_touch(exact, side);
+        else
+            exact_release(exact);
+        TRY(ledger_status(&exact->ledger, exact->problem));
+    }
+    return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+}
+
+// The whole interval in one step, where no stop can be reached. False: it must go by arcs.
+static bool fly(Exact *exact) {
+    Slice slice;
+    if (exact->phase != FLIGHT || exact->is_leaving ||
+        !base_cursor_interval(&exact->base, exact->sample, &slice))
+        return false;
+    ArcIntegrals integrals;
+    integrals.ww = 0;
+    const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
+    if (exact->plan->has_damper) {
+        const double first = fabs(slice.value),
+                     last = fabs(slice.value + slice.slope * exact->interval);
+        const double most = slice.omega > 0 ? first + fabs(slice.slope)
+                            : first > last  ? first
+                                            : last;
+        const double sag = flight_curvature(&exact->flight, &exact->state, most) * exact->interval *
+                           exact->interval / 8;
+        const double nearest = exact_room(exact, SIDE_RIGHT) - sag,
+                     furthest = sag - exact_room(exact, SIDE_LEFT);
+        if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest &&
+              end.r > furthest))
+            return false;
+    }
+    take_integrals(exact, &integrals);
+    exact->state = end;
+    exact->run->steps++;
+    return true;
+}
+
+// From the present sample over `length`.
+static Status cross(Exact *exact, double length) {
+    // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
+    const double clock = 2 * DBL_EPSILON * length;
+    while (length - exact->offset > clock) {
+        const double before = exact->offset;
+        const size_t events = exact->still_events;
+        TRY(advance(exact, length - exact->offset));
+        if (exact->offset == before && exact->still_events == events)
+            return problem_set(exact->problem, STATUS_UNSTABLE,
+                               "the contact is too stiff to be followed: at t = %.6g s a step of "
+                               "1/%.6g s is below "
+                               "the clock's resolution",
+                               exact_time(exact), exact_motion(exact)->rate);
+    }
+    return STATUS_OK;
+}
+
+static Status prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
+    const Plan *plan = run->plan;
+    memset(exact, 0, sizeof *exact);
+    exact->run = run;
+    exact->plan = plan;
+    exact->problem = problem;
+    exact->interval = 1 / plan->sample_rate;
+    const double total = plan->mass + plan->damper_mass;
+    const double share = plan->damper_mass / total, mass = plan->mass * share;
+    Motion flying = {.omega2 = plan->stiffness / plan->mass,
+                     .damping = plan->damping / plan->mass,
+                     .share = share};
+    const double own = fmax(sqrt(flying.omega2), flying.damping);
+    flying.rate = fmax(fmax(own, run->base->omega), 1e-300);
+    exact->flying = exact->resting = flying;
+    exact->resting.is_resting = true;
+    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->has_damper; side++) {
+        Motion *touching = &exact->touching[side];
+        *touching = flying;
+        touching->contact_omega2 = plan->stops[side].stiffness / mass;
+        touching->contact_damping = plan->stops[side].damping / mass;
+        touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping),
+                              flying.rate);
+    }
+    if (!isfinite(flying.rate) ||
+        !isfinite(exact->touching[SIDE_LEFT].rate + exact->touching[SIDE_RIGHT].rate) ||
+        !(share > 0 || !plan->has_damper) || !(share < 1))
+        return problem_set(
+            problem, STATUS_UNSTABLE,
+            "the scene's masses and stiffnesses are too far apart for double precision");
+    base_cursor_make(&exact->base, run->base, plan->sample_rate);
+    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
+                exact->interval);
+    exact->phase = FLIGHT;
+    exact->origin = ORIGIN_MIDDLE;
+    exact->state =
+        (State){plan->displacement, plan->velocity, plan->position, plan->relative_velocity};
+    const EnergyState energy = exact_energy(exact);
+    ledger_start(&exact->ledger, response, run->impacts_most, &energy);
+    recorder_start(&exact->recorder, run, response);
+    return STATUS_OK;
+}
+
+// A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
+static Status settle(Exact *exact) {
+    for (bool is_event = true; is_event;) {
+        Slice slice;
+        Arc arc;
+        double s;
+        Side side;
+        (void)base_cursor_slice(&exact->base, 0, 0, &slice);
+        arc_make(&arc, exact_motion(exact), &exact->state, &slice,
+                 fmin(exact->interval, 1 / exact_motion(exact)->rate));
+        is_event = exact->phase == FLIGHT && exact_find_event(exact, &arc, &s, &side) && s == 0;
+        if (is_event)
+            exact_touch(exact, side);
+    }
+    return ledger_status(&exact->ledger, exact->problem);
+}
+
+static Status solve(Exact *exact) {
+    const Plan *plan = exact->plan;
+    TRY(settle(exact));
+    Moment at = exact_moment(exact);
+    recorder_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
+    ledger_peaks(&exact->ledger, &at);
+    while (exact->sample + 1 < plan->count) {
+        if (!fly(exact)) {
+            TRY(cross(exact, exact->interval));
+        } else if (++exact->arcs >= WATCH_ARCS) {
+            TRY(keep_going(exact));
+        }
+        exact->sample++;
+        exact->offset = 0;
+        at = exact_moment(exact);
+        recorder_take(&exact->recorder, exact->sample, &at,
+                      base_cursor_at(&exact->base, exact->sample));
+        ledger_peaks(&exact->ledger, &at);
+        if (exact->sample % 64 == 0) {
+            const EnergyState energy = exact_energy(exact);
+            ledger_balance(&exact->ledger, &energy);
+        }
+    }
+    // The duration may end between samples.
+    TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
+    exact_note(exact);
+    TRY(keep_going(exact));
+    const EnergyState energy = exact_energy(exact);
+    return ledger_finish(&exact->ledger, &energy, exact->problem);
+}
+
+static Status exact_run(Run *run, Response *response, Problem *problem) {
+    Exact exact;
+    TRY(prepare(&exact, run, response, problem));
+    const Status status = solve(&exact);
+    recorder_finish(&exact.recorder, response);
+    free(exact.holds[SIDE_LEFT]);
+    free(exact.holds[SIDE_RIGHT]);
+    return status;
+}
+
+const Solver solver_exact = {
+    {"exact", "each contact state propagated exactly, events located to rounding", accuracy_fields,
+     sizeof(Accuracy)},
+    exact_run,
+};

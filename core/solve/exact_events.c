@@ -1,0 +1,122 @@
+#include "core/solve/exact_events.h"
+
+#include <float.h>
+#include <math.h>
+
+void exact_note(Exact *exact) {
+    const Moment at = exact_moment(exact);
+    const EnergyState energy = exact_energy(exact);
+    ledger_peaks(&exact->ledger, &at);
+    ledger_balance(&exact->ledger, &energy);
+}
+
+static void begin_contact(Exact *exact, Side side) {
+    exact->phase = CONTACT;
+    exact->contact_arcs = 0;
+    exact->side = side;
+    exact->origin = (Origin)side;
+    exact->state.r = 0;
+    const double speed = fabs(exact->state.w);
+    ledger_open(&exact->ledger, IMPACT_IMPACT, exact_time(exact), side, speed);
+    ledger_force(&exact->ledger, exact->plan->stops[side].damping * speed);
+}
+
+static void begin_rest(Exact *exact, Side side) {
+    // What relative momentum is left goes over to both, conserved.
+    const double mass = exact_effective_mass(exact), speed = fabs(exact->state.w);
+    exact->state.v += exact->resting.share * exact->state.w;
+    exact->state.w = 0;
+    exact->state.r = 0;
+    exact->origin = (Origin)side;
+    exact->phase = RESTING;
+    exact->side = side;
+    ledger_open(&exact->ledger, IMPACT_RESTING, exact_time(exact), side, NAN);
+    ledger_stretch(&exact->ledger, 0, exact_sign(side) * mass * speed, 0.5 * mass * speed * speed);
+    ledger_force(&exact->ledger, fabs(exact_force(exact)));
+}
+
+static void bounce(Exact *exact, Side side) {
+    const Plan *plan = exact->plan;
+    const double sign = exact_sign(side), e = plan->stops[side].restitution;
+    const double approach = fabs(exact->state.w);
+    const double mass = exact_effective_mass(exact); // m_e = m M / (M + m)
+    exact->origin = (Origin)side;
+    exact->state.r = 0;
+    exact->state.v += sign * exact->resting.share * (1 + e) * approach;
+    exact->state.w = -sign * e * approach;
+    ledger_bounce(&exact->ledger, exact_time(exact), side, approach, e * approach, mass);
+    // Bounces towards a pushing stop follow each other in a geometric series. When all that are
+    // left take less time than the clock resolves, they are one: the mass rests.
+    const double pull = sign * exact_push(exact);
+    const double left = 2 * e * approach / (pull * (1 - e));
+    const double clock = 4 * DBL_EPSILON * fmax(exact_time(exact), exact->interval);
+    if (pull >= 0 && (e * approach == 0 || left <= clock))
+        begin_rest(exact, side);
+}
+
+void exact_touch(Exact *exact, Side side) {
+    exact->is_leaving = false;
+    exact_note(exact);
+    if (exact->plan->form == CONTACT_LINEAR)
+        begin_contact(exact, side);
+    else if (exact->plan->clearance == 0)
+        begin_rest(exact, side);
+    else
+        bounce(exact, side);
+    exact_note(exact);
+}
+
+void exact_release(Exact *exact) {
+    exact_note(exact);
+    // A slope of the wrong sign is rounding: the gap does open.
+    const double sign = exact_sign(exact->side);
+    exact->is_leaving = exact->phase == RESTING;
+    exact->state.r = 0;
+    exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
+    ledger_close(&exact->ledger, exact_time(exact),
+                 exact->phase == RESTING ? NAN : fabs(exact->state.w));
+    const bool is_held = exact->phase == RESTING && exact->plan->clearance == 0;
+    exact->phase = FLIGHT;
+    if (is_held) // between stops without clearance the other one takes over
+        begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
+    exact_note(exact);
+}
+
+// Finds the first event on the arc. In flight `side` is the stop that is reached.
+bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side) {
+    double gap[ROOT_DEGREE + 1] = {0};
+    *side = exact->side;
+    if (exact->phase == RESTING) {
+        // arc.push times the side's sign must stay positive.
+        const double sign = exact_sign(exact->side);
+        for (size_t k = 0; k < arc->degree; k++)
+            gap[k] = sign * arc->push[k];
+        gap[0] = fmax(gap[0], 0);
+        return root_first_crossing(gap, arc->degree - 1, s);
+    }
+    if (exact->phase == CONTACT) {
+        const double sign = exact_sign(exact->side);
+        for (size_t k = 0; k <= arc->degree; k++)
+            gap[k] = sign * arc->r[k];
+        gap[0] = fmax(gap[0], 0);
+        return root_first_crossing(gap, arc->degree, s);
+    }
+    bool is_found = false;
+    if (!exact->plan->has_damper)
+        return false;
+    for (int i = 0; i < 2; i++) {
+        const double sign = exact_sign((Side)i);
+        for (size_t k = 0; k <= arc->degree; k++)
+            gap[k] = -sign * arc->r[k];
+        gap[0] = fmax(gap[0] + exact_room(exact, (Side)i), 0);
+        if (exact->is_leaving && exact->origin == (Origin)i)
+            gap[0] = gap[1] = gap[2] = 0;
+        double at;
+        if (root_first_crossing(gap, arc->degree, &at) && (!is_found || at < *s)) {
+            is_found = true;
+            *s = at;
+            *side = (Side)i;
+        }
+    }
+    return is_found;
+}

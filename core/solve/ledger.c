@@ -1,0 +1,144 @@
+#include "core/solve/ledger.h"
+
+#include <stdlib.h>
+
+// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught
+// elsewhere.
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy) {
+    *ledger = (Ledger){.response = response, .most = most};
+    ledger->energy.initial = energy->kinetic + energy->strain;
+    ledger->largest_energy = ledger->energy.initial;
+}
+
+static void add(Ledger *ledger, const Impact *impact) {
+    Impacts *impacts = &ledger->response->impacts;
+    if (ledger->status != STATUS_OK)
+        return;
+    if (ledger->most > 0 && impacts->count >= ledger->most) {
+        ledger->status = STATUS_LIMIT;
+        return;
+    }
+    if (impacts->count == ledger->room) {
+        const size_t wanted = ledger->room == 0 ? 64 : 2 * ledger->room;
+        Impact *grown = realloc(impacts->at, wanted * sizeof *grown);
+        if (grown == NULL) {
+            ledger->status = STATUS_NO_MEMORY;
+            return;
+        }
+        impacts->at = grown;
+        ledger->room = wanted;
+    }
+    impacts->at[impacts->count++] = *impact;
+}
+
+void ledger_open(Ledger *ledger, ImpactKind kind, double time, Side side, double approach) {
+    ledger->is_open = true;
+    ledger->open = (Impact){.kind = (int)kind,
+                            .start = time,
+                            .end = NAN,
+                            .damper = 1,
+                            .side = (int)side,
+                            .approach_speed = approach,
+                            .separation_speed = NAN,
+                            .restitution = NAN};
+}
+
+void ledger_stretch(Ledger *ledger, double length, double impulse, double lost) {
+    ledger->open.duration += length;
+    ledger->open.impulse += impulse;
+    ledger->open.energy_lost += lost;
+    ledger->energy.contact += lost;
+}
+
+void ledger_force(Ledger *ledger, double magnitude) {
+    Peaks *peaks = &ledger->response->peaks;
+    ledger->open.peak_force = larger(ledger->open.peak_force, magnitude);
+    peaks->contact_force = larger(peaks->contact_force, magnitude);
+}
+
+void ledger_close(Ledger *ledger, double time, double separation) {
+    Impact *open = &ledger->open;
+    open->end = time;
+    open->separation_speed = separation;
+    if (open->approach_speed > 0)
+        open->restitution = separation / open->approach_speed;
+    open->impulse = fabs(open->impulse);
+    add(ledger, open);
+    ledger->is_open = false;
+}
+
+void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
+                   double mass) {
+    const Impact impact = {.kind = IMPACT_IMPACT,
+                           .start = time,
+                           .end = time,
+                           .damper = 1,
+                           .side = (int)side,
+                           .approach_speed = approach,
+                           .separation_speed = separation,
+                           .restitution = approach > 0 ? separation / approach : NAN,
+                           .peak_force = NAN,
+                           .impulse = mass * (approach + separation),
+                           .energy_lost =
+                               0.5 * mass * (approach - separation) * (approach + separation)};
+    ledger->energy.contact += impact.energy_lost;
+    add(ledger, &impact);
+}
+
+void ledger_work(Ledger *ledger, double input, double structural_damping) {
+    ledger->energy.input += input;
+    ledger->energy.structural_damping += structural_damping;
+}
+
+void ledger_balance(Ledger *ledger, const EnergyState *state) {
+    const Energy *energy = &ledger->energy;
+    const double held = state->kinetic + state->strain;
+    const double balance =
+        held - energy->initial - energy->input + energy->structural_damping + energy->contact;
+    ledger->largest_energy = larger(ledger->largest_energy, larger(held, fabs(energy->input)));
+    ledger->largest_balance = larger(ledger->largest_balance, fabs(balance));
+}
+
+void ledger_peaks(Ledger *ledger, const Moment *at) {
+    Peaks *peaks = &ledger->response->peaks;
+    peaks->displacement = larger(peaks->displacement, fabs(at->x));
+    peaks->velocity = larger(peaks->velocity, fabs(at->v));
+    peaks->acceleration = larger(peaks->acceleration, fabs(at->acceleration));
+    peaks->damper_displacement = larger(peaks->damper_displacement, fabs(at->damper_x));
+}
+
+void ledger_acceleration(Ledger *ledger, double acceleration) {
+    Peaks *peaks = &ledger->response->peaks;
+    peaks->acceleration = larger(peaks->acceleration, fabs(acceleration));
+}
+
+Status ledger_status(const Ledger *ledger, Problem *problem) {
+    if (ledger->status == STATUS_LIMIT)
+        return problem_set(problem, STATUS_LIMIT,
+                           "more than %zu impacts; the last one kept was at t = %.6g s",
+                           ledger->most, ledger->response->impacts.at[ledger->most - 1].start);
+    if (ledger->status == STATUS_NO_MEMORY)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for more than %zu impacts",
+                           ledger->response->impacts.count);
+    return STATUS_OK;
+}
+
+Status ledger_finish(Ledger *ledger, const EnergyState *state, Problem *problem) {
+    if (ledger->is_open) {
+        ledger->open.duration = NAN;
+        ledger->open.impulse = fabs(ledger->open.impulse);
+        add(ledger, &ledger->open);
+    }
+    ledger_balance(ledger, state);
+    Energy *energy = &ledger->energy;
+    energy->kinetic = state->kinetic;
+    energy->strain = state->strain;
+    energy->residual =
+        ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
+    ledger->response->energy = *energy;
+    return ledger_status(ledger, problem);
+}

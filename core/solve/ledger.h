@@ -1,0 +1,52 @@
+// The ledgers kept while a run goes on: impacts, energies, peaks.
+// Not the samples: those are record.h's. Used by the solvers.
+#ifndef CORE_SOLVE_LEDGER_H
+#define CORE_SOLVE_LEDGER_H
+
+#include "core/result/response.h"
+#include "core/scene/damper.h"
+
+// What can be seen at one instant.
+typedef struct Moment {
+    double x, v, acceleration; // of the structure; acceleration is absolute
+    double damper_x, damper_v; // relative to the base
+    double penetration, force;
+} Moment;
+
+typedef struct EnergyState {
+    double kinetic, strain; // [J]
+} EnergyState;
+
+typedef struct Ledger {
+    Response *response;
+    size_t room, most;
+    Status status;
+    bool is_open;
+    Impact open;
+    Energy energy;
+    double largest_energy, largest_balance;
+} Ledger;
+
+void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy);
+
+// A contact or rest begins; approach NAN for a rest.
+void ledger_open(Ledger *ledger, ImpactKind kind, double time, Side side, double approach);
+// A stretch of it: its length [s], the integral of N [N s] and the work lost [J].
+void ledger_stretch(Ledger *ledger, double length, double impulse, double lost);
+void ledger_force(Ledger *ledger, double magnitude); // a candidate for the peak [N]
+void ledger_close(Ledger *ledger, double time, double separation);
+// An instantaneous impact of two bodies with effective mass `mass`.
+void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
+                   double mass);
+
+void ledger_work(Ledger *ledger, double input, double structural_damping);
+void ledger_balance(Ledger *ledger, const EnergyState *energy);
+void ledger_peaks(Ledger *ledger, const Moment *at);
+void ledger_acceleration(Ledger *ledger, double acceleration);
+
+// STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept.
+Status ledger_status(const Ledger *ledger, Problem *problem);
+// Lists an open contact, writes the energies into the response.
+Status ledger_finish(Ledger *ledger, const EnergyState *energy, Problem *problem);
+
+#endif

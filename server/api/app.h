@@ -1,0 +1,32 @@
+// What handlers work with: the rooms of the running daemon, and the few facts replies tell about
+// it. Not the rooms' settings. Filled by command/serve.c, used by every handler in api/.
+#ifndef SERVER_API_APP_H
+#define SERVER_API_APP_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "server/http/route.h"
+#include "server/jobs/intake.h"
+#include "server/store/store.h"
+
+struct App {
+    Store *store;
+    Intake *intake;
+    size_t reply_most; // bytes of one answer
+    int64_t started_unix_ms;
+    atomic_bool is_stopping;
+};
+
+extern const char program_version[]; // "0.1.0"
+extern const char program_build[];   // the compiler
+
+// The handlers, by file; routes.c lists them with their patterns.
+Handler jobs_create, jobs_list, jobs_show, jobs_dismiss;
+Handler results_show, results_manifest, results_series, results_psd, results_impacts,
+    results_energy;
+Handler materials_list, materials_show, materials_show_revision;
+Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
+Handler health_live, health_ready, version_show, landing_show;
+
+#endif

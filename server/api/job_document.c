@@ -1,0 +1,79 @@
+#include "server/api/job_document.h"
+
+#include "server/base/clock.h"
+#include "server/codec/write.h"
+
+static void write_time(Bytes *bytes, const char *name, int64_t unix_ms) {
+    char text[32];
+    if (unix_ms > 0)
+        clock_rfc3339(unix_ms, text);
+    bytes_format(bytes, ", \"%s\": ", name);
+    bytes_json_string(bytes, unix_ms > 0 ? text : NULL);
+}
+
+// A member whose value is JSON already.
+static void write_raw(Bytes *bytes, const char *name, const char *json) {
+    bytes_format(bytes, ", \"%s\": ", name);
+    bytes_text(bytes, json != NULL ? json : "null");
+}
+
+static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result) {
+    bytes_format(bytes, ", \"links\": {\"self\": \"/v1/jobs/%s\"", id);
+    if (has_result)
+        bytes_format(bytes,
+                     ", \"result\": \"/v1/results/%s\", \"series\": \"/v1/results/%s/series.json\"",
+                     result, result);
+    bytes_text(bytes, "}");
+}
+
+void job_put(Bytes *bytes, const JobShow *show, int parts) {
+    const bool has_result = show->state == JOB_SUCCESSFUL && show->result[0] != '\0';
+    bytes_text(bytes, "{\"id\": ");
+    bytes_json_string(bytes, show->id);
+    if (show->title != NULL) {
+        bytes_text(bytes, ", \"title\": ");
+        bytes_json_string(bytes, show->title);
+    }
+    bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
+    bytes_real(bytes, show->progress);
+    bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
+    bytes_json_string(bytes, has_result ? show->result : NULL);
+    write_time(bytes, "created", show->created_unix_ms);
+    write_time(bytes, "started", show->started_unix_ms);
+    write_time(bytes, "finished", show->finished_unix_ms);
+    write_raw(bytes, "problem", show->problem);
+    if (parts & JOB_PUT_WHOLE) {
+        write_raw(bytes, "plan", show->plan);
+        write_raw(bytes, "summary", show->summary);
+        write_raw(bytes, "warnings", show->warnings != NULL ? show->warnings : "[]");
+    }
+    bytes_text(bytes, ", \"timing\": {\"queued\": ");
+    bytes_real(bytes, show->queued);
+    bytes_text(bytes, ", \"run\": ");
+    bytes_real(bytes, show->run);
+    bytes_text(bytes, ", \"total\": ");
+    bytes_real(bytes, show->total);
+    bytes_text(bytes, "}");
+    if (parts & JOB_PUT_LINKS)
+        write_links(bytes, show->id, show->result, has_result);
+    else
+        bytes_text(bytes, ", \"links\": {}");
+    bytes_text(bytes, "}");
+}
+
+void job_put_dry_run(Bytes *bytes, const DryRun *run) {
+    bytes_text(bytes, "{\"dry_run\": true, \"scene\": ");
+    write_item(bytes, simulation_fields, &run->simulation, WRITE_SCENE);
+    bytes_format(bytes, ", \"result\": \"%s\", \"cached\": %s, \"plan\": ", run->result,
+                 run->is_cached ? "true" : "false");
+    write_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);
+    bytes_format(bytes, ", \"samples\": %zu, \"cost\": {\"cpu_seconds\": ",
+                 scene_sample_count(&run->simulation.scene));
+    bytes_real(bytes, run->cpu_seconds);
+    bytes_text(bytes, ", \"bytes\": ");
+    bytes_real(bytes, run->cost.bytes);
+    bytes_text(bytes, "}, \"warnings\": ");
+    write_list(bytes, warning_fields, run->warnings.at, run->warnings.count,
+               sizeof *run->warnings.at, WRITE_REPORT);
+    bytes_text(bytes, "}");
+}

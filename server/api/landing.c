@@ -1,0 +1,113 @@
+// GET /: how to begin, as lines that can be pasted into a shell as they are. Plain text for curl,
+// the same page as HTML for browsers.
+#include <stdio.h>
+#include <string.h>
+
+#include "server/api/app.h"
+#include "server/http/header.h"
+#include "server/http/reply.h"
+
+#define SCENE                                                                                      \
+    "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \
+    "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}], "            \
+    "\"excitation\": {\"kind\": \"free\", \"displacement\": 0.015}, \"duration\": 10, "            \
+    "\"sample_rate\": 1000}"
+
+typedef struct Step {
+    const char *what;
+    const char *line; // each @ is the server's URL
+} Step;
+
+static const Step steps[] = {
+    {"Simulate the paper's sponge damper, released from 15 mm:",
+     "curl -s --json '" SCENE "' @/v1/jobs"},
+    {"Keep the id of its result:",
+     "R=$(curl -s @/v1/examples/paper_free_sponge | curl -s -H 'Prefer: "
+     "wait=30' --json @- @/v1/jobs | grep -o '\"result\": "
+     "\"r-[0-9a-f]*' | cut -d'\"' -f4)"},
+    {"The impacts, the time series, the spectrum:", "curl -s @/v1/results/$R/impacts.json"},
+    {NULL, "curl -s \"@/v1/results/$R/series.csv?channels=displacement&to=0.1\""},
+    {NULL, "curl -s -O @/v1/results/$R/series.npy"},
+    {NULL, "curl -s @/v1/results/$R/psd.json"},
+    {"Check a scene and see its plan without running it:",
+     "curl -s @/v1/examples/paper_free_sponge | curl -s --json @- '@/v1/jobs?dry_run=1'"},
+    {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
+    {NULL, "curl -s @/v1/materials"},
+    {NULL, "curl -s @/v1/examples"},
+    {NULL, "curl -s @/schemas/scene"},
+    {NULL, "curl -s @/openapi.json"},
+};
+
+// "@-" is curl's standard input; every other @ stands for the URL.
+static void write_line(Bytes *bytes, const char *line, const char *url) {
+    for (; *line != '\0'; line++) {
+        if (*line == '@' && line[1] == '/')
+            bytes_text(bytes, url);
+        else
+            bytes_put(bytes, line, 1);
+    }
+}
+
+static void write_text(Bytes *bytes, const char *url) {
+    bytes_format(bytes, "impactd %s: simulations of impact dampers over HTTP and JSON\n",
+                 program_version);
+    for (size_t i = 0; i < COUNT(steps); i++) {
+        if (steps[i].what != NULL)
+            bytes_format(bytes, "\n# %s\n", steps[i].what);
+        write_line(bytes, steps[i].line, url);
+        bytes_text(bytes, "\n");
+    }
+}
+
+static void write_escaped(Bytes *bytes, const char *text) {
+    for (; *text != '\0'; text++) {
+        switch (*text) {
+        case '&':
+            bytes_text(bytes, "&amp;");
+            break;
+        case '<':
+            bytes_text(bytes, "&lt;");
+            break;
+        case '>':
+            bytes_text(bytes, "&gt;");
+            break;
+        case '"':
+            bytes_text(bytes, "&quot;");
+            break;
+        default:
+            bytes_put(bytes, text, 1);
+        }
+    }
+}
+
+static void write_html(Bytes *bytes, const char *text) {
+    static const char *const links[] = {"/v1/jobs", "/v1/materials", "/v1/examples",
+                                        "/schemas", "/openapi.json", "/health/ready",
+                                        "/version"};
+    bytes_text(bytes,
+               "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
+               "<meta name=\"viewport\" content=\"width=device-width\">\n<title>impactd</title>\n"
+               "<h1>impactd</h1>\n<p>");
+    for (size_t i = 0; i < COUNT(links); i++)
+        bytes_format(bytes, "<a href=\"%s\">%s</a>\n", links[i], links[i]);
+    bytes_text(bytes, "</p>\n<pre>");
+    write_escaped(bytes, text);
+    bytes_text(bytes, "</pre>\n</html>\n");
+}
+
+Status landing_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    static const char *const types[] = {"text/plain", "text/html", NULL};
+    char url[96];
+    // The gate lets through no Host but ours, so it can stand in a line for the shell.
+    snprintf(url, sizeof url, "http://%.80s", request->host);
+    Bytes text = {.most = 1 << 16};
+    write_text(&text, url);
+    reply->varies_by_accept = true;
+    if (header_accept(request->accept, types) != 1)
+        return reply_bytes(reply, 200, "text/plain; charset=utf-8", &text, problem);
+    Bytes page = {.most = 1 << 18};
+    write_html(&page, text.at != NULL ? text.at : "");
+    bytes_clear(&text);
+    return reply_bytes(reply, 200, "text/html; charset=utf-8", &page, problem);
+}

@@ -1,0 +1,241 @@
+// Results as documents: the summary, the manifest, and what was saved as JSON when the result was
+// made. Numbers in columns are series.c's.
+#include "server/api/results.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/api/app.h"
+#include "server/base/clock.h"
+#include "server/codec/read.h"
+#include "server/codec/write.h"
+#include "server/http/reply.h"
+
+// --- one result
+// ---------------------------------------------------------------------------------------------
+
+// The scene as it was run, read back from its canonical JSON. Cleared by simulation_clear in any
+// case.
+static Status read_scene(const ResultRow *row, Simulation *simulation, Problem *problem) {
+    Problem *fault = malloc(sizeof *fault);
+    if (fault == NULL || row->scene == NULL) {
+        free(fault);
+        memset(simulation, 0, sizeof *simulation);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's scene");
+    }
+    problem_clear(fault);
+    const Status status =
+        read_json(row->scene, strlen(row->scene), simulation_fields, simulation, fault);
+    // A fault here is ours, not the client's.
+    if (status != STATUS_OK)
+        problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
+    free(fault);
+    return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
+}
+
+// Of "displacement" as of "displacement_2".
+static const char *channel_unit(const char *name) {
+    for (size_t i = 0; i < CHANNEL_COUNT; i++) {
+        const size_t size = strlen(channels[i].name);
+        if (strncmp(name, channels[i].name, size) != 0)
+            continue;
+        const char *rest = name + size;
+        if (*rest == '\0' || (*rest == '_' && rest[1 + strspn(rest + 1, "0123456789")] == '\0'))
+            return channels[i].unit;
+    }
+    return NULL;
+}
+
+static void write_units(Bytes *bytes, const Simulation *simulation) {
+    bytes_text(bytes, "{");
+    const char *separator = "";
+    for (const Field *field = summary_fields; field->kind != FIELD_KIND_END; field++) {
+        if (field->unit == NULL)
+            continue;
+        bytes_format(bytes, "%s\"%s\": ", separator, field->name);
+        bytes_json_string(bytes, field->unit);
+        separator = ", ";
+    }
+    for (size_t i = 0; i < simulation->output.channels.count; i++) {
+        bytes_text(bytes, separator);
+        bytes_json_string(bytes, simulation->output.channels.at[i]);
+        bytes_text(bytes, ": ");
+        bytes_json_string(bytes, channel_unit(simulation->output.channels.at[i]));
+        separator = ", ";
+    }
+    bytes_text(bytes, "}");
+}
+
+static void write_links(Bytes *bytes, const char *id) {
+    static const char *const ways[] = {"manifest", "series.json",  "series.csv", "series.npy",
+                                       "psd.json", "impacts.json", "energy.json"};
+    bytes_format(bytes, "{\"self\": \"/v1/results/%s\"", id);
+    for (size_t i = 0; i < COUNT(ways); i++) {
+        // "series" is the JSON one; the other formats are named in full.
+        const size_t size =
+            strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
+        bytes_format(bytes, ", \"%.*s\": \"/v1/results/%s/%s\"", (int)size, ways[i], id, ways[i]);
+    }
+    bytes_text(bytes, "}");
+}
+
+static const char *json_or(const char *json, const char *otherwise) {
+    return json != NULL ? json : otherwise;
+}
+
+static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *simulation) {
+    bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
+    bytes_json_string(bytes, row->engine);
+    bytes_text(bytes, ", \"scene\": ");
+    bytes_text(bytes, json_or(row->scene, "null"));
+    bytes_text(bytes, ", \"plan\": ");
+    bytes_text(bytes, json_or(row->plan, "null"));
+    bytes_text(bytes, ", \"summary\": ");
+    bytes_text(bytes, json_or(row->summary, "null"));
+    bytes_text(bytes, ", \"units\": ");
+    write_units(bytes, simulation);
+    bytes_text(bytes, ", \"channels\": [");
+    for (size_t i = 0; i < simulation->output.channels.count; i++) {
+        bytes_text(bytes, i > 0 ? ", " : "");
+        bytes_json_string(bytes, simulation->output.channels.at[i]);
+    }
+    bytes_text(bytes, "], \"sample_rate\": ");
+    bytes_real(bytes, row->sample_rate);
+    bytes_format(bytes,
+                 ", \"count\": %llu, \"warnings\": %s, \"links\": ", (unsigned long long)row->count,
+                 json_or(row->warnings, "[]"));
+    write_links(bytes, row->id);
+    bytes_text(bytes, "}\n");
+}
+
+Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    ResultRow row = {0};
+    Simulation simulation = {0};
+    Bytes bytes = {.most = app->reply_most};
+    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
+        status = read_scene(&row, &simulation, problem);
+        if (status == STATUS_OK) {
+            write_result(&bytes, &row, &simulation);
+            status = reply_bytes(reply, 200, type_json, &bytes, problem);
+        }
+        simulation_clear(&simulation);
+    }
+    result_row_clear(&row);
+    return status;
+}
+
+// --- the manifest
+// -------------------------------------------------------------------------------------------
+
+static void write_used(App *app, Bytes *bytes, const char *name, bool is_first) {
+    char slug[64];
+    unsigned long long revision = 0;
+    const size_t size = strcspn(name, "@");
+    MaterialRevision material = {0};
+    if (name[size] == '@')
+        revision = strtoull(name + size + 1, NULL, 10);
+    bytes_text(bytes, is_first ? "" : ", ");
+    if (size < sizeof slug) {
+        memcpy(slug, name, size);
+        slug[size] = '\0';
+        if (store_material(app->store, slug, revision, &material, NULL) == STATUS_OK) {
+            write_item(bytes, material_fields, &material, WRITE_REPORT);
+            fields_clear(material_fields, &material);
+            return;
+        }
+        fields_clear(material_fields, &material);
+    }
+    bytes_text(bytes, "{\"slug\": "); // no longer here: its numbers stand in the scene
+    bytes_json_string(bytes, name);
+    bytes_text(bytes, "}");
+}
+
+static void write_materials(App *app, Bytes *bytes, const Simulation *simulation) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    const char *seen[64];
+    size_t count = 0;
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < 2 * dampers->count; i++) {
+        const Buffer *buffer =
+            damper_buffer(&dampers->at[i / 2], i % 2 == 0 ? SIDE_LEFT : SIDE_RIGHT);
+        if (buffer == NULL || buffer->material == NULL)
+            continue;
+        size_t at = 0;
+        while (at < count && strcmp(seen[at], buffer->material) != 0)
+            at++;
+        if (at < count || count == COUNT(seen))
+            continue;
+        write_used(app, bytes, buffer->material, count == 0);
+        seen[count++] = buffer->material;
+    }
+    bytes_text(bytes, "]");
+}
+
+Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
+    ResultRow row = {0};
+    Simulation simulation = {0};
+    Bytes bytes = {.most = app->reply_most};
+    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK)
+        status = read_scene(&row, &simulation, problem);
+    if (status == STATUS_OK) {
+        char created[32];
+        clock_rfc3339(row.created_unix_ms, created);
+        bytes_format(&bytes, "{\"id\": \"%s\", \"engine\": ", row.id);
+        bytes_json_string(&bytes, row.engine);
+        bytes_format(&bytes,
+                     ", \"created\": \"%s\", \"program\": {\"name\": \"impactd\", \"version\": "
+                     "\"%s\", \"build\": ",
+                     created, program_version);
+        bytes_json_string(&bytes, program_build);
+        bytes_text(&bytes, "}, \"scene\": ");
+        bytes_text(&bytes, json_or(row.scene, "null"));
+        bytes_text(&bytes, ", \"materials\": ");
+        write_materials(app, &bytes, &simulation);
+        bytes_text(&bytes,
+                   ", \"again\": {\"method\": \"POST\", \"path\": \"/v1/jobs\", \"content_type\": "
+                   "\"application/json\", \"body\": \"the member scene of this document\", "
+                   "\"why\": \"the same "
+                   "scene and engine give the same id and the same bytes\"}}\n");
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    simulation_clear(&simulation);
+    result_row_clear(&row);
+    return status;
+}
+
+// --- documents
+// ----------------------------------------------------------------------------------------------
+
+Status results_document(App *app, const Request *request, Reply *reply, Document document,
+                        Problem *problem) {
+    static const char *const names[] = {"psd", "impacts", "energy"};
+    ResultRow row = {0};
+    const Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status != STATUS_OK) {
+        result_row_clear(&row);
+        return status;
+    }
+    char tag[104];
+    snprintf(tag, sizeof tag, "%.72s-%s.json", row.id, names[document]);
+    const char *const texts[] = {row.psd, row.impacts, row.energy};
+    const char *text = texts[document];
+    Status answered = STATUS_OK;
+    if (text == NULL || strcmp(text, "null") == 0) {
+        answered =
+            problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no %s", names[document]);
+    } else if (!reply_immutable(reply, request, tag)) {
+        Bytes bytes = {.most = app->reply_most};
+        bytes_text(&bytes, text);
+        bytes_text(&bytes, "\n");
+        answered = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    result_row_clear(&row);
+    return answered;
+}
+
+Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_document(app, request, reply, DOCUMENT_ENERGY, problem);
+}

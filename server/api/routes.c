@@ -1,0 +1,41 @@
+// All endpoints, in the order in which they are tried: of two patterns that fit one path the more
+// literal stands first.
+#include "server/api/app.h"
+
+static const char *const of_submit[] = {"dry_run", NULL};
+static const char *const of_jobs[] = {"limit", "before", NULL};
+static const char *const of_job[] = {"wait", NULL};
+static const char *const of_series[] = {"channels", "from", "to", NULL};
+static const char *const of_materials[] = {"q", NULL};
+
+// clang-format off
+const Route routes[] = {
+    {"POST",   "/v1/jobs",                              "submit", of_submit,    "Submit a scene; ?dry_run=1 only checks and plans it", jobs_create},
+    {"GET",    "/v1/jobs",                              "read",   of_jobs,      "Jobs, newest first", jobs_list},
+    {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show},
+    {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss},
+    {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
+    {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
+    {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv or npy", results_series},
+    {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
+    {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv or npy", results_psd},
+    {"GET",    "/v1/results/{id}/psd",                  "read",   NULL,         "Power spectral densities, format by Accept", results_psd},
+    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json or csv", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts",              "read",   NULL,         "The ledger of impacts, format by Accept", results_impacts},
+    {"GET",    "/v1/results/{id}/energy.json",          "read",   NULL,         "The energy ledger", results_energy},
+    {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger", results_energy},
+    {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
+    {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
+    {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
+    {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
+    {"GET",    "/v1/examples/{name}",                   "read",   NULL,         "One of them, ready to submit", examples_show},
+    {"GET",    "/schemas",                              "read",   NULL,         "JSON Schemas, by name", schemas_list},
+    {"GET",    "/schemas/{name}",                       "read",   NULL,         "A JSON Schema", schemas_show},
+    {"GET",    "/openapi.json",                         "read",   NULL,         "This API as OpenAPI 3.1", openapi_show},
+    {"GET",    "/health/live",                          "read",   NULL,         "The daemon answers", health_live},
+    {"GET",    "/health/ready",                         "read",   NULL,         "The daemon takes jobs; 503 otherwise", health_ready},
+    {"GET",    "/version",                              "read",   NULL,         "Program, engine and build", version_show},
+    {"GET",    "/",                                     "read",   NULL,         "How to begin: curl lines", landing_show},
+    {NULL, NULL, NULL, NULL, NULL, NULL},
+};
+// clang-format on

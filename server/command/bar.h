@@ -1,0 +1,21 @@
+// A progress bar on a terminal: appears when the work takes long, goes when it ends.
+// Draws nothing where stderr is a file. Used by run.c.
+#ifndef SERVER_COMMAND_BAR_H
+#define SERVER_COMMAND_BAR_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/base/watch.h"
+
+typedef struct Bar {
+    bool is_terminal, is_drawn;
+    int64_t began_ns, drawn_ns;
+} Bar;
+
+void bar_start(Bar *bar);
+// A Watch that draws; it never asks to stop. Borrows `bar`.
+Watch bar_watch(Bar *bar);
+void bar_stop(Bar *bar);
+
+#endif

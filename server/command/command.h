@@ -1,0 +1,44 @@
+// What ONE subcommand of impactd is; commands.c lists all. A command reads its arguments, asks one
+// room, answers. Used by main.c and command/.
+#ifndef SERVER_COMMAND_COMMAND_H
+#define SERVER_COMMAND_COMMAND_H
+
+#include "core/base/field.h"
+
+// Exit codes of the program.
+typedef enum CommandExit {
+    COMMAND_OK = 0,
+    COMMAND_FAILED = 1, // the job failed
+    COMMAND_USAGE = 2,
+    COMMAND_BAD_SCENE = 3,
+    COMMAND_NOT_FOUND = 4,
+    COMMAND_NOT_ALLOWED = 5,
+    COMMAND_UNREACHABLE = 7,
+    COMMAND_TIMED_OUT = 8, // while the job goes on
+    COMMAND_INTERRUPTED = 130,
+} CommandExit;
+
+typedef struct Command {
+    const char *name;
+    const char *operands; // as help shows them: "SCENE.json"; NULL: takes none
+    const char *summary;  // one line
+    const char *help;     // examples and what else one should know; whole lines
+    const Field *options; // rows for help; NULL: none
+    // argv[0] is the first argument behind the command's name. Returns the exit code.
+    int (*run)(int argc, char *const *argv);
+} Command;
+
+extern const Command *const commands[];        // NULL-terminated
+const Command *command_find(const char *name); // NULL if there is none
+
+// The whole program: finds the command, answers --help, runs it. Returns the exit code.
+int command_main(int argc, char *const *argv);
+
+// Usage faults on stderr, "impactd run: --outpt is no option (did you mean --output?)"; returns
+// COMMAND_USAGE.
+int command_refuse(const char *name, const Problem *problem);
+
+// What a Status means to a shell.
+int command_exit(Status status);
+
+#endif

@@ -1,0 +1,175 @@
+// The list of subcommands, --help and version.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/simulation.h"
+#include "server/command/check.h"
+#include "server/command/command.h"
+#include "server/command/run.h"
+#include "server/command/serve.h"
+#include "server/options.h"
+
+static int help_run(int argc, char *const *argv);
+static int version_run(int argc, char *const *argv);
+
+static const Command command_help = {
+    .name = "help",
+    .operands = "[COMMAND]",
+    .summary = "tell more about a command",
+    .help = "  impactd help run\n",
+    .run = help_run,
+};
+static const Command command_version = {
+    .name = "version",
+    .summary = "print the engine's name and version",
+    .help = "  impactd version\n",
+    .run = version_run,
+};
+
+const Command *const commands[] = {
+    &command_serve, &command_run, &command_check, &command_help, &command_version, NULL,
+};
+
+static const char overview[] =
+    "impactd simulates structures with impact dampers.\n"
+    "\n"
+    "  impactd serve                        start the daemon on http://127.0.0.1:8080\n"
+    "  impactd run scene.json               run one scene here and print the finished job\n"
+    "  impactd run scene.json -o out.csv    write its time series (json, csv, npy)\n"
+    "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
+    "\n"
+    "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"
+    "\n"
+    "  {\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},\n"
+    "   \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],\n"
+    "   \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},\n"
+    "   \"duration\": 10, \"sample_rate\": 1000}\n"
+    "\n";
+
+static const char exits[] =
+    "\n"
+    "impactd help COMMAND tells more. Exit codes: 0 ok, 1 the job failed, 2 usage, 3 bad scene,\n"
+    "4 not found, 5 not allowed, 7 server unreachable, 8 timed out while the job goes on, 130 "
+    "interrupted.\n";
+
+const Command *command_find(const char *name) {
+    for (size_t i = 0; commands[i] != NULL; i++)
+        if (strcmp(commands[i]->name, name) == 0)
+            return commands[i];
+    return NULL;
+}
+
+static void overview_print(FILE *file) {
+    fputs(overview, file);
+    for (size_t i = 0; commands[i] != NULL; i++)
+        fprintf(file, "  %-9s %s\n", commands[i]->name, commands[i]->summary);
+    fputs(exits, file);
+}
+
+static void command_print(const Command *command) {
+    printf("impactd %s%s%s: %s\n\n", command->name, command->operands != NULL ? " " : "",
+           command->operands != NULL ? command->operands : "", command->summary);
+    fputs(command->help, stdout);
+    if (command->options != NULL) {
+        putchar('\n');
+        options_help(command->options, stdout);
+    }
+}
+
+static int unknown_refuse(const char *name) {
+    const char *names[COUNT(commands)];
+    for (size_t i = 0; i < COUNT(commands); i++)
+        names[i] = commands[i] == NULL ? NULL : commands[i]->name;
+    const char *near = texts_nearest(names, name);
+    fprintf(stderr, "impactd: %s is no command", name);
+    if (near != NULL)
+        fprintf(stderr, " (did you mean %s?)", near);
+    fputs("; impactd --help lists them\n", stderr);
+    return COMMAND_USAGE;
+}
+
+static int help_run(int argc, char *const *argv) {
+    if (argc == 0) {
+        overview_print(stdout);
+        return COMMAND_OK;
+    }
+    const Command *command = command_find(argv[0]);
+    if (command == NULL)
+        return unknown_refuse(argv[0]);
+    command_print(command);
+    return COMMAND_OK;
+}
+
+static int version_run(int argc, char *const *argv) {
+    if (argc > 0) {
+        fprintf(stderr, "impactd version: takes no arguments, is given %s\n", argv[0]);
+        return COMMAND_USAGE;
+    }
+    printf("%s\n", engine_version);
+    return COMMAND_OK;
+}
+
+int command_refuse(const char *name, const Problem *problem) {
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        const Fault *fault = &problem->faults[i];
+        fprintf(stderr, "impactd %s: %s %s", name, fault->pointer, fault->detail);
+        if (fault->did_you_mean[0] != '\0')
+            fprintf(stderr, " (did you mean %s?)", fault->did_you_mean);
+        fputc('\n', stderr);
+    }
+    if (problem->count == 0)
+        fprintf(stderr, "impactd %s: %s\n", name, problem->detail);
+    fprintf(stderr, "impactd help %s shows what it takes\n", name);
+    return COMMAND_USAGE;
+}
+
+int command_exit(Status status) {
+    switch (status) {
+    case STATUS_OK:
+        return COMMAND_OK;
+    case STATUS_UNREADABLE:
+    case STATUS_INVALID:
+    case STATUS_TOO_LARGE:
+        return COMMAND_BAD_SCENE;
+    case STATUS_USAGE:
+        return COMMAND_USAGE;
+    case STATUS_NOT_FOUND:
+        return COMMAND_NOT_FOUND;
+    case STATUS_UNAUTHORIZED:
+    case STATUS_FORBIDDEN:
+        return COMMAND_NOT_ALLOWED;
+    case STATUS_TIMEOUT:
+        return COMMAND_TIMED_OUT;
+    case STATUS_CANCELLED:
+        return COMMAND_INTERRUPTED;
+    default:
+        return COMMAND_FAILED;
+    }
+}
+
+int command_main(int argc, char *const *argv) {
+    if (argc < 2) {
+        overview_print(stderr);
+        return COMMAND_USAGE;
+    }
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)
+        return help_run(0, NULL);
+    if (strcmp(argv[1], "--version") == 0)
+        return version_run(0, NULL);
+    const Command *command = command_find(argv[1]);
+    if (command == NULL)
+        return unknown_refuse(argv[1]);
+    for (int i = 2; i < argc && strcmp(argv[i], "--") != 0; i++)
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
+            command_print(command);
+            return COMMAND_OK;
+        }
+    const int code = command->run(argc - 2, argv + 2);
+    // What was printed must have arrived: a full disk or a closed pipe is a failure.
+    if (fflush(stdout) != 0 && code == COMMAND_OK) {
+        fputs("impactd: standard output cannot be written\n", stderr);
+        return COMMAND_FAILED;
+    }
+    return code;
+}

@@ -1,0 +1,225 @@
+// impactd run SCENE.json: what the daemon does with a job, without the daemon. The scene is judged
+// and completed as there, so that equal scenes have equal results by number and by id.
+#include "server/command/run.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/simulation.h"
+#include "server/api/job_document.h"
+#include "server/base/clock.h"
+#include "server/command/bar.h"
+#include "server/command/output.h"
+#include "server/command/scene_file.h"
+#include "server/encode/encoder.h"
+#include "server/jobs/documents.h"
+#include "server/jobs/intake.h"
+#include "server/options.h"
+
+typedef struct RunSettings {
+    char *output;
+} RunSettings;
+
+static const Field run_fields[] = {
+    FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
+               "write to this file; its extension says what"),
+    FIELD_END,
+};
+
+static const SimulationLimits limits = {.samples = SCENE_FILE_SAMPLES,
+                                        .impacts = SCENE_FILE_IMPACTS};
+
+// The series as the encoders take it. The caller frees *chosen.
+static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes) {
+    const Column **chosen = calloc(response->series.count + 1, sizeof *chosen);
+    if (chosen == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < response->series.count; i++)
+        chosen[i] = &response->series.at[i];
+    const Table table = {.axis_name = "time",
+                         .axis_unit = "s",
+                         .axis_rate = response->sample_rate,
+                         .count = response->count,
+                         .columns = chosen,
+                         .column_count = response->series.count};
+    encoder->write(&table, bytes);
+    free(chosen);
+    return STATUS_OK;
+}
+
+// {job, series, impacts, psd}, each as the daemon answers it.
+static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes) {
+    bytes_text(bytes, "{\"job\": ");
+    bytes_put(bytes, job->at, job->count);
+    bytes_text(bytes, ",\n\"series\": ");
+    TRY(series_write(&outcome->response, encoder_find("json"), bytes));
+    bytes_text(bytes, ",\n\"impacts\": ");
+    document_impacts(bytes, &outcome->response.impacts);
+    bytes_text(bytes, ",\n\"psd\": ");
+    document_psd(bytes, &outcome->spectrum);
+    bytes_text(bytes, "}\n");
+    return STATUS_OK;
+}
+
+// A job of nobody's queue, finished.
+static Status job_write(const Simulation *simulation, const Warnings *warnings,
+                        const Outcome *outcome, const int64_t began_unix_ms, double took,
+                        Bytes *bytes) {
+    Bytes plan = {0}, summary = {0}, told = {0};
+    document_plan(&plan, &outcome->plan);
+    document_summary(&summary, &outcome->summary);
+    document_warnings(&told, warnings);
+    JobShow show = {.id = "j-local",
+                    .state = JOB_SUCCESSFUL,
+                    .progress = 100,
+                    .created_unix_ms = began_unix_ms,
+                    .started_unix_ms = began_unix_ms,
+                    .finished_unix_ms = clock_unix_ms(),
+                    .run = took,
+                    .total = took,
+                    .plan = plan.at,
+                    .summary = summary.at,
+                    .warnings = told.at,
+                    .title = simulation->title};
+    intake_result_id(simulation, show.result);
+    const bool is_failed = plan.is_failed || summary.is_failed || told.is_failed;
+    if (!is_failed)
+        job_put(bytes, &show, JOB_PUT_WHOLE);
+    bytes_clear(&plan);
+    bytes_clear(&summary);
+    bytes_clear(&told);
+    return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
+}
+
+// Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
+static Status scene_run(const Simulation *simulation, const Warnings *warnings, const char *output,
+                        const Encoder *encoder, Problem *problem) {
+    Outcome *outcome = NULL;
+    Bytes job = {0}, bytes = {0};
+    Bar bar;
+    const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
+    bar_start(&bar);
+    const Watch watch = bar_watch(&bar);
+    Status status = simulation_run(simulation, &limits, &watch, &outcome, problem);
+    bar_stop(&bar);
+    const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
+    if (status == STATUS_OK)
+        status = job_write(simulation, warnings, outcome, began_unix_ms, took, &job);
+    if (status == STATUS_OK && output == NULL) {
+        bytes_text(&job, "\n");
+        (void)fwrite(job.at, 1, job.count, stdout);
+    } else if (status == STATUS_OK) {
+        status = strcmp(encoder->extension, "json") == 0
+                     ? whole_write(outcome, &job, &bytes)
+                     : series_write(&outcome->response, encoder, &bytes);
+        if (status == STATUS_OK && bytes.is_failed)
+            status = STATUS_NO_MEMORY;
+        if (status == STATUS_OK)
+            status = output_write(bytes.at, bytes.count, problem);
+        if (status == STATUS_OK)
+            status = output_close(problem);
+    }
+    if (status == STATUS_NO_MEMORY)
+        (void)problem_set(problem, status, "no memory for the answer");
+    bytes_clear(&job);
+    bytes_clear(&bytes);
+    outcome_drop(outcome);
+    return status;
+}
+
+static Status scene_prepare_and_run(const char *path, const Bytes *text, const char *output,
+                                    const Encoder *encoder, Problem *problem) {
+    Store *store = NULL;
+    Simulation simulation = {0};
+    Warnings warnings = {0};
+    TRY(store_open(NULL, &store, problem));
+    Status status =
+        intake_prepare(store, text->at, text->count, &limits, &simulation, &warnings, problem);
+    store_close(store);
+    if (status == STATUS_OK) {
+        scene_file_warn(path, &warnings);
+        // Before the run, so that a wrong folder is told now and not after it.
+        if (output != NULL)
+            status = output_open(output, problem);
+        if (status == STATUS_OK)
+            status = scene_run(&simulation, &warnings, output, encoder, problem);
+        output_drop();
+    }
+    simulation_clear(&simulation);
+    warnings_clear(&warnings);
+    return status;
+}
+
+// The encoder by the output's extension, NULL where there is no output.
+static Status encoder_choose(const char *output, const Encoder **encoder, Problem *problem) {
+    *encoder = NULL;
+    if (output == NULL)
+        return STATUS_OK;
+    const char *file = strrchr(output, '/') != NULL ? strrchr(output, '/') + 1 : output;
+    const char *dot = strrchr(file, '.');
+    if (dot != NULL)
+        *encoder = encoder_find(dot + 1);
+    if (*encoder != NULL)
+        return STATUS_OK;
+    char known[128] = "";
+    for (size_t i = 0, used = 0; encoders[i] != NULL && used < sizeof known; i++)
+        used += (size_t)snprintf(known + used, sizeof known - used, "%s.%s", i > 0 ? ", " : "",
+                                 encoders[i]->extension);
+    return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known,
+                       output);
+}
+
+static int run(const RunSettings *settings, const Options *options, Problem *problem) {
+    const Encoder *encoder = NULL;
+    Status status = encoder_choose(settings->output, &encoder, problem);
+    if (status == STATUS_OK && options->operand_count != 1)
+        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
+                             options->operand_count);
+    if (status != STATUS_OK)
+        return command_refuse("run", problem);
+    const char *path = options->operands[0];
+    Bytes text;
+    output_guard();
+    status = scene_file_read(path, &text, problem);
+    if (status == STATUS_OK)
+        status = scene_prepare_and_run(path, &text, settings->output, encoder, problem);
+    bytes_clear(&text);
+    if (status != STATUS_OK)
+        scene_file_refuse(path, problem);
+    return command_exit(status);
+}
+
+static int run_run(int argc, char *const *argv) {
+    RunSettings settings;
+    Options options;
+    Problem *problem = calloc(1, sizeof *problem);
+    if (problem == NULL || fields_default(run_fields, &settings) != STATUS_OK) {
+        free(problem);
+        return command_exit(STATUS_NO_MEMORY);
+    }
+    const int code =
+        options_read(run_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
+            ? run(&settings, &options, problem)
+            : command_refuse("run", problem);
+    fields_clear(run_fields, &settings);
+    free(problem);
+    return code;
+}
+
+const Command command_run = {
+    .name = "run",
+    .operands = "SCENE.json",
+    .summary = "run one scene here, without a daemon",
+    .help =
+        "  impactd run scene.json                 print the finished job\n"
+        "  impactd run scene.json -o out.csv      write the time series, as a table\n"
+        "  impactd run scene.json -o out.npy      the same for numpy.load\n"
+        "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
+        "  impactd run - < scene.json             from standard input\n"
+        "\n"
+        "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
+        "Exit code 3 if the scene has faults, 1 if the run failed.\n",
+    .options = run_fields,
+    .run = run_run,
+};

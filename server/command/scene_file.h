@@ -1,0 +1,18 @@
+// A scene given on the command line: its text, and what a person is told about its faults.
+// Judges nothing itself. Used by run.c and check.c.
+#ifndef SERVER_COMMAND_SCENE_FILE_H
+#define SERVER_COMMAND_SCENE_FILE_H
+
+#include "core/plan/plan.h"
+#include "server/base/bytes.h"
+
+enum { SCENE_FILE_BYTES = 16 << 20, SCENE_FILE_SAMPLES = 1 << 25, SCENE_FILE_IMPACTS = 10000000 };
+
+// Reads the file, or standard input for "-". Cleared by bytes_clear in any case.
+Status scene_file_read(const char *path, Bytes *text, Problem *problem);
+
+// One line on stderr per fault: "scene.json: /structure/mass: must be above 0 kg, is -1".
+void scene_file_refuse(const char *path, const Problem *problem);
+void scene_file_warn(const char *path, const Warnings *warnings);
+
+#endif

@@ -1,0 +1,17 @@
+// From a Request to a Reply: find the route, check what all routes have in common, call the
+// handler, turn its fault into a problem document. Not the gate (gate.h), not sockets (listener.h).
+// Used by command/serve.c, as the listener's answerer, and by tests without sockets.
+#ifndef SERVER_HTTP_DISPATCH_H
+#define SERVER_HTTP_DISPATCH_H
+
+#include "server/http/route.h"
+
+typedef struct Dispatcher {
+    App *app;
+    const Route *table;
+} Dispatcher;
+
+// Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.
+void dispatch(void *context, Request *request, Reply *reply);
+
+#endif

@@ -1,0 +1,158 @@
+// The refusals, in the order in which they are judged. libmicrohttpd 0.9.75 accepts all of these
+// heads by itself; what it does not show us is a NUL in the request line and how a header's line
+// ended.
+#include "server/http/gate.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "server/http/request.h"
+
+static const char *const known_methods[] = {"GET",    "HEAD",    "POST", "PUT",
+                                            "DELETE", "OPTIONS", "PATCH"};
+
+bool gate_host_is_ours(const char *host, size_t size) {
+    static const char *const ours[] = {"localhost", "127.0.0.1", "[::1]"};
+    for (size_t i = 0; i < COUNT(ours); i++) {
+        const size_t length = strlen(ours[i]);
+        if (size < length || strncasecmp(host, ours[i], length) != 0)
+            continue;
+        if (size == length)
+            return true;
+        if (host[length] != ':' || size - length - 1 > 5)
+            continue;
+        size_t digits = 0;
+        while (length + 1 + digits < size && host[length + 1 + digits] >= '0' &&
+               host[length + 1 + digits] <= '9')
+            digits++;
+        if (length + 1 + digits == size)
+            return true;
+    }
+    return false;
+}
+
+static bool is_name(const char *name, size_t size, const char *text) {
+    return size == strlen(text) && strncasecmp(name, text, size) == 0;
+}
+
+static bool has_control(const char *text, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        const unsigned char c = (unsigned char)text[i];
+        if ((c < 0x20 && c != '\t') || c == 0x7f)
+            return true;
+    }
+    return false;
+}
+
+// Whether every character may stand in a header's name (RFC 9110 token).
+static bool is_token(const char *text, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        const unsigned char c = (unsigned char)text[i];
+        if (c <= 0x20 || c >= 0x7f || strchr("\"(),/:;<=>?@[\\]{}", c) != NULL)
+            return false;
+    }
+    return size > 0;
+}
+
+void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
+                 size_t value_size) {
+    if (value == NULL)
+        value_size = 0;
+    if (!gate->has_control && (!is_token(name, name_size) || has_control(value, value_size))) {
+        gate->has_control = true;
+        snprintf(gate->fault_name, sizeof gate->fault_name, "%s",
+                 is_token(name, name_size) && name_size < sizeof gate->fault_name ? name
+                                                                                  : "a header");
+    }
+    if (is_name(name, name_size, "Host")) {
+        gate->hosts++;
+        if (!gate_host_is_ours(value_size > 0 ? value : "", value_size)) {
+            gate->is_foreign_host = true;
+            if (value_size > 0 && !has_control(value, value_size))
+                text_fit(gate->host, sizeof gate->host, value);
+        }
+    } else if (is_name(name, name_size, "Content-Length")) {
+        gate->lengths++;
+        if (value_size == 0 || value_size > 18 || strspn(value, "0123456789") != value_size)
+            gate->has_bad_length = true;
+    } else if (is_name(name, name_size, "Transfer-Encoding")) {
+        gate->encodings++;
+        gate->is_chunked = is_name(value_size > 0 ? value : "", value_size, "chunked");
+    }
+}
+
+static int refuse(Problem *problem, int code, const char *detail) {
+    problem_set(problem, STATUS_USAGE, "%s", detail);
+    return code;
+}
+
+// Whether the path holds an escaped NUL, or a segment that becomes "." or ".." only when decoded;
+// plain dot segments are refused as well, because clients take them out before sending and proxies
+// differ.
+static const char *path_fault(const char *target) {
+    const size_t size = strcspn(target, "?");
+    size_t dots = 0, others = 0;
+    for (size_t i = 0; i <= size; i++) {
+        if (i == size || target[i] == '/') {
+            if (others == 0 && (dots == 1 || dots == 2))
+                return "the path holds a dot segment; write it without \".\" and \"..\"";
+            dots = others = 0;
+        } else if (target[i] == '.') {
+            dots++;
+        } else if (i + 2 < size && strncasecmp(target + i, "%2e", 3) == 0) {
+            dots++;
+            i += 2;
+        } else {
+            others++;
+        }
+    }
+    return strstr(target, "%00") != NULL ? "the target holds an escaped NUL" : NULL;
+}
+
+int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
+               Problem *problem) {
+    if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
+        return refuse(problem, 505, "this server speaks HTTP/1.1 and HTTP/1.0");
+    bool is_known = false;
+    for (size_t i = 0; i < COUNT(known_methods); i++)
+        is_known = is_known || strcmp(method, known_methods[i]) == 0;
+    if (!is_known)
+        return refuse(problem, 501,
+                      "unknown method; known are GET, HEAD, POST, PUT, PATCH, DELETE and OPTIONS");
+    if (target[0] != '/')
+        return refuse(problem, 400, "the target must be a path that begins with \"/\"");
+    if (strlen(target) > REQUEST_TARGET_MOST)
+        return refuse(problem, 414, "the target is longer than 4096 bytes");
+    if (has_control(target, strlen(target)))
+        return refuse(problem, 400, "the target holds a control character");
+    const char *fault = path_fault(target);
+    if (fault != NULL)
+        return refuse(problem, 400, fault);
+    if (gate->has_control) {
+        problem_set(problem, STATUS_USAGE, "the head holds a control character (in %s)",
+                    gate->fault_name);
+        return 400;
+    }
+    if (gate->hosts > 1)
+        return refuse(problem, 400, "more than one Host");
+    if (gate->hosts == 0 && strcmp(version, "HTTP/1.1") == 0)
+        return refuse(problem, 400, "HTTP/1.1 needs a Host");
+    if (gate->is_foreign_host) {
+        problem_set(problem, STATUS_USAGE,
+                    "the Host must be localhost, 127.0.0.1 or [::1], with any port, is \"%s\"",
+                    gate->host);
+        return 400;
+    }
+    if (gate->lengths > 1)
+        return refuse(problem, 400, "more than one Content-Length");
+    if (gate->has_bad_length)
+        return refuse(problem, 400, "Content-Length must be a plain number");
+    if (gate->lengths > 0 && gate->encodings > 0)
+        return refuse(problem, 400, "Content-Length beside Transfer-Encoding");
+    if (gate->encodings > 1 || (gate->encodings == 1 && !gate->is_chunked))
+        return refuse(problem, 501, "the only Transfer-Encoding understood is \"chunked\"");
+    if (gate->encodings > 0 && strcmp(version, "HTTP/1.0") == 0)
+        return refuse(problem, 400, "HTTP/1.0 has no Transfer-Encoding");
+    return 0;
+}

@@ -1,0 +1,32 @@
+// What is turned away before anything else looks at a request: heads that two parsers could read
+// differently, and hosts that are not ours. Plain values, no sockets. A refused request's
+// connection is closed. Not who may do what (scopes) and not which routes exist. Used by
+// listener.c.
+#ifndef SERVER_HTTP_GATE_H
+#define SERVER_HTTP_GATE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "core/base/status.h"
+
+// Facts gathered header by header; all zero to begin with.
+typedef struct Gate {
+    size_t hosts, lengths, encodings;
+    bool is_chunked, is_foreign_host, has_bad_length, has_control;
+    char fault_name[40]; // the header that has_control is about
+    char host[64];
+} Gate;
+
+void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
+                 size_t value_size);
+
+// 0 if the request may go on, else the HTTP status (400, 414, 501, 505), with the reason in
+// `problem`.
+int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
+               Problem *problem);
+
+// Whether a Host header's value is localhost, 127.0.0.1 or [::1], with any port or none.
+bool gate_host_is_ours(const char *host, size_t size);
+
+#endif

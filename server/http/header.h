@@ -1,0 +1,40 @@
+// The values of the request headers that mean something here: Accept, Prefer, Range, If-None-Match,
+// Content-Type. Not the request's safety (gate.h) and not the target (request.h). Used by
+// dispatch.c, body.c and api/.
+#ifndef SERVER_HTTP_HEADER_H
+#define SERVER_HTTP_HEADER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+// RFC 9110: which of `types` (media types, NULL-terminated, the preferred one first) the client
+// likes best; -1 for none. NULL or "" accepts all. Parameters of the types themselves (charset)
+// play no part.
+int header_accept(const char *accept, const char *const *types);
+// Whether the client names `type` itself, not by a wildcard, and does not refuse it.
+bool header_accept_names(const char *accept, const char *type);
+
+// RFC 7240.
+typedef struct Prefer {
+    bool responds_async;
+    bool has_wait;
+    double wait; // [s]
+} Prefer;
+Prefer header_prefer(const char *prefer);
+
+typedef enum RangeKind {
+    RANGE_WHOLE, // none, or one that may be passed over: several ranges, another unit, not well
+                 // formed
+    RANGE_PART,
+    RANGE_UNSATISFIABLE,
+} RangeKind;
+// "bytes=first-last", "bytes=first-", "bytes=-suffix" within `size` bytes.
+RangeKind header_range(const char *range, size_t size, size_t *first, size_t *last);
+
+// Whether If-None-Match ("*" or a list, weak ones included) names `etag`.
+bool header_etag_matches(const char *if_none_match, const char *etag);
+
+// Whether a Content-Type is `type`, whatever its parameters.
+bool header_type_is(const char *content_type, const char *type);
+
+#endif

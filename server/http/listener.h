@@ -1,0 +1,29 @@
+// The door: listens on loopback, collects requests, has them answered, sends the replies.
+// libmicrohttpd lives in listener.c alone. Not routes and not rights (dispatch.h). Used by
+// command/serve.c.
+#ifndef SERVER_HTTP_LISTENER_H
+#define SERVER_HTTP_LISTENER_H
+
+#include "server/http/address.h"
+#include "server/http/request.h"
+
+typedef struct Listener Listener;
+
+typedef struct ListenerSettings {
+    Address address;
+    size_t body_most; // bytes; a larger body is answered 413
+    void (*answer)(void *context, Request *request, Reply *reply); // from several threads
+    void *context;
+} ListenerSettings;
+
+// Fails as address_open does.
+Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem);
+// "http://127.0.0.1:8080", with the port that was chosen.
+const char *listener_url(const Listener *listener);
+// Takes no more connections, ends all waiting and lets requests under way finish for at most
+// `grace_ms`. When this returns nothing is being answered.
+void listener_stop(Listener *listener, int grace_ms);
+// Frees what wakers point to: after whoever may call them is gone.
+void listener_free(Listener *listener);
+
+#endif

@@ -1,0 +1,102 @@
+#include "server/http/reply.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/http/header.h"
+
+const char type_json[] = "application/json";
+
+void reply_default(Reply *reply) {
+    memset(reply, 0, sizeof *reply);
+    reply->retry_after = -1;
+}
+
+void reply_clear(Reply *reply) {
+    if (reply->release != NULL)
+        reply->release(reply->context);
+    if (reply->forget != NULL)
+        reply->forget(reply->keep);
+    reply_default(reply);
+}
+
+void reply_borrow(Reply *reply, int code, const char *content_type, const void *body, size_t size) {
+    reply->code = code;
+    reply->content_type = content_type;
+    reply->body = body;
+    reply->body_size = size;
+}
+
+Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *bytes,
+                   Problem *problem) {
+    const bool is_failed = bytes->is_failed;
+    const size_t most = bytes->most;
+    size_t size = 0;
+    char *body = bytes_take(bytes, &size);
+    if (is_failed || body == NULL) {
+        free(body);
+        if (most > 0)
+            return problem_set(
+                problem, STATUS_LIMIT,
+                "the answer would be larger than %zu bytes, or memory ran out; ask for fewer "
+                "channels or a shorter time",
+                most);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    }
+    reply_borrow(reply, code, content_type, body, size);
+    reply->release = free;
+    reply->context = body;
+    return STATUS_OK;
+}
+
+static bool tag(Reply *reply, const Request *request, const char *text, const char *cache_control) {
+    snprintf(reply->etag, sizeof reply->etag, "\"%s\"", text);
+    snprintf(reply->cache_control, sizeof reply->cache_control, "%s", cache_control);
+    if (!header_etag_matches(request->if_none_match, reply->etag))
+        return false;
+    reply_borrow(reply, 304, NULL, NULL, 0);
+    return true;
+}
+
+bool reply_immutable(Reply *reply, const Request *request, const char *text) {
+    return tag(reply, request, text, "private, max-age=31536000, immutable");
+}
+
+bool reply_tagged(Reply *reply, const Request *request, const char *text) {
+    return tag(reply, request, text, "no-cache");
+}
+
+Status reply_range(Reply *reply, const Request *request, Problem *problem) {
+    if (!reply->accepts_ranges || reply->code != 200 || strcmp(request->method, "GET") != 0)
+        return STATUS_OK;
+    // If-Range: a part only of what the client already has the other parts of.
+    if (request->if_range != NULL && strcmp(request->if_range, reply->etag) != 0)
+        return STATUS_OK;
+    size_t first = 0, last = 0;
+    const size_t size = reply->body_size;
+    switch (header_range(request->range, size, &first, &last)) {
+    case RANGE_WHOLE:
+        return STATUS_OK;
+    case RANGE_PART:
+        reply->code = 206;
+        reply->body = (const char *)reply->body + first;
+        reply->body_size = last - first + 1;
+        snprintf(reply->content_range, sizeof reply->content_range, "bytes %zu-%zu/%zu", first,
+                 last, size);
+        return STATUS_OK;
+    case RANGE_UNSATISFIABLE:
+        break;
+    }
+    reply_clear(reply);
+    reply->code = 416;
+    snprintf(reply->content_range, sizeof reply->content_range, "bytes */%zu", size);
+    return problem_set(problem, STATUS_USAGE, "the range lies outside the %zu bytes there are",
+                       size);
+}
+
+void reply_wait(Reply *reply, int wait_ms, void *keep, void (*forget)(void *keep)) {
+    reply->wait_ms = wait_ms > 0 ? wait_ms : 1;
+    reply->keep = keep;
+    reply->forget = forget;
+}

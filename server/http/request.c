@@ -1,0 +1,141 @@
+// The target of a request: "/path?name=value&name=value", escapes and all. One block of storage
+// holds the target as sent, the path as sent and the decoded queries.
+#include "server/http/request.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static int hex_digit(char c) {
+    if (c >= '0' && c <= '9')
+        return c - '0';
+    if (c >= 'a' && c <= 'f')
+        return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F')
+        return c - 'A' + 10;
+    return -1;
+}
+
+bool request_decode(char *text, bool is_query) {
+    char *out = text;
+    for (const char *in = text; *in != '\0'; in++) {
+        if (*in == '+' && is_query) {
+            *out++ = ' ';
+        } else if (*in == '%') {
+            const int high = hex_digit(in[1]);
+            const int low = high < 0 ? -1 : hex_digit(in[2]);
+            if (low < 0 || high * 16 + low == 0)
+                return false;
+            *out++ = (char)(high * 16 + low);
+            in += 2;
+        } else {
+            *out++ = *in;
+        }
+    }
+    *out = '\0';
+    return true;
+}
+
+static Status add_query(Request *request, char *pair, Problem *problem) {
+    char *value = strchr(pair, '=');
+    if (value != NULL)
+        *value++ = '\0';
+    else
+        value = pair + strlen(pair);
+    if (!request_decode(pair, true) || !request_decode(value, true))
+        return problem_set(
+            problem, STATUS_USAGE,
+            "the query holds a broken escape; write %% and two hexadecimal digits, not 00");
+    if (request_query(request, pair) != NULL)
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"%.40s\" stands twice; give it once", pair);
+    if (request->query_count == REQUEST_QUERIES)
+        return problem_set(problem, STATUS_USAGE, "more than %d query parameters", REQUEST_QUERIES);
+    request->queries[request->query_count++] = (RequestPair){pair, value};
+    return STATUS_OK;
+}
+
+Status request_open(Request *request, const char *target, Problem *problem) {
+    const size_t size = strlen(target) + 1;
+    request->storage = malloc(3 * size);
+    if (request->storage == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the request's target");
+    char *path = request->storage + size, *queries = path + size;
+    memcpy(request->storage, target, size);
+    memcpy(path, target, size);
+    request->target = request->storage;
+    request->path = path;
+    request->query_count = 0;
+
+    char *question = strchr(path, '?');
+    if (question == NULL)
+        return STATUS_OK;
+    *question = '\0';
+    memcpy(queries, question + 1, strlen(question + 1) + 1);
+    char *next = queries;
+    while (next != NULL) {
+        char *pair = next;
+        next = strchr(pair, '&');
+        if (next != NULL)
+            *next++ = '\0';
+        if (*pair != '\0')
+            TRY(add_query(request, pair, problem));
+    }
+    return STATUS_OK;
+}
+
+void request_close(Request *request) {
+    free(request->storage);
+    request->storage = NULL;
+}
+
+void request_header(Request *request, const char *name, const char *value) {
+    if (strcasecmp(name, "Prefer") == 0) {
+        // One preference may stand in several headers (RFC 7240, section 2).
+        const size_t used = strlen(request->prefers);
+        snprintf(request->prefers + used, sizeof request->prefers - used, "%s%s",
+                 used > 0 ? ", " : "", value);
+        request->prefer = request->prefers;
+        return;
+    }
+    const struct {
+        const char *name;
+        const char **target;
+    } kept[] = {{"Host", &request->host},         {"Content-Type", &request->content_type},
+                {"Accept", &request->accept},     {"If-None-Match", &request->if_none_match},
+                {"If-Range", &request->if_range}, {"Range", &request->range},
+                {"Expect", &request->expect}};
+    for (size_t i = 0; i < COUNT(kept); i++)
+        if (*kept[i].target == NULL && strcasecmp(name, kept[i].name) == 0)
+            *kept[i].target = value;
+}
+
+const char *request_query(const Request *request, const char *name) {
+    for (size_t i = 0; i < request->query_count; i++)
+        if (strcmp(request->queries[i].name, name) == 0)
+            return request->queries[i].value;
+    return NULL;
+}
+
+Status request_number(const Request *request, const char *name, double least, double most,
+                      double initial, double *value, Problem *problem) {
+    const char *text = request_query(request, name);
+    *value = initial;
+    if (text == NULL)
+        return STATUS_OK;
+    char *end = NULL;
+    // strtod would also take leading blanks, "inf", "nan" and hexadecimal digits: none is a number
+    // here.
+    const bool is_plain = *text != '\0' && text[strspn(text, "0123456789+-.eE")] == '\0';
+    const double number = is_plain ? strtod(text, &end) : NAN;
+    char low[32], high[32];
+    if (!is_plain || *end != '\0' || !(number >= least && number <= most))
+        return problem_set(
+            problem, STATUS_USAGE,
+            "the query parameter \"%s\" must be a number within [%s, %s], is \"%.40s\"", name,
+            text_real(low, least), text_real(high, most), text);
+    *value = number;
+    return STATUS_OK;
+}

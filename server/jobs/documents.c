@@ -1,0 +1,75 @@
+#include "server/jobs/documents.h"
+
+#include "server/codec/write.h"
+
+void document_plan(Bytes *bytes, const PlanReport *plan) {
+    write_item(bytes, plan_report_fields, plan, WRITE_REPORT);
+}
+
+void document_summary(Bytes *bytes, const Summary *summary) {
+    write_item(bytes, summary_fields, summary, WRITE_REPORT);
+}
+
+void document_warnings(Bytes *bytes, const Warnings *warnings) {
+    write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
+               WRITE_REPORT);
+}
+
+void document_energy(Bytes *bytes, const Energy *energy) {
+    bytes_text(bytes, "{\"unit\": \"J\", ");
+    (void)write_members(bytes, energy_fields, energy, WRITE_REPORT);
+    bytes_text(bytes, "}");
+}
+
+void document_impacts(Bytes *bytes, const Impacts *impacts) {
+    size_t count = 0;
+    for (size_t i = 0; i < impacts->count; i++)
+        count += impacts->at[i].kind == IMPACT_IMPACT;
+    bytes_format(bytes, "{\"count\": %zu, \"resting\": %zu, \"impacts\": ", count,
+                 impacts->count - count);
+    write_list(bytes, impact_fields, impacts->at, impacts->count, sizeof *impacts->at,
+               WRITE_REPORT);
+    bytes_text(bytes, "}");
+}
+
+static void put_values(Bytes *bytes, const char *unit, const double *values, size_t count) {
+    bytes_text(bytes, "{\"unit\": ");
+    bytes_json_string(bytes, unit);
+    bytes_text(bytes, ", \"values\": [");
+    for (size_t i = 0; i < count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ",");
+        bytes_real(bytes, values[i]);
+    }
+    bytes_text(bytes, "]}");
+}
+
+void document_psd(Bytes *bytes, const Spectrum *spectrum) {
+    const SpectrumSettings *settings = &spectrum->settings;
+    const Columns *densities = &spectrum->densities;
+    if (densities->count == 0) {
+        bytes_text(bytes, "null");
+        return;
+    }
+    bytes_format(bytes,
+                 "{\"method\": \"welch\", \"segment\": %zu, \"overlap\": %zu, \"window\": \"%s\", ",
+                 settings->segment, settings->overlap, spectrum_window_names[settings->window]);
+    bytes_format(bytes, "\"detrend\": \"%s\", \"segments\": %zu, \"frequency\": ",
+                 spectrum_detrend_names[settings->detrend], spectrum->segments);
+    put_values(bytes, "Hz", spectrum->frequency, densities->rows);
+    bytes_text(bytes, ", \"channels\": {");
+    for (size_t i = 0; i < densities->count; i++) {
+        bytes_text(bytes, i > 0 ? ", " : "");
+        bytes_json_string(bytes, densities->at[i].name);
+        bytes_text(bytes, ": ");
+        put_values(bytes, densities->at[i].unit, densities->at[i].values, densities->rows);
+    }
+    bytes_text(bytes, "}}");
+}
+
+void document_scene(Bytes *bytes, const Simulation *simulation) {
+    Simulation plain = *simulation; // a borrowed view: nothing is cleared
+    plain.title = NULL;
+    plain.labels = (Texts){NULL, 0};
+    write_item(bytes, simulation_fields, &plain, WRITE_SCENE);
+}

@@ -1,0 +1,19 @@
+// The JSON documents of a result: what API.md calls plan, summary, warnings, energy, impacts.json
+// and psd.json. Not the series: those are the encoders'. Used by worker.c and by `impactd run`.
+#ifndef SERVER_JOBS_DOCUMENTS_H
+#define SERVER_JOBS_DOCUMENTS_H
+
+#include "core/simulation/simulation.h"
+#include "server/base/bytes.h"
+
+void document_plan(Bytes *bytes, const PlanReport *plan);
+void document_summary(Bytes *bytes, const Summary *summary);
+void document_warnings(Bytes *bytes, const Warnings *warnings);
+void document_energy(Bytes *bytes, const Energy *energy);
+void document_impacts(Bytes *bytes, const Impacts *impacts);
+// Without any density: null.
+void document_psd(Bytes *bytes, const Spectrum *spectrum);
+// The scene as it can be submitted again, without its notes.
+void document_scene(Bytes *bytes, const Simulation *simulation);
+
+#endif

@@ -1,0 +1,152 @@
+#include "server/jobs/job.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/base/clock.h"
+#include "server/jobs/intake_state.h"
+
+const char *const job_state_names[] = {"accepted", "running",   "successful",
+                                       "failed",   "dismissed", NULL};
+
+bool job_state_is_final(int state) {
+    return state != JOB_ACCEPTED && state != JOB_RUNNING;
+}
+
+// --- wakers ------------------------------------------------------------------------------------
+
+bool wakers_add(Wakers *wakers, const Waker *waker) {
+    for (size_t i = 0; i < wakers->count; i++)
+        if (wakers->at[i].context == waker->context)
+            return true;
+    Waker *grown = realloc(wakers->at, (wakers->count + 1) * sizeof *grown);
+    if (grown == NULL)
+        return false;
+    wakers->at = grown;
+    grown[wakers->count++] = *waker;
+    return true;
+}
+
+void wakers_remove(Wakers *wakers, const Waker *waker) {
+    for (size_t i = 0; i < wakers->count; i++)
+        if (wakers->at[i].context == waker->context) {
+            wakers->at[i] = wakers->at[--wakers->count];
+            return;
+        }
+}
+
+void wakers_call(Wakers *wakers) {
+    for (size_t i = 0; i < wakers->count; i++)
+        wakers->at[i].wake(wakers->at[i].context);
+    free(wakers->at);
+    *wakers = (Wakers){NULL, 0};
+}
+
+// --- jobs --------------------------------------------------------------------------------------
+
+Job *job_new(Intake *intake) {
+    Job *job = calloc(1, sizeof *job);
+    if (job == NULL)
+        return NULL;
+    atomic_init(&job->holds, 1);
+    job->intake = intake;
+    if (intake != NULL)
+        atomic_fetch_add(&intake->holds, 1);
+    return job;
+}
+
+Job *job_hold(Job *job) {
+    atomic_fetch_add(&job->holds, 1);
+    return job;
+}
+
+void job_drop(Job *job) {
+    if (job == NULL || atomic_fetch_sub(&job->holds, 1) != 1)
+        return;
+    job_row_clear(&job->row);
+    free(job->plan);
+    free(job->summary);
+    free(job->wakers.at);
+    intake_drop(job->intake);
+    free(job);
+}
+
+static void lock(Job *job) {
+    if (job->intake != NULL)
+        pthread_mutex_lock(&job->intake->lock);
+}
+
+static void unlock(Job *job) {
+    if (job->intake != NULL)
+        pthread_mutex_unlock(&job->intake->lock);
+}
+
+bool job_is_finished(Job *job) {
+    lock(job);
+    const bool is_finished = job_state_is_final(job->row.state);
+    unlock(job);
+    return is_finished;
+}
+
+static bool copy(char **target, const char *text) {
+    *target = text == NULL ? NULL : strdup(text);
+    return text == NULL || *target != NULL;
+}
+
+Status job_show(Job *job, JobShow *show) {
+    *show = (JobShow){0};
+    lock(job);
+    const JobRow *row = &job->row;
+    text_fit(show->id, sizeof show->id, row->id);
+    show->state = (JobState)row->state;
+    show->is_cached = row->is_cached;
+    show->created_unix_ms = row->created_unix_ms;
+    show->started_unix_ms = row->started_unix_ms;
+    show->finished_unix_ms = row->finished_unix_ms;
+    show->queued = row->queued;
+    show->run = row->run;
+    show->total = row->total;
+    if (row->state == JOB_SUCCESSFUL) {
+        text_fit(show->result, sizeof show->result, row->result);
+        show->progress = 100;
+    } else if (job->computation != NULL) {
+        show->progress = atomic_load(&job->computation->progress) / 100.0;
+    }
+    if (!job_state_is_final(row->state) && job->submitted_ns > 0) {
+        const int64_t now = clock_monotonic_ns();
+        show->total = 1e-9 * (double)(now - job->submitted_ns);
+        show->queued = job->started_ns > 0 ? row->queued : show->total;
+        show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
+    }
+    const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
+                          copy(&show->summary, job->summary) &&
+                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title);
+    unlock(job);
+    return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+void job_show_clear(JobShow *show) {
+    free(show->problem);
+    free(show->plan);
+    free(show->summary);
+    free(show->warnings);
+    free(show->title);
+    *show = (JobShow){0};
+}
+
+bool job_watch(Job *job, const Waker *waker) {
+    lock(job);
+    bool is_watched = true;
+    if (job_state_is_final(job->row.state))
+        waker->wake(waker->context);
+    else
+        is_watched = wakers_add(&job->wakers, waker);
+    unlock(job);
+    return is_watched;
+}
+
+void job_unwatch(Job *job, const Waker *waker) {
+    lock(job);
+    wakers_remove(&job->wakers, waker);
+    unlock(job);
+}

@@ -1,0 +1,189 @@
+// A scene's text made ready: read, its materials' names turned into numbers, judged and completed,
+// and its id.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/canonical.h"
+#include "server/base/digest.h"
+#include "server/codec/read.h"
+#include "server/jobs/intake.h"
+
+// "slug" or "slug@revision"; false if what stands behind @ is no revision.
+static bool split_name(const char *name, char slug[128], uint64_t *revision) {
+    const char *at = strchr(name, '@');
+    const size_t length = at == NULL ? strlen(name) : (size_t)(at - name);
+    *revision = 0;
+    if (length == 0 || length >= 128)
+        return false;
+    memcpy(slug, name, length);
+    slug[length] = '\0';
+    if (at == NULL)
+        return true;
+    if (at[1] < '1' || at[1] > '9' || strlen(at + 1) > 9)
+        return false;
+    char *end;
+    *revision = strtoull(at + 1, &end, 10);
+    return *end == '\0';
+}
+
+// "no material is called ..., there are: ...", with the nearest one suggested.
+static Status refuse_unknown(Store *store, const char *name, const char *slug, const char *pointer,
+                             Problem *problem) {
+    Fault fault = {.detail = ""};
+    MaterialRevisions known = {NULL, 0};
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_quote(fault.value, sizeof fault.value, name);
+    char short_name[80], list[200] = "";
+    text_fit(short_name, sizeof short_name, name);
+    if (store_materials(store, &known, NULL) == STATUS_OK && known.count > 0) {
+        const char **slugs = calloc(known.count + 1, sizeof *slugs);
+        size_t used = 0;
+        for (size_t i = 0; i < known.count; i++) {
+            if (slugs != NULL)
+                slugs[i] = known.at[i].slug;
+            if (used < sizeof list)
+                used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "",
+                                         known.at[i].slug);
+        }
+        const char *nearest = slugs == NULL ? NULL : texts_nearest(slugs, slug);
+        if (nearest != NULL)
+            text_fit(fault.did_you_mean, sizeof fault.did_you_mean, nearest);
+        free(slugs);
+    }
+    material_revisions_clear(&known);
+    snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s", short_name,
+             list[0] != '\0' ? "; there are " : "", list);
+    return problem_put(problem, STATUS_INVALID, &fault);
+}
+
+// The slug is known, the revision is not.
+static Status refuse_revision(const MaterialRevision *head, const char *name, const char *pointer,
+                              Problem *problem) {
+    Fault fault = {.detail = ""};
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_quote(fault.value, sizeof fault.value, name);
+    snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%.40s@%llu", head->slug,
+             (unsigned long long)head->revision);
+    snprintf(fault.detail, sizeof fault.detail,
+             "the material %.64s has no such revision; its head is %s", head->slug,
+             fault.did_you_mean);
+    return problem_put(problem, STATUS_INVALID, &fault);
+}
+
+// A number that came beside the name must be the revision's.
+static Status match(double *given, double known, const char *pointer, const char *member,
+                    const char *unit, const char *name, Problem *problem) {
+    if (isnan(*given) || *given == known) {
+        *given = known;
+        return STATUS_OK;
+    }
+    char place[sizeof((Fault){0}.pointer)], is[32], is_known[32];
+    pointer_join(place, sizeof place, pointer, member);
+    text_real(is, *given);
+    if (isnan(known))
+        text_fit(is_known, sizeof is_known, "none");
+    else
+        text_real(is_known, known);
+    return problem_add_real(problem, STATUS_INVALID, place, *given, unit,
+                            "is %s, but %s has %s: leave one of them out", is, name, is_known);
+}
+
+static Status fill(Buffer *buffer, const MaterialRevision *material, const char *pointer,
+                   Warnings *warnings, Problem *problem) {
+    char name[160];
+    snprintf(name, sizeof name, "%s@%llu", material->slug, (unsigned long long)material->revision);
+    // Under impulse a canonical scene has no contact time: completion leaves it out again.
+    Status status = match(&buffer->restitution, material->restitution, pointer, "restitution", NULL,
+                          name, problem);
+    const Status second = match(&buffer->contact_time, material->contact_time, pointer,
+                                "contact_time", "s", name, problem);
+    if (status != STATUS_OK || second != STATUS_OK)
+        return STATUS_INVALID;
+    if (strcmp(material->status, "draft") == 0)
+        TRY(warnings_add(warnings, pointer, "%s is a draft that nobody has approved", name));
+    if (strcmp(material->status, "deprecated") == 0)
+        TRY(warnings_add(warnings, pointer, "%s is deprecated", name));
+    char *text = strdup(name);
+    if (text == NULL)
+        return STATUS_NO_MEMORY;
+    free(buffer->material);
+    buffer->material = text;
+    return STATUS_OK;
+}
+
+static Status resolve(Store *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+                      Problem *problem) {
+    char slug[128];
+    uint64_t revision;
+    MaterialRevision material = {0};
+    if (buffer->material == NULL)
+        return STATUS_OK;
+    if (!split_name(buffer->material, slug, &revision))
+        return refuse_unknown(store, buffer->material, buffer->material, pointer, problem);
+    Status status = store_material(store, slug, revision, &material, NULL);
+    if (status == STATUS_NOT_FOUND && revision > 0 &&
+        store_material(store, slug, 0, &material, NULL) == STATUS_OK)
+        status = refuse_revision(&material, buffer->material, pointer, problem);
+    else if (status == STATUS_NOT_FOUND)
+        status = refuse_unknown(store, buffer->material, slug, pointer, problem);
+    else if (status == STATUS_OK)
+        status = fill(buffer, &material, pointer, warnings, problem);
+    else
+        status =
+            problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+    fields_clear(material_fields, &material);
+    return status;
+}
+
+static Status resolve_all(Store *store, Simulation *simulation, Warnings *warnings,
+                          Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
+        Damper *damper = &simulation->scene.dampers.at[i];
+        Buffer *const buffers[] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
+        static const char *const names[] = {"buffer", "left_buffer", "right_buffer"};
+        for (size_t j = 0; j < COUNT(buffers); j++) {
+            char pointer[64];
+            snprintf(pointer, sizeof pointer, "/dampers/%zu/%s", i, names[j]);
+            const Status one = resolve(store, buffers[j], pointer, warnings, problem);
+            if (one != STATUS_OK && one != STATUS_INVALID)
+                return one;
+            if (one != STATUS_OK)
+                status = one;
+        }
+    }
+    return status;
+}
+
+Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
+                      Simulation *simulation, Warnings *warnings, Problem *problem) {
+    // All three add to one problem: what could not be read is judged no further, the rest is.
+    Problem *own = NULL;
+    if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
+        return STATUS_NO_MEMORY;
+    Status status = read_json(text, size, simulation_fields, simulation, problem);
+    if (status == STATUS_OK || status == STATUS_INVALID) {
+        const Status resolved = resolve_all(store, simulation, warnings, problem);
+        if (resolved != STATUS_OK && resolved != STATUS_INVALID)
+            status = resolved;
+        else
+            status = simulation_complete(simulation, limits, warnings, problem);
+        if (status == STATUS_OK)
+            status = resolved;
+    }
+    free(own);
+    return status;
+}
+
+void intake_result_id(const Simulation *simulation, char target[72]) {
+    char hex[65];
+    Digest *digest = digest_new();
+    target[0] = '\0';
+    if (digest == NULL)
+        return;
+    digest_take(digest, engine_version, strlen(engine_version) + 1);
+    canonical_write(simulation_fields, simulation, digest_take, digest);
+    digest_end(digest, hex);
+    snprintf(target, 72, "r-%s", hex);
+}

@@ -1,0 +1,255 @@
+// A connection keeps the statements it has made: there are some twenty texts in all, each a
+// constant, so that its address is its name. Settings are those that were measured to pay; FULL
+// makes every commit durable.
+#include "server/store/database.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <sqlite3.h>
+
+#include "server/store/row.h"
+
+enum { STATEMENTS = 48, APPLICATION = 0x696D7064 }; // "impd"
+
+struct Database {
+    sqlite3 *connection;
+    struct {
+        const char *sql;
+        Statement *statement;
+    } kept[STATEMENTS];
+    size_t kept_count;
+};
+
+// What SQLite says, in words and as a status.
+static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
+    Status status = STATUS_IO;
+    switch (sqlite3_errcode(connection) & 0xFF) {
+    case SQLITE_CONSTRAINT:
+        status = STATUS_CONFLICT;
+        break;
+    case SQLITE_NOMEM:
+        status = STATUS_NO_MEMORY;
+        break;
+    case SQLITE_TOOBIG:
+        status = STATUS_TOO_LARGE;
+        break;
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+        status = STATUS_BUSY;
+        break;
+    case SQLITE_ERROR:
+    case SQLITE_MISUSE:
+    case SQLITE_RANGE:
+        status = STATUS_INTERNAL;
+        break;
+    default:
+        break;
+    }
+    const char *path = sqlite3_db_filename(connection, "main");
+    const bool has_path = path != NULL && path[0] != '\0';
+    return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
+                       has_path ? ", in " : "", has_path ? path : "");
+}
+
+// --- statements --------------------------------------------------------------------------------
+
+Status database_execute(Database *database, const char *sql, Problem *problem) {
+    if (sqlite3_exec(database->connection, sql, NULL, NULL, NULL) == SQLITE_OK)
+        return STATUS_OK;
+    return report(database->connection, "writing to the database", problem);
+}
+
+bool database_is_in_transaction(Database *database) {
+    return sqlite3_get_autocommit(database->connection) == 0;
+}
+
+static Status prepare(Database *database, const char *sql, Statement **statement,
+                      Problem *problem) {
+    for (size_t i = 0; i < database->kept_count; i++)
+        if (database->kept[i].sql == sql) {
+            *statement = database->kept[i].statement;
+            return STATUS_OK;
+        }
+    if (database->kept_count == STATEMENTS)
+        return problem_set(problem, STATUS_INTERNAL, "more than %d SQL texts", STATEMENTS);
+    if (sqlite3_prepare_v3(database->connection, sql, -1, SQLITE_PREPARE_PERSISTENT, statement,
+                           NULL) != SQLITE_OK)
+        return report(database->connection, "preparing a statement", problem);
+    database->kept[database->kept_count].sql = sql;
+    database->kept[database->kept_count++].statement = *statement;
+    return STATUS_OK;
+}
+
+Status statement_begin(Database *database, const char *sql, const RowColumn *columns,
+                       const void *item, Statement **statement, Problem *problem) {
+    *statement = NULL;
+    Statement *prepared;
+    TRY(prepare(database, sql, &prepared, problem));
+    const Status status = row_bind(prepared, columns, item, problem);
+    if (status != STATUS_OK) {
+        statement_end(prepared);
+        return status;
+    }
+    *statement = prepared;
+    return STATUS_OK;
+}
+
+Status statement_step(Statement *statement, bool *has_row, Problem *problem) {
+    const int code = sqlite3_step(statement);
+    *has_row = code == SQLITE_ROW;
+    if (code == SQLITE_ROW || code == SQLITE_DONE)
+        return STATUS_OK;
+    sqlite3 *connection = sqlite3_db_handle(statement);
+    return report(connection,
+                  sqlite3_column_count(statement) > 0 ? "reading the database"
+                                                      : "writing to the database",
+                  problem);
+}
+
+void statement_end(Statement *statement) {
+    if (statement == NULL)
+        return;
+    sqlite3_reset(statement);
+    sqlite3_clear_bindings(statement);
+}
+
+Status database_change(Database *database, const char *sql, const RowColumn *columns,
+                       const void *item, int *changes, Problem *problem) {
+    Statement *statement;
+    bool has_row;
+    TRY(statement_begin(database, sql, columns, item, &statement, problem));
+    const Status status = statement_step(statement, &has_row, problem);
+    if (changes != NULL)
+        *changes = status == STATUS_OK ? sqlite3_changes(database->connection) : 0;
+    statement_end(statement);
+    return status;
+}
+
+// --- opening -----------------------------------------------------------------------------------
+
+// Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
+static const char writer_settings[] = "PRAGMA page_size = 16384;"
+                                      "PRAGMA auto_vacuum = INCREMENTAL;"
+                                      "PRAGMA journal_mode = WAL;";
+static const char settings[] = "PRAGMA synchronous = FULL;"
+                               "PRAGMA secure_delete = OFF;"
+                               "PRAGMA mmap_size = 1073741824;"
+                               "PRAGMA cache_size = -32768;"
+                               "PRAGMA temp_store = MEMORY;"
+                               "PRAGMA trusted_schema = OFF;"
+                               "PRAGMA foreign_keys = ON;";
+
+// SQLite would make it readable for all; its other files follow this one.
+static Status make_file(const char *path, Problem *problem) {
+    const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (file < 0)
+        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(errno));
+    close(file);
+    return STATUS_OK;
+}
+
+static Status read_number(Database *database, const char *sql, int64_t *number, Problem *problem) {
+    static const RowColumn columns[] = {{.name = "number", .kind = COLUMN_INTEGER}, ROW_END};
+    Statement *statement;
+    bool has_row = false;
+    TRY(statement_begin(database, sql, NULL, NULL, &statement, problem));
+    Status status = statement_step(statement, &has_row, problem);
+    if (status == STATUS_OK && has_row)
+        status = row_read(statement, columns, number, problem);
+    statement_end(statement);
+    return status;
+}
+
+static Status check_owner(Database *database, Problem *problem) {
+    int64_t application = 0, tables = 0;
+    TRY(read_number(database, "SELECT application_id AS number FROM pragma_application_id",
+                    &application, problem));
+    TRY(read_number(database, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
+    if (application == APPLICATION || (application == 0 && tables == 0))
+        return STATUS_OK;
+    return problem_set(problem, STATUS_CONFLICT,
+                       "%s is a database of another program; move it away or choose another folder",
+                       sqlite3_db_filename(database->connection, "main"));
+}
+
+Status database_open(const char *path, DatabaseMode mode, Database **database, Problem *problem) {
+    *database = NULL;
+    if (path != NULL && mode == DATABASE_WRITER)
+        TRY(make_file(path, problem));
+    Database *made = calloc(1, sizeof *made);
+    if (made == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the database");
+    const int code = sqlite3_open_v2(path != NULL ? path : ":memory:", &made->connection,
+                                     SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL);
+    Status status = STATUS_OK;
+    if (code != SQLITE_OK) {
+        status = problem_set(problem, code == SQLITE_NOMEM ? STATUS_NO_MEMORY : STATUS_IO,
+                             "cannot open %s: %s", path != NULL ? path : "a database in memory",
+                             sqlite3_errstr(code));
+    } else {
+        sqlite3_extended_result_codes(made->connection, 1);
+        sqlite3_busy_timeout(made->connection, 5000);
+        if (mode == DATABASE_WRITER)
+            status = check_owner(made, problem);
+        if (status == STATUS_OK && mode == DATABASE_WRITER)
+            status = database_execute(made, writer_settings, problem);
+        if (status == STATUS_OK)
+            status = database_execute(made, settings, problem);
+        if (status == STATUS_OK && mode == DATABASE_READER)
+            status = database_execute(made, "PRAGMA query_only = ON", problem);
+    }
+    if (status != STATUS_OK) {
+        database_close(made);
+        return status;
+    }
+    *database = made;
+    return STATUS_OK;
+}
+
+void database_close(Database *database) {
+    if (database == NULL)
+        return;
+    for (size_t i = 0; i < database->kept_count; i++)
+        sqlite3_finalize(database->kept[i].statement);
+    sqlite3_close(database->connection);
+    free(database);
+}
+
+// --- migration ---------------------------------------------------------------------------------
+
+static Status migrate_step(Database *database, const EmbeddedFile *file, int64_t version,
+                           Problem *problem) {
+    char footer[96];
+    TRY(database_execute(database, "BEGIN IMMEDIATE", problem));
+    Status status = database_execute(database, file->bytes, problem);
+    sqlite3_snprintf(sizeof footer, footer,
+                     "PRAGMA application_id = %d; PRAGMA user_version = %lld; COMMIT", APPLICATION,
+                     (long long)version);
+    if (status == STATUS_OK)
+        status = database_execute(database, footer, problem);
+    if (status != STATUS_OK && database_is_in_transaction(database))
+        (void)database_execute(database, "ROLLBACK", NULL);
+    return status;
+}
+
+Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem) {
+    int64_t version = 0, last = 0;
+    while (files[last].path != NULL)
+        last++;
+    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", &version,
+                    problem));
+    if (version > last)
+        return problem_set(
+            problem, STATUS_CONFLICT,
+            "%s was written by a newer impactd: its schema is %lld, this program knows %lld; "
+            "use the newer program or another folder",
+            sqlite3_db_filename(database->connection, "main"), (long long)version, (long long)last);
+    for (; version < last; version++)
+        TRY(migrate_step(database, &files[version], version + 1, problem));
+    return STATUS_OK;
+}

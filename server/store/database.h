@@ -1,0 +1,49 @@
+// One connection to SQLite: opening, settings, statements kept ready, transactions, migration.
+// Not thread-safe and not the tables: each connection belongs to one thread at a time (store.c),
+// and the SQL of the tables is in *_rows.c. Used inside store/ alone.
+#ifndef SERVER_STORE_DATABASE_H
+#define SERVER_STORE_DATABASE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "core/base/status.h"
+#include "server/base/embedded.h"
+
+typedef struct Database Database;
+typedef struct sqlite3_stmt Statement;
+struct RowColumn;
+
+typedef enum DatabaseMode {
+    DATABASE_WRITER, // makes the file if it is missing
+    DATABASE_READER,
+} DatabaseMode;
+
+// Opens the file at `path`; NULL is a private database in memory.
+Status database_open(const char *path, DatabaseMode mode, Database **database, Problem *problem);
+void database_close(Database *database);
+
+// Brings the schema to the last of `files`, NNN_WHAT.sql counted from 1 without a gap, each step in
+// a transaction of its own. STATUS_CONFLICT for a newer schema and for a file that is not
+// impactd's.
+Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem);
+
+// Runs SQL that has neither parameters nor rows; any number of statements.
+Status database_execute(Database *database, const char *sql, Problem *problem);
+// Whether a transaction is open. A failed write may have ended it.
+bool database_is_in_transaction(Database *database);
+
+// Runs one statement with the members of `item` bound to its parameters. *changes (may be NULL):
+// rows changed.
+Status database_change(Database *database, const char *sql, const struct RowColumn *columns,
+                       const void *item, int *changes, Problem *problem);
+
+// A statement, made once per connection, ready to be stepped through. `sql` is a constant text: it
+// is known by its address. To be ended before the next one of the same text.
+Status statement_begin(Database *database, const char *sql, const struct RowColumn *columns,
+                       const void *item, Statement **statement, Problem *problem);
+// *has_row is false at the end.
+Status statement_step(Statement *statement, bool *has_row, Problem *problem);
+void statement_end(Statement *statement); // NULL is fine
+
+#endif

@@ -1,0 +1,86 @@
+// The lock is flock's: it ends with the process however that ends, and the file may stay behind.
+// Its text, the holder's number, is for people only.
+#include "server/store/folder.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static Status make(const char *directory, Problem *problem) {
+    char path[PATH_MAX];
+    const size_t length = strlen(directory);
+    if (length == 0 || length >= sizeof path - 32)
+        return problem_set(problem, STATUS_IO,
+                           "the data folder's name has %zu bytes; must be 1 to %zu", length,
+                           sizeof path - 33);
+    memcpy(path, directory, length + 1);
+    for (size_t i = 1; i <= length; i++) {
+        if (path[i] != '/' && path[i] != '\0')
+            continue;
+        const char end = path[i];
+        path[i] = '\0';
+        if (mkdir(path, 0700) != 0 && errno != EEXIST)
+            return problem_set(problem, STATUS_IO, "cannot make the folder %s: %s", path,
+                               strerror(errno));
+        path[i] = end;
+    }
+    return STATUS_OK;
+}
+
+static void say_who(const char *directory, int lock, Problem *problem) {
+    char holder[32] = "";
+    const ssize_t size = read(lock, holder, sizeof holder - 1);
+    if (size > 0)
+        holder[strspn(holder, "0123456789")] = '\0';
+    problem_set(problem, STATUS_CONFLICT,
+                "another impactd%s%s%s uses the folder %s; stop it or choose another folder",
+                holder[0] != '\0' ? " (process " : "", holder, holder[0] != '\0' ? ")" : "",
+                directory);
+}
+
+Status folder_lock(const char *directory, int *lock, Problem *problem) {
+    char path[PATH_MAX];
+    *lock = -1;
+    TRY(make(directory, problem));
+    snprintf(path, sizeof path, "%s/impactd.lock", directory);
+    const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (file < 0)
+        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(errno));
+    if (flock(file, LOCK_EX | LOCK_NB) != 0) {
+        const int code = errno;
+        if (code == EWOULDBLOCK)
+            say_who(directory, file, problem);
+        close(file);
+        return code == EWOULDBLOCK
+                   ? STATUS_CONFLICT
+                   : problem_set(problem, STATUS_IO, "cannot lock %s: %s", path, strerror(code));
+    }
+    // A full disk is no reason not to start.
+    if (ftruncate(file, 0) == 0)
+        (void)dprintf(file, "%ld\n", (long)getpid());
+    *lock = file;
+    return STATUS_OK;
+}
+
+void folder_unlock(int lock) {
+    if (lock >= 0)
+        close(lock);
+}
+
+Status folder_sync(const char *directory, Problem *problem) {
+    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool is_synced = folder >= 0 && fsync(folder) == 0;
+    // Some file systems cannot sync a folder and need not.
+    const int code = errno;
+    if (folder >= 0)
+        close(folder);
+    if (is_synced || (folder >= 0 && code == EINVAL))
+        return STATUS_OK;
+    return problem_set(problem, STATUS_IO, "cannot sync the folder %s: %s", directory,
+                       strerror(code));
+}

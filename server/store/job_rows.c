@@ -1,0 +1,128 @@
+// Jobs. The integer key rises with the order of acceptance: listing walks it downwards, a start
+// walks it upwards.
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/store/job_rows.h"
+#include "server/store/store.h"
+
+// clang-format off
+static const RowColumn job_columns[] = {
+    ROW_COLUMN(JobRow, id, COLUMN_NAME),
+    ROW_COLUMN(JobRow, state, COLUMN_CHOICE),
+    ROW_COLUMN(JobRow, result, COLUMN_NAME),
+    ROW_COLUMN(JobRow, is_cached, COLUMN_FLAG),
+    ROW_COLUMN(JobRow, created_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN(JobRow, started_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN(JobRow, finished_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN(JobRow, queued, COLUMN_REAL),
+    ROW_COLUMN(JobRow, run, COLUMN_REAL),
+    ROW_COLUMN(JobRow, total, COLUMN_REAL),
+    ROW_COLUMN(JobRow, title, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, problem, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, warnings, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, scene, COLUMN_TEXT),
+    ROW_END
+};
+// clang-format on
+
+#define JOB_SHORT                                                                                  \
+    "id, state, result, is_cached, created_unix_ms, started_unix_ms, finished_unix_ms, queued, "   \
+    "run, total, "                                                                                 \
+    "title, problem, warnings"
+
+void job_row_clear(JobRow *row) {
+    row_clear(job_columns, row, sizeof *row);
+}
+
+void job_rows_clear(JobRows *rows) {
+    for (size_t i = 0; i < rows->count; i++)
+        job_row_clear(&rows->at[i]);
+    free(rows->at);
+    *rows = (JobRows){0};
+}
+
+static Status not_found(const char *id, Problem *problem) {
+    return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", id);
+}
+
+static Status add(Database *database, const void *work, Problem *problem) {
+    static const char sql[] =
+        "INSERT INTO jobs (" JOB_SHORT
+        ", scene) VALUES (:id, :state, :result, :is_cached, :created_unix_ms, "
+        ":started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, :problem, :warnings, "
+        ":scene)";
+    return database_change(database, sql, job_columns, work, NULL, problem);
+}
+
+Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
+    return store_write(store, add, row, problem);
+}
+
+Status job_row_update(Database *database, const JobRow *row, Problem *problem) {
+    static const char sql[] = "UPDATE jobs SET state = :state, result = :result, is_cached = "
+                              ":is_cached, started_unix_ms = :started_unix_ms, "
+                              "finished_unix_ms = :finished_unix_ms, queued = :queued, run = :run, "
+                              "total = :total, problem = :problem "
+                              "WHERE id = :id";
+    int changes;
+    TRY(database_change(database, sql, job_columns, row, &changes, problem));
+    return changes > 0 ? STATUS_OK : not_found(row->id, problem);
+}
+
+static Status update(Database *database, const void *work, Problem *problem) {
+    return job_row_update(database, work, problem);
+}
+
+Status store_job_update(Store *store, const JobRow *row, Problem *problem) {
+    return store_write(store, update, row, problem);
+}
+
+typedef struct Key {
+    char *id;
+    uint64_t most;
+} Key;
+static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT),
+                                        ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
+
+Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem) {
+    static const char sql[] = "SELECT " JOB_SHORT " FROM jobs WHERE id = :id";
+    const Key key = {(char *)id, 0};
+    bool is_found;
+    memset(row, 0, sizeof *row);
+    TRY(store_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK : not_found(id, problem);
+}
+
+static Status load(Store *store, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
+    void *at;
+    const Status status = store_all(store, sql, key_columns, key, job_columns, sizeof *rows->at,
+                                    &at, &rows->count, problem);
+    rows->at = at;
+    if (status != STATUS_OK)
+        job_rows_clear(rows);
+    return status;
+}
+
+Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows,
+                      Problem *problem) {
+    static const char first_sql[] =
+        "SELECT " JOB_SHORT " FROM jobs ORDER BY number DESC LIMIT :most";
+    static const char next_sql[] =
+        "SELECT " JOB_SHORT " FROM jobs WHERE number < (SELECT number FROM jobs "
+        "WHERE id = :id) ORDER BY number DESC LIMIT :most";
+    const Key key = {(char *)before, most};
+    *rows = (JobRows){0};
+    if (before != NULL) {
+        JobRow row;
+        TRY(store_job_load(store, before, &row, problem));
+        job_row_clear(&row);
+    }
+    return load(store, before == NULL ? first_sql : next_sql, &key, rows, problem);
+}
+
+Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem) {
+    static const char sql[] =
+        "SELECT " JOB_SHORT ", scene FROM jobs WHERE state < 2 ORDER BY number";
+    return load(store, sql, &(Key){0}, rows, problem);
+}

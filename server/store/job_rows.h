@@ -1,0 +1,11 @@
+// What a transaction over several tables needs of the jobs'. Everything else of them is in store.h.
+// Not for the rest of the server. Used by result_rows.c.
+#ifndef SERVER_STORE_JOB_ROWS_H
+#define SERVER_STORE_JOB_ROWS_H
+
+#include "server/store/access.h"
+
+// Within a transaction: all that changes of a job. STATUS_NOT_FOUND.
+Status job_row_update(Database *database, const JobRow *row, Problem *problem);
+
+#endif

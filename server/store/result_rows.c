@@ -1,0 +1,93 @@
+// Results. A row is written once, in the same transaction as the jobs that it finishes.
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/store/job_rows.h"
+#include "server/store/store.h"
+
+// clang-format off
+static const RowColumn result_columns[] = {
+    ROW_COLUMN(ResultRow, id, COLUMN_NAME),
+    ROW_COLUMN(ResultRow, engine, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, sample_rate, COLUMN_REAL),
+    ROW_COLUMN(ResultRow, count, COLUMN_COUNT),
+    ROW_COLUMN(ResultRow, created_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN(ResultRow, summary, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, plan, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, warnings, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, energy, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, scene, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, impacts, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, psd, COLUMN_TEXT),
+    ROW_END
+};
+// clang-format on
+
+void result_row_clear(ResultRow *row) {
+    row_clear(result_columns, row, sizeof *row);
+}
+
+typedef struct Finish {
+    const ResultRow *result;
+    const JobRow *const *jobs;
+    size_t job_count;
+} Finish;
+
+static Status finish(Database *database, const void *work, Problem *problem) {
+    static const char sql[] = "INSERT INTO results (id, engine, sample_rate, count, "
+                              "created_unix_ms, summary, plan, warnings, energy, scene, "
+                              "impacts, psd) VALUES (:id, :engine, :sample_rate, :count, "
+                              ":created_unix_ms, :summary, :plan, :warnings, "
+                              ":energy, :scene, :impacts, :psd) ON CONFLICT (id) DO NOTHING";
+    const Finish *both = work;
+    if (both->result != NULL)
+        TRY(database_change(database, sql, result_columns, both->result, NULL, problem));
+    for (size_t i = 0; i < both->job_count; i++)
+        TRY(job_row_update(database, both->jobs[i], problem));
+    return STATUS_OK;
+}
+
+Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, Problem *problem) {
+    return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
+}
+
+typedef struct Key {
+    char *id;
+} Key;
+static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_END};
+
+static Status load(Store *store, const char *sql, const char *id, ResultRow *row,
+                   Problem *problem) {
+    const Key key = {(char *)id};
+    bool is_found;
+    memset(row, 0, sizeof *row);
+    TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK
+                    : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
+}
+
+Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem) {
+    static const char sql[] =
+        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, energy, "
+        "scene, impacts, psd FROM results WHERE id = :id";
+    return load(store, sql, id, row, problem);
+}
+
+Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem) {
+    static const char sql[] =
+        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings "
+        "FROM results WHERE id = :id";
+    return load(store, sql, id, row, problem);
+}
+
+Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem) {
+    static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
+    return load(store, sql, id, row, problem);
+}
+
+bool store_result_exists(Store *store, const char *id) {
+    static const char sql[] = "SELECT id FROM results WHERE id = :id";
+    ResultRow row;
+    return load(store, sql, id, &row, NULL) == STATUS_OK;
+}

@@ -1,0 +1,46 @@
+// How a struct's members lie in columns: one table per stored struct, walked to bind and to read by
+// name. Not core/base/field.h: a stored row has names of fixed size and times in whole
+// milliseconds, and no faults to tell a person. Used inside store/ alone.
+#ifndef SERVER_STORE_ROW_H
+#define SERVER_STORE_ROW_H
+
+#include <stddef.h>
+
+#include "core/base/status.h"
+#include "server/store/database.h"
+
+typedef enum ColumnKind {
+    COLUMN_END,
+    COLUMN_TEXT,    // char *, owned; NULL is NULL
+    COLUMN_NAME,    // char[size]; "" is never NULL
+    COLUMN_REAL,    // double; NAN is NULL
+    COLUMN_INTEGER, // int64_t
+    COLUMN_COUNT,   // uint64_t, size_t
+    COLUMN_CHOICE,  // int
+    COLUMN_FLAG,    // bool
+} ColumnKind;
+
+typedef struct RowColumn {
+    const char *name;
+    ColumnKind kind;
+    size_t offset, size;
+} RowColumn;
+
+// clang-format off
+#define ROW_COLUMN(Type, member, kind_) \
+    {.name = #member, .kind = kind_, .offset = offsetof(Type, member), .size = sizeof(((Type *)0)->member)}
+#define ROW_END {.kind = COLUMN_END}
+// clang-format on
+
+// Binds every parameter ":name" of the statement to the member of that name. `columns` may be NULL
+// where it has none. Texts are borrowed until the statement ends.
+Status row_bind(Statement *statement, const RowColumn *columns, const void *item, Problem *problem);
+
+// Reads the current row into the members of its columns' names; the others stay as they are. `item`
+// holds no texts. On failure it is cleared.
+Status row_read(Statement *statement, const RowColumn *columns, void *item, Problem *problem);
+
+// Frees the texts and sets all of `item`, of `size` bytes, to zero.
+void row_clear(const RowColumn *columns, void *item, size_t size);
+
+#endif

@@ -1,0 +1,21 @@
+// The one thread that writes: it takes whatever is queued into one transaction, so that many
+// callers share the cost of making it durable. Not for reading. Used by store.c.
+#ifndef SERVER_STORE_WRITER_H
+#define SERVER_STORE_WRITER_H
+
+#include "core/base/status.h"
+#include "server/store/access.h"
+
+typedef struct Writer Writer;
+
+// Starts the thread. Where `shared` is not NULL, its connections are the only ones: the writer
+// takes one from there for each transaction. Otherwise `database` is the writer's own, borrowed
+// until writer_stop.
+Status writer_start(Database *database, Store *shared, Writer **writer, Problem *problem);
+// Writes what is queued, then ends the thread. NULL is fine. Nobody may call writer_do any more.
+void writer_stop(Writer *writer);
+
+// As store_write.
+Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem);
+
+#endif

@@ -1,0 +1,252 @@
+#!/usr/bin/env python3
+"""The command line: exit codes, formats, help, the progress bar, Ctrl-C."""
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+SANITIZED = True
+SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
+
+
+def endless():
+    """A scene that takes many seconds: few samples, millions of impacts."""
+    scene = program.scene("paper_sine_aluminium")
+    scene.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+    return json.dumps(scene)
+
+
+def test_help_leads_with_examples():
+    """--help begins with commands that can be typed, and every command has its page."""
+    code, out, errors = program.run("--help")
+    assert code == 0 and errors == ""
+    lines = [line.strip() for line in out.splitlines() if line.strip()]
+    assert lines[1].startswith("impactd serve"), lines[:3]
+    for command in ("serve", "run", "check", "help", "version"):
+        assert any(line.startswith(command + " ") for line in lines), command
+        pages = [program.run("help", command), program.run(command, "--help"), program.run(command, "-h")]
+        assert pages[0] == pages[1] == pages[2], command
+        assert pages[0][0] == 0 and "impactd " + command in pages[0][1], command
+
+
+def test_usage_faults():
+    """Wrong words are exit code 2, told on stderr, with what was probably meant."""
+    for arguments, expected in [
+            ((), "impactd"),
+            (("chekc", SPONGE), "did you mean check?"),
+            (("help", "rnu"), "did you mean run?"),
+            (("run", SPONGE, "--outptu", "x.csv"), "did you mean --output?"),
+            (("run", SPONGE, "-x"), "-x"),
+            (("run",), "takes one scene"),
+            (("run", SPONGE, SPONGE), "takes one scene"),
+            (("run", SPONGE, "-o"), "needs a value"),
+            (("run", SPONGE, "-o", "out.xlsx"), ".csv"),
+            (("run", SPONGE, "-o", "out"), ".csv"),
+            (("check",), "takes one scene"),
+            (("check", "--json=maybe", SPONGE), "true or false"),
+            (("serve", "--workers", "many"), "--workers"),
+            (("serve", "--workers", "100000"), "--workers"),
+            (("serve", "--wokers", "2"), "did you mean --workers?"),
+            (("version", "x"), "takes no arguments")]:
+        code, out, errors = program.run(*arguments)
+        assert code == 2, (arguments, code, errors)
+        assert out == "" and expected in errors, (arguments, out, errors)
+
+
+def test_settings_come_from_flag_environment_file_and_default():
+    """serve --print-config: a flag beats the environment, that the file, that the default; each says so."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "impactd.conf")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("# settings\nworkers = 3\nqueue = 30  # jobs\nmax_body = 5000\n")
+        environment = {**os.environ, "IMPACTD_QUEUE": "40", "IMPACTD_MAX_BODY": "6000", "IMPACTD_CONFIG": path}
+        code, out, errors = program.run("serve", "--max-body", "7000", "--print-config", environment=environment)
+        assert code == 0, errors
+        for line in ("workers = 3  # file", "queue = 40  # environment", "max_body = 7000  # flag"):
+            assert line in out.splitlines(), (line, out)
+        assert any(line.startswith("listen = 127.0.0.1:8080") and line.endswith("# default")
+                   for line in out.splitlines()), out
+        with open(path, "a", encoding="utf-8") as file:
+            file.write("wrokers = 4\nnonsense\n")
+        code, out, errors = program.run("serve", "--print-config", environment=environment)
+        assert code == 2 and f"{path}:5" in errors and "workers" in errors and f"{path}:6" in errors, errors
+
+
+def test_run_prints_the_finished_job():
+    """`run` without -o prints the job of the contract, and nothing else."""
+    code, out, errors = program.run("run", SPONGE)
+    assert code == 0 and errors == "", (code, errors)
+    job = json.loads(out)
+    for member in ("id", "status", "progress", "cached", "result", "created", "started", "finished", "problem",
+                   "plan", "summary", "warnings", "timing", "links"):
+        assert member in job, member
+    assert (job["status"], job["progress"], job["cached"], job["problem"]) == ("successful", 100, False, None)
+    derived = job["plan"]["derived"][0]
+    assert derived["material"] == "sponge@1" and abs(derived["stiffness"] - 1655.6191) < 1e-4, derived
+    assert job["summary"]["impacts"] == 22 and abs(job["summary"]["peak_contact_force"] - 5.7175273) < 1e-7
+    with open(SPONGE, encoding="utf-8") as file:
+        text = file.read()
+    code, out, errors = program.run("run", "-", text=text)
+    assert code == 0 and json.loads(out)["result"] == job["result"], errors
+
+
+def test_run_writes_each_format_alike():
+    """-o json, csv and npy hold the same samples, bit for bit."""
+    with tempfile.TemporaryDirectory() as folder:
+        for extension in ("json", "csv", "npy"):
+            code, out, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "out." + extension))
+            assert (code, out, errors) == (0, "", ""), (extension, code, out, errors)
+        assert sorted(os.listdir(folder)) == ["out.csv", "out.json", "out.npy"]
+        with open(os.path.join(folder, "out.json"), encoding="utf-8") as file:
+            whole = json.load(file)
+        assert list(whole) == ["job", "series", "impacts", "psd"]
+        channels = whole["series"]["channels"]
+        count = whole["series"]["count"]
+        assert count == 10001 and list(channels) == ["displacement", "velocity", "acceleration",
+                                                     "damper_displacement", "contact_force"]
+        assert whole["impacts"]["count"] == len(whole["impacts"]["impacts"]) == 22
+        assert whole["psd"]["segment"] == 4096 and len(whole["psd"]["frequency"]["values"]) == 2049
+        table = numpy.load(os.path.join(folder, "out.npy"))
+        assert table.shape == (count, 6) and table.flags.f_contiguous
+        with open(os.path.join(folder, "out.csv"), encoding="utf-8") as file:
+            assert file.readline().startswith("time [s],displacement [m],velocity [m/s],")
+            text = numpy.array([[float(cell) for cell in line.split(",")] for line in file])
+        assert numpy.array_equal(text, table)
+        assert numpy.array_equal(table[:, 0], numpy.arange(count) / 1000)
+        for column, name in enumerate(channels, 1):
+            assert numpy.array_equal(table[:, column], numpy.array(channels[name]["values"])), name
+
+
+def test_an_output_can_be_replaced_and_is_readable():
+    """An earlier file is replaced; the new one has the rights any new file gets; a device is refused."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = os.path.join(folder, "out.csv")
+        for _ in range(2):
+            assert program.run("run", SPONGE, "-o", target)[0] == 0
+        mask = os.umask(0)
+        os.umask(mask)
+        assert os.stat(target).st_mode & 0o777 == 0o666 & ~mask
+        os.mkfifo(os.path.join(folder, "pipe.csv"))
+        code, _, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "pipe.csv"))
+        assert code == 1 and "not a regular file" in errors, (code, errors)
+        code, _, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "none", "out.csv"))
+        assert code == 1 and "No such file" in errors, (code, errors)
+        assert sorted(os.listdir(folder)) == ["out.csv", "pipe.csv"]
+
+
+def test_bad_scenes_are_exit_code_3():
+    """`run` and `check` tell every fault of a scene on one line each and exit with 3; a missing file is 4."""
+    scene = program.scene("paper_free_sponge")
+    scene["structure"]["mass"] = -1
+    scene["duratoin"] = scene.pop("duration")
+    for command in ("run", "check"):
+        code, out, errors = program.run(command, "-", text=json.dumps(scene))
+        assert code == 3 and out == "", (command, code, out)
+        lines = errors.splitlines()
+        assert len(lines) == 3, errors
+        assert any("/structure/mass: must be above 0 kg, is -1" in line for line in lines), errors
+        assert any("/duratoin: " in line and 'did you mean "duration"?' in line for line in lines), errors
+        assert any("/duration: " in line for line in lines), errors
+        code, _, errors = program.run(command, "/nonexistent/scene.json")
+        assert code == 4 and "cannot be read" in errors, (command, code, errors)
+        code, _, errors = program.run(command, "-", text='{"structure": ' + " " * (16 << 20) + "{}}")
+        assert code == 3 and "larger" in errors, (command, code, errors)
+
+
+def test_check_shows_the_plan():
+    """`check` names model, solver, stiffness and damping for people; --json is the dry run's shape."""
+    code, out, errors = program.run("check", SPONGE)
+    assert code == 0 and errors == ""
+    for part in ("spring_damper", "exact", "sponge@1", "k_b = 1655.6", "c_b = 4.0457", "10001"):
+        assert part in out, (part, out)
+    assert "\033" not in out
+    code, out, _ = program.run("check", SPONGE, "--json")
+    plan = json.loads(out)
+    assert code == 0 and plan["samples"] == 10001 and plan["cost"]["cpu_seconds"] > 0 and plan["cost"]["bytes"] > 0
+    assert plan["plan"]["contact_model"] == "spring_damper" and plan["result"].startswith("r-")
+    again = program.run("run", "-", text=json.dumps(plan["scene"]))
+    assert again[0] == 0 and json.loads(again[1])["result"] == plan["result"], again
+
+
+def test_a_full_disk_is_told():
+    """Output that cannot be written is exit code 1."""
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run([program.impactd(), "run", SPONGE], stdout=full, stderr=subprocess.PIPE,
+                              text=True, check=False)
+    assert done.returncode == 1 and "cannot be written" in done.stderr, done
+
+
+def test_interrupts_stop_at_once():
+    """Ctrl-C and SIGTERM end a long run within half a second, exit code 130, and leave no file."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with tempfile.TemporaryDirectory() as folder:
+            target = os.path.join(folder, "out.csv")
+            with open(target, "w", encoding="utf-8") as file:
+                file.write("mine")
+            with subprocess.Popen([program.impactd(), "run", "-", "-o", target], stdin=subprocess.PIPE,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+                process.stdin.write(endless())
+                process.stdin.close()
+                end = time.monotonic() + 20
+                while len(os.listdir(folder)) < 2:
+                    assert process.poll() is None and time.monotonic() < end, process.stderr.read()
+                    time.sleep(0.01)
+                time.sleep(0.3)
+                assert process.poll() is None, "the scene is too short for this test"
+                process.send_signal(number)
+                began = time.monotonic()
+                assert process.wait(10) == 130
+                assert time.monotonic() - began < 0.5
+            assert os.listdir(folder) == ["out.csv"]
+            with open(target, encoding="utf-8") as file:
+                assert file.read() == "mine"
+
+
+def on_a_terminal(text, seconds):
+    """What `run` writes to a terminal as its stderr within some seconds."""
+    master, slave = pty.openpty()
+    with subprocess.Popen([program.impactd(), "run", "-"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+                          stderr=slave, text=True) as process:
+        os.close(slave)
+        process.stdin.write(text)
+        process.stdin.close()
+        shown, end = b"", time.monotonic() + seconds
+        while time.monotonic() < end and process.poll() is None:
+            if select.select([master], [], [], 0.05)[0]:
+                try:
+                    shown += os.read(master, 4096)
+                except OSError:  # the terminal's end: the process is gone
+                    break
+        process.kill()
+    os.close(master)
+    return shown.decode()
+
+
+def test_progress_bar_on_a_terminal():
+    """A long run shows a bar that moves on a terminal; a short one, or one into a file, shows none."""
+    shown = on_a_terminal(endless(), 2)
+    percents = [int(part.split("%")[0].split("]")[1]) for part in shown.split("\r") if "%" in part]
+    assert len(percents) >= 3 and percents == sorted(percents) and percents[-1] <= 100, shown
+    with open(SPONGE, encoding="utf-8") as file:
+        assert on_a_terminal(file.read(), 20) == ""
+
+
+def test_version():
+    """`version` and --version print the engine's name and version."""
+    code, out, errors = program.run("version")
+    assert (code, errors) == (0, "") and out == program.run("--version")[1] and len(out.split()) >= 1, out
+
+
+if __name__ == "__main__":
+    program.main(globals())

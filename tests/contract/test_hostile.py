@@ -1,0 +1,231 @@
+#!/usr/bin/env python3
+"""Requests by raw socket: heads that two parsers could read differently, slow and broken clients, pipelining."""
+
+import http.client
+import json
+import os
+import re
+import socket
+import sys
+import threading
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+SANITIZED = True
+HOST = b"Host: localhost\r\n"
+GET = b"GET /version HTTP/1.1\r\n"
+POST = b"POST /v1/jobs HTTP/1.1\r\n" + HOST + b"Content-Type: application/json\r\n"
+SECOND = GET + HOST + b"\r\n"
+
+
+def connect(daemon):
+    made = socket.create_connection(("127.0.0.1", daemon.port), timeout=10)
+    made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return made
+
+
+def exchange(daemon, data, seconds=0.4):
+    """Sends bytes; returns the replies' statuses, whether the daemon closed, and all it sent."""
+    with connect(daemon) as client:
+        client.sendall(data)
+        client.settimeout(seconds)
+        got, is_closed = b"", False
+        try:
+            while True:
+                piece = client.recv(65536)
+                if not piece:
+                    is_closed = True
+                    break
+                got += piece
+        except ConnectionError:
+            is_closed = True
+        except TimeoutError:
+            pass
+    return [int(code) for code in re.findall(rb"^HTTP/1\.1 (\d{3}) ", got, re.M)], is_closed, got
+
+
+def test_ambiguous_heads_are_refused_and_the_connection_closed():
+    """Each is answered once, with its 4xx or 5xx, and a second request behind it is never served."""
+    cases = [
+        (400, GET + HOST + HOST),
+        (400, GET + HOST + b"Host: example.org\r\n"),
+        (400, GET + b"Host: example.org\r\n"),
+        (400, GET + b"Host: localhost.example.org\r\n"),
+        (400, GET),
+        (400, GET + b"Host : localhost\r\n"),
+        (505, b"GET /version HTTP/1.9\r\n" + HOST),
+        (505, b"GET /version HTTP/2.0\r\n" + HOST),
+        (501, b"BREW /version HTTP/1.1\r\n" + HOST),
+        (501, b"TRACE /version HTTP/1.1\r\n" + HOST),
+        (501, b"CONNECT localhost:80 HTTP/1.1\r\n" + HOST),
+        (400, b"OPTIONS * HTTP/1.1\r\n" + HOST),
+        (400, b"GET http://localhost/version HTTP/1.1\r\n" + HOST),
+        (400, b"GET version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /v1/%2e%2e/version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /v1/.%2E/version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /v1/../version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version%00.json HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version?a=%00 HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version?a=%zz HTTP/1.1\r\n" + HOST),
+        (400, GET + HOST + b"X-A: a\rX-B: b\r\n"),
+        (400, GET + HOST + b"X-A: a\x01b\r\n"),
+        (400, GET + HOST + b"Content-Length: 0\r\nContent-Length: 5\r\n"),
+        (400, POST + b"Content-Length: 2\r\nContent-Length: 2\r\n"),
+        (400, POST + b"Content-Length: +2\r\n"),
+        (400, POST + b"Content-Length: 2, 2\r\n"),
+        (400, POST + b"Content-Length: -1\r\n"),
+        (400, POST + b"Content-Length: 0x2\r\n"),
+        (400, POST + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n"),
+        (501, POST + b"Transfer-Encoding: gzip\r\n"),
+        (501, POST + b"Transfer-Encoding: chunked, gzip\r\n"),
+        (501, POST + b"Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n"),
+        (417, POST + b"Content-Length: 2\r\nExpect: miracles\r\n"),
+        (413, POST + b"Content-Length: 99999999999999999999999\r\n"),
+        (413, POST + b"Content-Length: 99999999999\r\n"),
+        (414, b"GET /" + 5000 * b"a" + b" HTTP/1.1\r\n" + HOST),
+        (414, b"GET /" + 40000 * b"a" + b" HTTP/1.1\r\n" + HOST),
+        (431, GET + HOST + b"X-A: " + 40000 * b"a" + b"\r\n"),
+    ]
+    with program.daemon() as daemon:
+        for expected, head in cases:
+            statuses, is_closed, got = exchange(daemon, head + b"\r\n" + SECOND)
+            assert b'"engine"' not in got, (head[:80], "a second request was served", got)
+            assert is_closed, (head[:80], "left open", got)
+            assert statuses[:1] == [expected], (head[:80], got[:300])
+        assert daemon.get("/version").status == 200
+
+
+def test_garbage_is_not_served():
+    """Bytes that are no HTTP at all end in a 4xx or a closed connection."""
+    with program.daemon() as daemon:
+        for data in (b"garbage\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"GET\r\n\r\n", b"GET /version\r\n\r\n",
+                     b"\x00" * 5000, b"\r\n" * 3000, os.urandom(3000), b"GET /version HTTP/1.1 extra\r\n" + HOST + b"\r\n",
+                     GET + HOST + b" folded: x\r\n\r\n", GET + b": x\r\n" + HOST + b"\r\n", b"A" * 70000):
+            statuses, _, got = exchange(daemon, data, 0.2)
+            assert all(status >= 400 for status in statuses), (data[:60], got)
+        assert daemon.get("/version").status == 200
+
+
+def test_old_and_unusual_but_good_requests_are_served():
+    """HTTP/1.0 without Host, [::1] and ports in Host, chunked bodies, Expect: 100-continue, leading blank lines."""
+    body = json.dumps(program.scene("paper_free_sponge")).encode()
+    with program.daemon() as daemon:
+        for data, closes in ((b"GET /version HTTP/1.0\r\n\r\n", True),
+                             (GET + b"Host: [::1]:65535\r\n\r\n", False), (GET + b"Host: LocalHost:1\r\n\r\n", False),
+                             (b"\r\n" + SECOND, False), (GET + HOST + b"Connection: close\r\n\r\n", True),
+                             (GET + HOST + b"Content-Length: 3\r\n\r\nabc", False)):
+            statuses, is_closed, got = exchange(daemon, data)
+            assert statuses == [200] and is_closed == closes, (data, got)
+        half = len(body) // 2
+        chunked = b"%x\r\n%s\r\n%x;a=b\r\n%s\r\n0\r\nTrailer: x\r\n\r\n" % (half, body[:half], len(body) - half, body[half:])
+        statuses, _, got = exchange(daemon, POST + b"Transfer-Encoding: chunked\r\n\r\n" + chunked, 2)
+        assert statuses == [200] and b'"successful"' in got, got
+        with connect(daemon) as client:
+            client.sendall(POST + b"Expect: 100-continue\r\nContent-Length: %d\r\n\r\n" % len(body))
+            assert client.recv(100).startswith(b"HTTP/1.1 100 "), "the body is asked for"
+            client.sendall(body)
+            assert client.recv(100).startswith(b"HTTP/1.1 200 ")
+        statuses, is_closed, got = exchange(daemon, POST + b"Expect: 100-continue\r\nContent-Length: 20000000\r\n\r\n")
+        assert statuses == [413] and is_closed, got
+
+
+def test_pipelined_requests_are_answered_in_order():
+    """Requests sent at once, one of which waits: as many answers, in the same order."""
+    with program.daemon() as daemon:
+        body = json.dumps(program.scene("paper_random_sponge")).encode()
+        data = (b"".join(b"GET /v1/materials/m%d HTTP/1.1\r\n" % i + HOST + b"\r\n" for i in range(20))
+                + POST + b"Content-Length: %d\r\n\r\n" % len(body) + body + SECOND)
+        statuses, is_closed, got = exchange(daemon, data, 2)
+        assert statuses == [404] * 20 + [200, 200] and not is_closed, statuses
+        order = [int(i) for i in re.findall(rb'"instance": "/v1/materials/m(\d+)"', got)]
+        assert order == list(range(20)), order
+        assert got.index(b'"successful"') < got.index(b'"engine"')
+
+
+def test_slow_and_silent_clients_hold_up_nobody():
+    """400 clients who stop in the middle of head or body: others are answered at once, and descriptors come back."""
+    with program.daemon() as daemon:
+        folder = f"/proc/{daemon.process.pid}/fd"
+        daemon.get("/version")
+        before = len(os.listdir(folder))
+        slow = [connect(daemon) for _ in range(400)]
+        for i, client in enumerate(slow):
+            client.sendall((b"GET /ver", GET + b"X-A: b", POST + b"Content-Length: 100\r\n\r\n{",
+                            POST + b"Transfer-Encoding: chunked\r\n\r\n5\r\n{")[i % 4])
+        times = []
+        for _ in range(50):
+            began = time.monotonic()
+            assert daemon.get("/health/live").status == 200
+            times.append(time.monotonic() - began)
+        assert sorted(times)[45] < (2 if program.is_sanitized() else 0.2), times
+        for client in slow:
+            client.close()
+        end = time.monotonic() + 5
+        while len(os.listdir(folder)) > before + 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        assert len(os.listdir(folder)) <= before + 2, "descriptors are lost"
+
+
+def test_a_dripping_head_is_cut_off():
+    """A client who sends its head a byte at a time is thrown out after 10 s, whether or not it goes on."""
+    with program.daemon() as daemon:
+        client = connect(daemon)
+        client.sendall(GET)
+        began = time.monotonic()
+        try:
+            while time.monotonic() - began < 20:
+                client.sendall(b"a")
+                time.sleep(0.3)
+            seconds = None
+        except OSError:
+            seconds = time.monotonic() - began
+        client.close()
+        assert seconds is not None and 8 < seconds < 14, seconds
+
+
+def test_clients_who_leave_while_waiting():
+    """Many clients submit, wait and vanish: the daemon goes on, and its jobs can be dismissed."""
+    scene = program.scene("paper_sine_aluminium")
+    scene.update(sample_rate=10, output={"channels": [], "psd": None})
+    with program.daemon("--workers", "1") as daemon:
+        def leave(i):
+            body = json.dumps({**scene, "duration": 1e5 + i}).encode()
+            client = connect(daemon)
+            client.sendall(POST + b"Prefer: wait=3\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+            time.sleep(0.01 * (i % 5))
+            if i % 3 == 0:
+                client.shutdown(socket.SHUT_WR)
+            client.close()
+        threads = [threading.Thread(target=leave, args=(i,)) for i in range(60)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for _ in range(2):
+            for job in daemon.get("/v1/jobs?limit=100").json()["jobs"]:
+                daemon.request("DELETE", f"/v1/jobs/{job['id']}")
+        time.sleep(3.2)
+        assert daemon.submit(program.scene("paper_free_sponge")).json()["status"] == "successful"
+
+
+def test_the_number_of_connections_makes_no_stall():
+    """Keep-alive connections around multiples of 128: every one is answered, round after round."""
+    with program.daemon() as daemon:
+        for count in (127, 128, 129, 256):
+            clients = [http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=10) for _ in range(count)]
+            began = time.monotonic()
+            for _ in range(5):
+                for client in clients:
+                    client.request("GET", "/health/live")
+                for client in clients:
+                    reply = client.getresponse()
+                    assert reply.status == 200 and reply.read() == b'{"status": "live"}\n'
+            assert time.monotonic() - began < (30 if program.is_sanitized() else 5), count
+            for client in clients:
+                client.close()
+
+
+if __name__ == "__main__":
+    program.main(globals())

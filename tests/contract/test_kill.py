@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""A job that was accepted is finished, once, whatever happens to the daemon in between."""
+
+import concurrent.futures
+import json
+import os
+import shutil
+import sqlite3
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+JOBS, ROUNDS = 200, 10
+RUN = 0.05  # [s] of CPU a job
+
+
+def long_scene(number, duration):
+    """A long scene of which only the summary is wanted, each different."""
+    scene = program.scene("paper_sine_aluminium")
+    scene.update(duration=duration, output={"channels": [], "psd": None})
+    scene["dampers"][0]["clearance"] = 0.012 + 0.00002 * number
+    return scene
+
+
+def fitting_duration():
+    """How long a scene takes RUN seconds here, so that 200 of them outlast their being submitted."""
+    took = min(json.loads(program.run("run", "-", text=json.dumps(long_scene(0, 500)))[1])["timing"]["run"]
+               for _ in range(3))
+    return round(500 * RUN / took)
+
+
+def rows(folder, query):
+    """Reads a copy of the database as the killed daemon left it."""
+    with tempfile.TemporaryDirectory() as copy:
+        for name in os.listdir(folder):
+            if name.startswith("impactd.db"):
+                shutil.copy(os.path.join(folder, name), copy)
+        connection = sqlite3.connect(os.path.join(copy, "impactd.db"))
+        try:
+            return connection.execute(query).fetchall()
+        finally:
+            connection.close()
+
+
+def submit(daemon, scene):
+    reply = daemon.submit(scene, headers={"Prefer": "respond-async"})
+    assert reply.status == 202, reply
+    return reply.json()["id"]
+
+
+def listed(daemon):
+    """The ids of all jobs, page by page."""
+    found, target = [], "/v1/jobs?limit=100"
+    while target:
+        reply = daemon.get(target)
+        found += [job["id"] for job in reply.json()["jobs"]]
+        link = reply.headers.get("link", "")
+        target = link[link.index("<") + 1:link.index(">")] if 'rel="next"' in link else None
+    return found
+
+
+def one_round(number, duration):
+    folder = tempfile.mkdtemp(prefix="impactd-")
+    try:
+        with program.Daemon(program.build, "--workers", "2", data=folder) as daemon:
+            with concurrent.futures.ThreadPoolExecutor(4) as pool:
+                ids = list(pool.map(lambda i: submit(daemon, long_scene(i, duration)), range(JOBS)))
+            time.sleep(0.05 * number)  # not always at the same moment
+            daemon.kill()
+        assert len(set(ids)) == JOBS
+        before = dict(rows(folder, "SELECT id, finished_unix_ms FROM jobs WHERE state = 2"))
+        unfinished = rows(folder, "SELECT count(*) FROM jobs WHERE state < 2")[0][0]
+        assert len(before) + unfinished == JOBS, (len(before), unfinished)
+        assert unfinished >= JOBS / 2, f"only {unfinished} of {JOBS} were unfinished"
+
+        with program.daemon("--workers", "2", data=folder) as daemon:
+            jobs = [daemon.finished(one, 120) for one in ids]
+            assert [job["id"] for job in jobs] == ids
+            assert all(job["status"] == "successful" for job in jobs), \
+                [job for job in jobs if job["status"] != "successful"][:2]
+            assert len({job["result"] for job in jobs}) == JOBS
+            assert sorted(listed(daemon)) == sorted(ids), "a job was lost or doubled"
+        after = dict(rows(folder, "SELECT id, finished_unix_ms FROM jobs WHERE state = 2"))
+        assert len(after) == JOBS
+        assert all(after[one] == finished for one, finished in before.items()), "a finished job ran again"
+        assert rows(folder, "SELECT count(*), count(DISTINCT id) FROM results") == [(JOBS, JOBS)]
+        return unfinished
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def test_accepted_jobs_survive_a_kill():
+    """kill -9 with 200 jobs accepted, at least half unfinished: afterwards all finish, none twice, none lost; 10 rounds."""
+    duration = fitting_duration()
+    unfinished = [one_round(number, duration) for number in range(ROUNDS)]
+    print(f"      unfinished at the kill: {unfinished}")
+
+
+if __name__ == "__main__":
+    program.main(globals())

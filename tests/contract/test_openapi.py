@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+"""schema/openapi.json tells what routes.c has, no more and no less, and real answers have the shapes it promises."""
+
+import json
+import os
+import re
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
+    DOCUMENT = json.load(openapi)
+
+TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
+
+
+def operations():
+    """Every (method, path) of the document, with its operation."""
+    return {(method.upper(), path): operation
+            for path, item in DOCUMENT["paths"].items() for method, operation in item.items()}
+
+
+def routes():
+    """Every (method, pattern) of routes.c, with the names its query may hold."""
+    with open(os.path.join(program.SOURCE, "server", "api", "routes.c"), encoding="utf-8") as file:
+        text = file.read()
+    names = {array: set(re.findall(r'"(\w+)"', list_)) for array, list_
+             in re.findall(r"static const char \*const (\w+)\[\] = \{([^}]*)\}", text)}
+    rows = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(?:read|submit|materials|admin)",\s*(\w+),', text, re.M)
+    return {(method, pattern): names.get(queries, set()) for method, pattern, queries in rows}
+
+
+def is_type(value, name):
+    if name == "integer":
+        return isinstance(value, int) and not isinstance(value, bool)
+    if name == "number":
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return isinstance(value, TYPES[name])
+
+
+def faults(schema, value, place=""):
+    """Where `value` is not as `schema` says; knows the keywords this document uses."""
+    if schema.get("$ref", "").startswith("#/components/schemas/"):
+        return faults(DOCUMENT["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]], value, place)
+    found = []
+    if "oneOf" in schema:
+        if sum(not faults(choice, value) for choice in schema["oneOf"]) != 1:
+            tried = min((faults(choice, value, place) for choice in schema["oneOf"]), key=len)
+            found.append(f"{place}: is not exactly one of the choices: {tried}")
+    types = schema.get("type", [])
+    types = [types] if isinstance(types, str) else types
+    if types and not any(is_type(value, name) for name in types):
+        return [f"{place}: is no {types}: {str(value)[:80]}"]
+    if "enum" in schema and value not in schema["enum"] or "const" in schema and value != schema["const"]:
+        found.append(f"{place}: {value!r} is not allowed")
+    if isinstance(value, dict):
+        properties = schema.get("properties", {})
+        found += [f"{place}/{name}: is missing" for name in schema.get("required", []) if name not in value]
+        for name, inner in value.items():
+            if name in properties:
+                found += faults(properties[name], inner, f"{place}/{name}")
+            elif schema.get("additionalProperties") is False:
+                found.append(f"{place}/{name}: is not in the document")
+            elif isinstance(schema.get("additionalProperties"), dict):
+                found += faults(schema["additionalProperties"], inner, f"{place}/{name}")
+    if isinstance(value, list) and "items" in schema:
+        for i, inner in enumerate(value[:50]):
+            found += faults(schema["items"], inner, f"{place}/{i}")
+    return found
+
+
+def test_paths_methods_and_queries_are_those_of_the_routes():
+    """Every route with its query names stands in the document, and nothing else."""
+    described = {key: {p["name"] for p in operation.get("parameters", []) if p["in"] == "query"}
+                 for key, operation in operations().items()}
+    assert len(routes()) > 20, "routes.c is not read as it is written"
+    assert described == routes(), {key: (described.get(key), routes().get(key))
+                                   for key in set(described) ^ set(routes())
+                                   or {k for k in described if described[k] != routes()[k]}}
+
+
+def test_the_document_is_whole():
+    """Unique operation ids, path parameters declared, references that lead somewhere, no schema without use."""
+    ids = [operation["operationId"] for operation in operations().values()]
+    assert len(ids) == len(set(ids)), ids
+    for (_, path), operation in operations().items():
+        declared = {p["name"] for p in operation.get("parameters", []) if p["in"] == "path"}
+        assert declared == set(re.findall(r"\{(\w+)\}", path)), path
+        assert operation["tags"][0] in {tag["name"] for tag in DOCUMENT["tags"]}, path
+    used = set(re.findall(r'"#/components/schemas/(\w+)"', json.dumps(DOCUMENT)))
+    assert used == set(DOCUMENT["components"]["schemas"]), used ^ set(DOCUMENT["components"]["schemas"])
+
+
+def test_real_answers_have_the_promised_shapes():
+    """Every operation is called, good and bad, and each answer has a status, type and shape of the document."""
+    called, statuses = set(), set()
+    with program.daemon() as daemon:
+        job = program.finished(daemon, program.scene("paper_free_sponge"))
+        values = {"/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
+                  "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
+                  "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
+
+        def call(method, path, target, **options):
+            reply = daemon.request(method, target, **options)
+            responses = operations()[method, path]["responses"]
+            assert str(reply.status) in responses, (method, target, reply)
+            called.add((method, path))
+            statuses.add(reply.status)
+            content = responses[str(reply.status)].get("content", {})
+            kind = reply.headers.get("content-type", "").split(";")[0]
+            assert kind in content if content else reply.body == b"", (method, target, reply)
+            if kind.endswith("json"):
+                found = faults(content[kind]["schema"], reply.json())
+                assert not found, (method, target, found)
+            promised = responses[str(reply.status)].get("headers", {})
+            return {name for name in promised if name.lower() in reply.headers}
+
+        for (method, path), operation in operations().items():
+            if method != "GET":
+                continue
+            formats = [p["schema"]["enum"] for p in operation.get("parameters", []) if p["name"] == "format"]
+            for extension in formats[0] if formats else [None]:
+                target = path.format(**{"id": job["result"], "format": extension, **values.get(path, {})})
+                call(method, path, target)
+                if "400" in operation["responses"]:
+                    call(method, path, target + "?unknown=1")
+            if "404" in operation["responses"] and "{" in path:
+                call(method, path, re.sub(r"\{\w+\}", "0", path).replace(".0", ".json"))
+            if "406" in operation["responses"]:
+                call(method, path, target, headers={"Accept": "image/png"})
+            if "304" in operation["responses"]:
+                call(method, path, target, headers={"If-None-Match": "*"})
+
+        scene = program.scene("paper_random_sponge")
+        slow = program.scene("paper_sine_aluminium")
+        slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        call("POST", "/v1/jobs", "/v1/jobs", json=scene)
+        call("POST", "/v1/jobs", "/v1/jobs?dry_run=1", json=scene)
+        call("POST", "/v1/jobs", "/v1/jobs", json={})
+        call("POST", "/v1/jobs", "/v1/jobs", body="{", headers={"Content-Type": "application/json"})
+        call("POST", "/v1/jobs", "/v1/jobs", body="{}")
+        call("POST", "/v1/jobs", "/v1/jobs", body=b" " * (1 << 24) + b"x", headers={"Content-Type": "application/json"})
+        assert call("POST", "/v1/jobs", "/v1/jobs", json=slow, headers={"Prefer": "respond-async"}) == {
+            "Location", "Retry-After", "Preference-Applied"}
+        running = daemon.get("/v1/jobs").json()["jobs"][0]["id"]
+        call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}")
+        call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
+        call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
+        call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")
+        assert call("GET", "/v1/jobs", "/v1/jobs?limit=1") == {"Link"}
+        call("GET", "/v1/results/{id}/series.{format}", f"/v1/results/{job['result']}/series.npy", headers={"Range": "bytes=0-9"})
+        call("GET", "/v1/results/{id}/series.{format}", f"/v1/results/{job['result']}/series.npy", headers={"Range": "bytes=99999999-"})
+    assert called == set(operations()), set(operations()) - called
+    assert statuses >= {200, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
+
+
+if __name__ == "__main__":
+    program.main(globals())

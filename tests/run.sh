@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Everything that can be checked: builds with gcc and clang, with address, undefined-behaviour and thread sanitizers,
+# unit and truth tests in each, contract and truth tests of the program. --quick: the release build only.
+# On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
+set -uo pipefail
+here=$(cd "$(dirname "$0")/.." && pwd)
+cd "$here" || exit 1
+
+presets=(release debug tsan clang)
+case "${1-}" in
+'') ;;
+--quick) presets=(release) ;;
+*)
+    echo "usage: tests/run.sh [--quick]" >&2
+    exit 2
+    ;;
+esac
+
+server/packages.sh server/packages.txt tests/packages.txt || exit 1
+
+export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 TSAN_OPTIONS=halt_on_error=1
+# Debian's python3, which has the packages, whatever else is in PATH.
+python=/usr/bin/python3
+passed=0
+failed=0
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+folder() {
+    if [ "$1" = release ]; then echo build; else echo "build-$1"; fi
+}
+
+# gcc's thread sanitizer cannot live with as much address randomisation as some kernels use.
+still=()
+if setarch "$(uname -m)" -R true 2>/dev/null; then still=(setarch "$(uname -m)" -R); fi
+
+for preset in "${presets[@]}"; do
+    echo "== $preset"
+    if ! { cmake --preset "$preset" -DIMPACTD_TESTS=ON && cmake --build --preset "$preset"; } >"$log" 2>&1; then
+        tail -n 60 "$log"
+        echo "FAIL  the $preset build"
+        failed=$((failed + 1))
+        continue
+    fi
+    runner=()
+    [ "$preset" != tsan ] || runner=("${still[@]}")
+    "${runner[@]}" ctest --preset "$preset" >"$log" 2>&1
+    # "100% tests passed, 0 tests failed out of 27"
+    if read -r wrong all < <(sed -n 's/.*tests passed, \([0-9]*\) tests\{0,1\} failed out of \([0-9]*\).*/\1 \2/p' "$log"); then
+        [ "$wrong" -eq 0 ] || cat "$log"
+        echo "$((all - wrong)) programs passed, $wrong failed"
+        passed=$((passed + all - wrong))
+        failed=$((failed + wrong))
+    else
+        cat "$log"
+        echo "FAIL  ctest found no tests in $preset"
+        failed=$((failed + 1))
+    fi
+done
+
+# FILE PRESET: runs one Python test of a build and adds its count.
+ask() {
+    echo "-- $1 ($2)"
+    local code
+    "$python" "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
+    code=${PIPESTATUS[0]}
+    # "tests/contract/test_includes.py: 3 passed, 0 failed"; a file that counts nothing is one test.
+    if read -r good bad < <(sed -n '$s/.*: \([0-9]*\) passed, \([0-9]*\) failed.*/\1 \2/p' "$log"); then
+        passed=$((passed + good))
+        failed=$((failed + bad))
+    elif [ "$code" -eq 0 ]; then
+        passed=$((passed + 1))
+    else
+        failed=$((failed + 1))
+        echo "FAIL  $1"
+    fi
+}
+
+for file in tests/contract/test_*.py tests/truth/test_*.py; do
+    ask "$file" release
+done
+# What faces hostile input is asked once more of the instrumented program.
+if [[ " ${presets[*]} " == *" debug "* ]]; then
+    while read -r file; do ask "$file" debug; done < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)
+fi
+
+echo
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]

@@ -1,0 +1,138 @@
+"""Starts and stops an impactd of its own for a test: port 0, a folder of its own, ended in any case.
+
+    with Daemon("build") as daemon:
+        reply = daemon.request("POST", "/v1/jobs", json={...})
+
+Standard library only. Not a client for users. Used by the tests under contract/ and truth/.
+"""
+import http.client
+import json as json_module
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+
+class Reply:
+    def __init__(self, status, headers, body):
+        self.status = status
+        self.headers = headers  # names in lower case
+        self.body = body
+
+    def json(self):
+        return json_module.loads(self.body)
+
+    def __repr__(self):
+        return f"<{self.status} {self.headers.get('content-type')} {self.body[:300]!r}>"
+
+
+class Daemon:
+    def __init__(self, build, *arguments, data=None, environment=None):
+        self.program = os.path.join(os.path.abspath(build), "impactd")
+        self.arguments = list(arguments)
+        self.owns_data = data is None
+        self.data = data or tempfile.mkdtemp(prefix="impactd-")
+        self.environment = {**os.environ, **(environment or {})}
+        self.process = None
+        self.port = None
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+        if self.owns_data:
+            shutil.rmtree(self.data, ignore_errors=True)
+
+    def start(self, seconds=20):
+        """Starts it on any free port and returns when it answers."""
+        self.errors = tempfile.TemporaryFile(mode="w+")
+        self.process = subprocess.Popen(
+            [self.program, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.arguments],
+            stdout=subprocess.PIPE, stderr=self.errors, text=True, env=self.environment)
+        end = time.monotonic() + seconds
+        self.greeting = ""
+        while time.monotonic() < end:
+            line = self.process.stdout.readline()
+            self.greeting += line
+            found = re.search(r"listens on (http://(.+):(\d+))", line)
+            if found:
+                self.url, self.host, self.port = found[1], found[2], int(found[3])
+                return self
+            if line == "":
+                break
+        self.kill()
+        raise RuntimeError(f"impactd does not start: {self.greeting}{self.stderr()}")
+
+    def stderr(self):
+        self.errors.seek(0)
+        return self.errors.read()
+
+    def stop(self, seconds=10):
+        """SIGTERM; returns (exit code, seconds it took). Kills it if it does not end."""
+        if self.process is None:
+            return None
+        begin = time.monotonic()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            raise
+        finally:
+            if self.process is not None:
+                self.process.stdout.close()
+        code, self.process = self.process.returncode, None
+        return code, time.monotonic() - begin
+
+    def kill(self):
+        """SIGKILL, as a power failure would."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+            self.process.stdout.close()
+            self.process = None
+
+    def is_alive(self):
+        return self.process is not None and self.process.poll() is None
+
+    def request(self, method, path, body=None, json=None, headers=None, timeout=60):
+        """One request on a connection of its own."""
+        headers = dict(headers or {})
+        if json is not None:
+            body = json_module.dumps(json)
+            headers.setdefault("Content-Type", "application/json")
+        if isinstance(body, str):
+            body = body.encode()
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
+        try:
+            connection.request(method, path, body=body, headers=headers)
+            reply = connection.getresponse()
+            return Reply(reply.status, {k.lower(): v for k, v in reply.getheaders()}, reply.read())
+        finally:
+            connection.close()
+
+    def get(self, path, **options):
+        return self.request("GET", path, **options)
+
+    def submit(self, scene, wait=None, **options):
+        """POST /v1/jobs; waits until the job is finished unless told otherwise by headers."""
+        headers = dict(options.pop("headers", None) or {})
+        if wait is not None:
+            headers["Prefer"] = f"wait={wait}"
+        return self.request("POST", "/v1/jobs", json=scene, headers=headers, **options)
+
+    def finished(self, job_id, seconds=60):
+        """The job when it is finished."""
+        end = time.monotonic() + seconds
+        while True:
+            job = self.get(f"/v1/jobs/{job_id}?wait=20").json()
+            if job["status"] not in ("accepted", "running"):
+                return job
+            if time.monotonic() > end:
+                raise TimeoutError(f"job {job_id} is still {job['status']}")

@@ -1,0 +1,74 @@
+#include "tests/support/paper.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/excite/random.h"
+#include "core/excite/sine.h"
+#include "tests/support/scenes.h"
+
+const PaperBuffer paper_buffers[5] = {
+    {"sponge", 0.61, 0.025, 1.65e3, 4.05},      {"soft_rubber", 0.44, 0.019, 2.99e3, 8.80},
+    {"hard_rubber", 0.53, 0.004, 65.7e3, 32.5}, {"hard_acrylic", 0.49, 0.003, 118.0e3, 48.7},
+    {"aluminium", 0.46, 0.0003, 11900e3, 530},
+};
+
+void paper_scene(Simulation *simulation, double restitution, double contact_time, double duration) {
+    scene_with_damper(simulation, restitution, contact_time);
+    simulation->scene.duration = duration;
+}
+
+void paper_free(Simulation *simulation, double displacement) {
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "free");
+    ((Excitation *)(void *)simulation->scene.excitation)->displacement = displacement;
+}
+
+void paper_random(Simulation *simulation, double rms, uint64_t seed) {
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "random");
+    ExcitationRandom *random = (ExcitationRandom *)(void *)simulation->scene.excitation;
+    random->band.at = malloc(2 * sizeof *random->band.at);
+    if (random->band.at == NULL)
+        abort();
+    random->band.at[0] = 0;
+    random->band.at[1] = 15;
+    random->band.count = 2;
+    random->rms = rms;
+    random->seed = seed;
+}
+
+void paper_sine(Simulation *simulation, double amplitude, double frequency) {
+    scene_choose(&simulation->scene.excitation, &excitation_kinds, "sine");
+    ExcitationSine *sine = (ExcitationSine *)(void *)simulation->scene.excitation;
+    sine->amplitude = amplitude;
+    sine->frequency = frequency;
+}
+
+void paper_model(Simulation *simulation, const char *model) {
+    scene_choose(&simulation->scene.contact, &contact_kinds, model);
+}
+
+static void texts_free(Texts *texts) {
+    for (size_t i = 0; i < texts->count; i++)
+        free(texts->at[i]);
+    free(texts->at);
+    *texts = (Texts){NULL, 0};
+}
+
+void paper_channels(Simulation *simulation, const char *const *names, size_t count) {
+    Texts *channels_wanted = &simulation->output.channels;
+    texts_free(channels_wanted);
+    channels_wanted->at = calloc(count > 0 ? count : 1, sizeof *channels_wanted->at);
+    if (channels_wanted->at == NULL)
+        abort();
+    for (size_t i = 0; i < count; i++) {
+        const size_t size = strlen(names[i]) + 1;
+        if ((channels_wanted->at[i] = malloc(size)) == NULL)
+            abort();
+        memcpy(channels_wanted->at[i], names[i], size);
+    }
+    channels_wanted->count = count;
+}
+
+void paper_no_psd(Simulation *simulation) {
+    texts_free(&simulation->output.psd.channels);
+}

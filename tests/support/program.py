@@ -1,0 +1,108 @@
+"""What the Python tests share: where the program is, how to run it, what a test file does as a whole.
+
+Not a test framework: a test is a function whose name begins with test_ and whose first line of
+documentation is the sentence it proves. Used by every tests/**/test_*.py."""
+
+import argparse
+import contextlib
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+import traceback
+
+from daemon import Daemon
+
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+EXAMPLES = os.path.join(SOURCE, "schema", "examples")
+build = os.path.join(SOURCE, "build")
+
+
+class Skipped(Exception):
+    """Raised by a test that cannot be made here; the reason is printed and counted."""
+
+
+def impactd():
+    return os.path.join(build, "impactd")
+
+
+def is_sanitized():
+    """Whether the build is an instrumented one: several times slower, so that timing says nothing."""
+    with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
+        return re.search(r"^IMPACTD_SANITIZE:\w+=\S", cache.read(), re.M) is not None
+
+
+def run(*arguments, text="", timeout=120, environment=None):
+    """Runs impactd to its end; returns code, standard output and standard error."""
+    done = subprocess.run([impactd(), *arguments], input=text, capture_output=True, text=True,
+                          timeout=timeout, env=environment or dict(os.environ), check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def scene(name):
+    """One of schema/examples as a dict."""
+    with open(os.path.join(EXAMPLES, name + ".json"), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def examples():
+    return sorted(f[:-5] for f in os.listdir(EXAMPLES) if f.endswith(".json"))
+
+
+@contextlib.contextmanager
+def daemon(*arguments, **options):
+    """A running daemon; afterwards it must end well, within its time, and no sanitizer may have spoken."""
+    with Daemon(build, *arguments, **options) as running:
+        yield running
+        assert running.is_alive(), f"the daemon ended by itself: {running.stderr()}"
+        code, seconds = running.stop(60)
+        assert code == 0, f"the daemon ended with {code}: {running.stderr()}"
+        assert seconds < 5 or is_sanitized(), f"SIGTERM took {seconds:.1f} s"
+        spoken = re.findall(r".*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer).*", running.stderr())
+        assert not spoken, spoken
+
+
+def finished(running, scene):
+    """Submits and waits; the job's document, which must be of a successful one."""
+    reply = running.submit(scene, wait=30)
+    assert reply.status in (200, 202), reply
+    job = reply.json()
+    if job["status"] in ("accepted", "running"):
+        job = running.finished(job["id"], 300)
+    assert job["status"] == "successful", job
+    return job
+
+
+def main(namespace):
+    """Runs every test_* function of a test file; the last line printed counts them."""
+    global build
+    parser = argparse.ArgumentParser(description=namespace["__doc__"])
+    parser.add_argument("--build", default=build, help="folder of the build to test")
+    parser.add_argument("names", nargs="*", help="only the tests whose name contains one of these")
+    arguments = parser.parse_args()
+    build = os.path.abspath(arguments.build)
+    passed = failed = skipped = 0
+    for name, test in list(namespace.items()):
+        if not name.startswith("test_") or not callable(test):
+            continue
+        if arguments.names and not any(part in name for part in arguments.names):
+            continue
+        sentence = (test.__doc__ or name).strip().splitlines()[0]
+        began = time.monotonic()
+        try:
+            test()
+        except Skipped as reason:
+            skipped += 1
+            print(f"skip  {sentence} ({reason})", flush=True)
+        except Exception:  # noqa: BLE001 - whatever it was, the test failed
+            failed += 1
+            print(f"FAIL  {sentence}", flush=True)
+            traceback.print_exc(file=sys.stdout)
+        else:
+            passed += 1
+            print(f"ok    {sentence} [{time.monotonic() - began:.2f} s]", flush=True)
+    print(f"{os.path.relpath(sys.argv[0], SOURCE)}: {passed} passed, {failed} failed"
+          + (f", {skipped} skipped" if skipped else ""), flush=True)
+    sys.exit(1 if failed or not passed + skipped else 0)

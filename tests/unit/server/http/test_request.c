@@ -1,0 +1,155 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/http/address.h"
+#include "server/http/request.h"
+
+static Status open_target(Request *request, const char *target) {
+    Problem problem;
+    problem_clear(&problem);
+    memset(request, 0, sizeof *request);
+    return request_open(request, target, &problem);
+}
+
+static void a_target_is_taken_apart_and_decoded(void **state) {
+    (void)state;
+    Request request;
+    assert_int_equal(open_target(&request, "/v1/a%20b?q=soft+rubber%21&empty=&bare&&x=a=b"),
+                     STATUS_OK);
+    assert_string_equal(request.path, "/v1/a%20b");
+    assert_string_equal(request.target, "/v1/a%20b?q=soft+rubber%21&empty=&bare&&x=a=b");
+    assert_int_equal(request.query_count, 4);
+    assert_string_equal(request_query(&request, "q"), "soft rubber!");
+    assert_string_equal(request_query(&request, "empty"), "");
+    assert_string_equal(request_query(&request, "bare"), "");
+    assert_string_equal(request_query(&request, "x"), "a=b");
+    assert_null(request_query(&request, "y"));
+    request_close(&request);
+}
+
+static void broken_queries_are_refused(void **state) {
+    (void)state;
+    static const char *const targets[] = {"/?a=%",   "/?a=%4",  "/?a=%zz",
+                                          "/?a=%00", "/?%g0=1", "/?a=1&a=2"};
+    for (size_t i = 0; i < COUNT(targets); i++) {
+        Request request;
+        assert_int_equal(open_target(&request, targets[i]), STATUS_USAGE);
+        request_close(&request);
+    }
+}
+
+static void more_queries_than_there_is_room_for_are_refused(void **state) {
+    (void)state;
+    char target[512] = "/?";
+    for (size_t i = 0; i <= REQUEST_QUERIES; i++) {
+        const char pair[] = {(char)('A' + i), '=', '1', '&', '\0'};
+        strcat(target, pair);
+    }
+    Request request;
+    assert_int_equal(open_target(&request, target), STATUS_USAGE);
+    request_close(&request);
+}
+
+static void numbers_in_queries_have_bounds(void **state) {
+    (void)state;
+    Request request;
+    Problem problem;
+    problem_clear(&problem);
+    double value = 0;
+    assert_int_equal(open_target(&request, "/?a=2.5&b=nan&c=0x10&d=&e=+1&f=11&g=1e1&h=1%202"),
+                     STATUS_OK);
+    assert_int_equal(request_number(&request, "a", 0, 10, 1, &value, &problem), STATUS_OK);
+    assert_true(value == 2.5);
+    assert_int_equal(request_number(&request, "z", 0, 10, 7, &value, &problem), STATUS_OK);
+    assert_true(value == 7);
+    assert_int_equal(request_number(&request, "g", 0, 10, 7, &value, &problem), STATUS_OK);
+    assert_true(value == 10);
+    static const char *const bad[] = {"b", "c", "d", "e", "f", "h"}; // "+1" is " 1" in a query
+    for (size_t i = 0; i < COUNT(bad); i++)
+        assert_int_equal(request_number(&request, bad[i], 0, 10, 1, &value, &problem),
+                         STATUS_USAGE);
+    assert_non_null(strstr(problem.detail, "[0, 10]"));
+    request_close(&request);
+}
+
+static void headers_are_kept_once_and_preferences_joined(void **state) {
+    (void)state;
+    Request request = {0};
+    request_header(&request, "accept", "text/csv");
+    request_header(&request, "Accept", "text/html");
+    request_header(&request, "PREFER", "respond-async");
+    request_header(&request, "Prefer", "wait=3");
+    request_header(&request, "X-Other", "x");
+    assert_string_equal(request.accept, "text/csv");
+    assert_string_equal(request.prefer, "respond-async, wait=3");
+    assert_null(request.range);
+    char text[300];
+    memset(text, 'a', sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    request_header(&request, "Prefer", text); // cut, not overrun
+    assert_int_equal(strlen(request.prefer), sizeof request.prefers - 1);
+}
+
+static void addresses_on_loopback_are_read(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *host;
+        uint16_t port;
+    } good[] = {{"127.0.0.1:8080", "127.0.0.1", 8080},
+                {"localhost:0", "127.0.0.1", 0},
+                {"[::1]:65535", "::1", 65535},
+                {":9", "127.0.0.1", 9},
+                {"8081", "127.0.0.1", 8081}};
+    for (size_t i = 0; i < COUNT(good); i++) {
+        Address address;
+        assert_int_equal(address_read(good[i].text, &address, NULL), STATUS_OK);
+        assert_string_equal(address.host, good[i].host);
+        assert_int_equal(address.port, good[i].port);
+    }
+}
+
+static void other_addresses_are_refused_with_the_reason(void **state) {
+    (void)state;
+    static const struct {
+        const char *text;
+        Status status;
+    } bad[] = {{"0.0.0.0:8080", STATUS_FORBIDDEN},
+               {"192.168.1.2:80", STATUS_FORBIDDEN},
+               {"[::]:80", STATUS_FORBIDDEN},
+               {"example.org:80", STATUS_FORBIDDEN},
+               {"127.0.0.1", STATUS_USAGE},
+               {"127.0.0.1:65536", STATUS_USAGE},
+               {"::1:80", STATUS_USAGE},
+               {"localhost:http", STATUS_USAGE},
+               {"", STATUS_USAGE},
+               {"127.0.0.1:", STATUS_USAGE},
+               {"127.0.0.1:-1", STATUS_USAGE},
+               {"[::1:80", STATUS_USAGE},
+               {"[]:80", STATUS_USAGE}};
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        Address address;
+        Problem problem;
+        problem_clear(&problem);
+        if (address_read(bad[i].text, &address, &problem) != bad[i].status)
+            fail_msg("\"%s\" is taken otherwise: %s", bad[i].text, problem.detail);
+        assert_true(problem.detail[0] != '\0');
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_target_is_taken_apart_and_decoded),
+        cmocka_unit_test(broken_queries_are_refused),
+        cmocka_unit_test(more_queries_than_there_is_room_for_are_refused),
+        cmocka_unit_test(numbers_in_queries_have_bounds),
+        cmocka_unit_test(headers_are_kept_once_and_preferences_joined),
+        cmocka_unit_test(addresses_on_loopback_are_read),
+        cmocka_unit_test(other_addresses_are_refused_with_the_reason),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

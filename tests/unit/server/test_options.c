@@ -1,0 +1,176 @@
+// Settings from flags, environment, file and defaults.
+#include "server/options.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+typedef struct Settings {
+    double rate;
+    uint64_t queue_most;
+    char *listen, *config;
+    bool quiet;
+    int level;
+} Settings;
+
+static const char *const levels[] = {"low", "high", NULL};
+
+// clang-format off
+static const Field fields[] = {
+    FIELD_REAL(Settings, rate, "Hz", WITHIN(1, 100), 10, "rate"),
+    FIELD_COUNT(Settings, queue_most, NULL, WITHIN(1, 1000), 50, "jobs"),
+    FIELD_TEXT(Settings, listen, 100, PRESENCE_OPTIONAL, 0, "address"),
+    FIELD_TEXT(Settings, config, 200, PRESENCE_OPTIONAL, 0, "file"),
+    FIELD_FLAG(Settings, quiet, false, "say less"),
+    FIELD_CHOICE(Settings, level, levels, 0, "level"),
+    FIELD_END,
+};
+// clang-format on
+
+static Settings settings;
+static Options options;
+static Problem problem;
+
+static int start(void **state) {
+    (void)state;
+    problem_clear(&problem);
+    return fields_default(fields, &settings) == STATUS_OK ? 0 : -1;
+}
+
+static int stop(void **state) {
+    (void)state;
+    fields_clear(fields, &settings);
+    unsetenv("TEST_QUEUE_MOST");
+    unsetenv("TEST_CONFIG");
+    unsetenv("TEST_RATE");
+    return 0;
+}
+
+#define READ(prefix, ...)                                                                          \
+    options_read(fields, &settings, (int)COUNT(((char *[]){__VA_ARGS__})),                         \
+                 (char *[]){__VA_ARGS__}, prefix, &options, &problem)
+
+static void flags_set_values_and_the_rest_are_operands(void **state) {
+    (void)state;
+    assert_int_equal(READ(NULL, "one", "--rate", "2.5", "--queue-most=7", "-l", "a:1", "-q=9",
+                          "--quiet", "--level", "high", "-", "--", "--rate"),
+                     STATUS_OK);
+    assert_true(settings.rate == 2.5);
+    assert_int_equal(settings.queue_most, 9);
+    assert_string_equal(settings.listen, "a:1");
+    assert_true(settings.quiet);
+    assert_int_equal(settings.level, 1);
+    assert_int_equal(options.operand_count, 3);
+    assert_string_equal(options.operands[0], "one");
+    assert_string_equal(options.operands[1], "-");
+    assert_string_equal(options.operands[2], "--rate");
+    assert_int_equal(options.origins[0], OPTION_FLAG);
+}
+
+static void a_flag_beats_the_environment_that_the_file_that_the_default(void **state) {
+    (void)state;
+    char path[] = "/tmp/impactd-options-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    const char text[] = "# comment\n\nrate = 3 # Hz\nqueue_most=4\n  listen = x:1#2  \n";
+    assert_int_equal(write(file, text, strlen(text)), (int)strlen(text));
+    close(file);
+    setenv("TEST_CONFIG", "/nowhere", 1);
+    setenv("TEST_QUEUE_MOST", "5", 1);
+    const Status status = READ("TEST_", "--config", path);
+    unlink(path);
+    assert_int_equal(status, STATUS_OK);
+    assert_true(settings.rate == 3);
+    assert_int_equal(settings.queue_most, 5);
+    assert_string_equal(settings.listen, "x:1#2");
+    assert_int_equal(options.origins[0], OPTION_FILE);
+    assert_int_equal(options.origins[1], OPTION_ENVIRONMENT);
+    assert_int_equal(options.origins[3], OPTION_FLAG);
+    assert_int_equal(options.origins[4], OPTION_DEFAULT);
+}
+
+static void the_environment_is_not_read_without_a_prefix(void **state) {
+    (void)state;
+    setenv("TEST_QUEUE_MOST", "none", 1);
+    assert_int_equal(READ(NULL, "--rate", "2"), STATUS_OK);
+    assert_int_equal(settings.queue_most, 50);
+}
+
+static void every_fault_is_told_under_the_name_that_was_typed(void **state) {
+    (void)state;
+    setenv("TEST_RATE", "1000", 1);
+    assert_int_equal(
+        READ("TEST_", "--queue-most", "-3", "--qiet", "--level=hihg", "--quiet=2", "--listen"),
+        STATUS_USAGE);
+    static const char *const places[] = {"TEST_RATE", "--queue-most", "--qiet",
+                                         "--level",   "--quiet",      "--listen"};
+    assert_int_equal(problem.count, COUNT(places));
+    for (size_t i = 0; i < COUNT(places); i++)
+        assert_string_equal(problem.faults[i].pointer, places[i]);
+    assert_string_equal(problem.faults[2].did_you_mean, "--quiet");
+    assert_string_equal(problem.faults[3].did_you_mean, "high");
+    assert_non_null(strstr(problem.faults[0].detail, "100"));
+}
+
+static void numbers_that_are_none_are_refused(void **state) {
+    (void)state;
+    static char *const wrong[][2] = {
+        {"--rate", "ten"},       {"--rate", "nan"},
+        {"--rate", "5x"},        {"--rate", ""},
+        {"--queue-most", "1.5"}, {"--queue-most", "+3"},
+        {"--queue-most", "0"},   {"--queue-most", "99999999999999999999"},
+        {"--rate", "1e999"},     {"--queue-most", " 3"}};
+    for (size_t i = 0; i < COUNT(wrong); i++) {
+        problem_clear(&problem);
+        assert_int_equal(options_read(fields, &settings, 2, wrong[i], NULL, &options, &problem),
+                         STATUS_USAGE);
+        assert_int_equal(problem.count, 1);
+        assert_string_equal(problem.faults[0].pointer, wrong[i][0]);
+    }
+}
+
+static void faults_are_seen_without_a_problem_to_tell_them(void **state) {
+    (void)state;
+    char *const wrong[] = {"--no-such"};
+    assert_int_equal(options_read(fields, &settings, 1, wrong, NULL, &options, NULL), STATUS_USAGE);
+}
+
+static void what_is_printed_can_be_read_as_a_file(void **state) {
+    (void)state;
+    assert_int_equal(READ(NULL, "--rate", "2.5", "-l", "a:1", "--quiet", "--level", "high"),
+                     STATUS_OK);
+    char path[] = "/tmp/impactd-options-XXXXXX";
+    const int number = mkstemp(path);
+    assert_true(number >= 0);
+    FILE *file = fdopen(number, "w");
+    options_print(fields, &settings, &options, file);
+    fclose(file);
+    fields_clear(fields, &settings);
+    assert_int_equal(fields_default(fields, &settings), STATUS_OK);
+    const Status status = READ("TEST_", "--config", path);
+    unlink(path);
+    assert_int_equal(status, STATUS_OK);
+    assert_true(settings.rate == 2.5 && settings.quiet && settings.level == 1);
+    assert_string_equal(settings.listen, "a:1");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(flags_set_values_and_the_rest_are_operands, start, stop),
+        cmocka_unit_test_setup_teardown(a_flag_beats_the_environment_that_the_file_that_the_default,
+                                        start, stop),
+        cmocka_unit_test_setup_teardown(the_environment_is_not_read_without_a_prefix, start, stop),
+        cmocka_unit_test_setup_teardown(every_fault_is_told_under_the_name_that_was_typed, start,
+                                        stop),
+        cmocka_unit_test_setup_teardown(numbers_that_are_none_are_refused, start, stop),
+        cmocka_unit_test_setup_teardown(faults_are_seen_without_a_problem_to_tell_them, start,
+                                        stop),
+        cmocka_unit_test_setup_teardown(what_is_printed_can_be_read_as_a_file, start, stop),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
