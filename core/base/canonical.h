@@ -1,6 +1,6 @@
-// The canonical form: the bytes that stand for a struct in a digest. Rows in table order, absent members and
-// notes left out, names written, numbers as little-endian IEEE doubles with -0 as 0. Equal meaning, equal bytes.
-// Not for people and never parsed. Used by whoever hashes a scene.
+// The canonical form: the bytes that stand for a struct in a digest. Rows in table order, absent
+// members and notes left out, names written, numbers as little-endian IEEE doubles with -0 as 0.
+// Equal meaning, equal bytes. Not for people and never parsed. Used by whoever hashes a scene.
 #ifndef CORE_BASE_CANONICAL_H
 #define CORE_BASE_CANONICAL_H
 

@@ -10,7 +10,7 @@
 typedef struct Column {
     char name[48];
     char unit[24];
-    double *values;  // `rows` of them, inside the Columns' block
+    double *values; // `rows` of them, inside the Columns' block
 } Column;
 
 // All zero is empty. The values of all columns lie in one block, column after column.
@@ -21,10 +21,12 @@ typedef struct Columns {
     double *block;
 } Columns;
 
-// Makes `count` columns of `rows` values (not initialised) without names. At most `most_bytes` (0: no limit).
-Status columns_make(Columns *columns, size_t count, size_t rows, size_t most_bytes, Problem *problem);
+// Makes `count` columns of `rows` values (not initialised) without names. At most `most_bytes` (0:
+// no limit).
+Status columns_make(Columns *columns, size_t count, size_t rows, size_t most_bytes,
+                    Problem *problem);
 void columns_name(Columns *columns, size_t index, const char *name, const char *unit);
 void columns_clear(Columns *columns);
-const Column *columns_find(const Columns *columns, const char *name);  // NULL if absent
+const Column *columns_find(const Columns *columns, const char *name); // NULL if absent
 
 #endif

@@ -1,6 +1,6 @@
 // One table per struct: what a member is called, its unit, range, default and meaning.
-// Not a serializer: codec/ (JSON, JSON Schema) and canonical.h (digest) walk these rows, nothing here reads text.
-// Used by every struct that crosses a border, and by whoever carries it across.
+// Not a serializer: codec/ (JSON, JSON Schema) and canonical.h (digest) walk these rows, nothing
+// here reads text. Used by every struct that crosses a border, and by whoever carries it across.
 #ifndef CORE_BASE_FIELD_H
 #define CORE_BASE_FIELD_H
 
@@ -13,24 +13,25 @@
 
 typedef enum FieldKind {
     FIELD_KIND_END,
-    FIELD_KIND_REAL,     // double; absent is NAN
-    FIELD_KIND_COUNT,    // uint64_t; absent is COUNT_ABSENT
-    FIELD_KIND_FLAG,     // bool
-    FIELD_KIND_TEXT,     // char *, owned; absent is NULL
-    FIELD_KIND_CHOICE,   // int, an index into `choices`; absent is CHOICE_ABSENT
-    FIELD_KIND_REALS,    // Reals
-    FIELD_KIND_TEXTS,    // Texts
-    FIELD_KIND_ITEM,     // a nested struct with rows of its own
-    FIELD_KIND_LIST,     // List of such structs
-    FIELD_KIND_VARIANT,  // Variant *, owned: one of a plural table, by the name under its tag
-    FIELD_KIND_BASE,     // a nested struct whose rows appear in the same object (a base, an inlined part)
+    FIELD_KIND_REAL,    // double; absent is NAN
+    FIELD_KIND_COUNT,   // uint64_t; absent is COUNT_ABSENT
+    FIELD_KIND_FLAG,    // bool
+    FIELD_KIND_TEXT,    // char *, owned; absent is NULL
+    FIELD_KIND_CHOICE,  // int, an index into `choices`; absent is CHOICE_ABSENT
+    FIELD_KIND_REALS,   // Reals
+    FIELD_KIND_TEXTS,   // Texts
+    FIELD_KIND_ITEM,    // a nested struct with rows of its own
+    FIELD_KIND_LIST,    // List of such structs
+    FIELD_KIND_VARIANT, // Variant *, owned: one of a plural table, by the name under its tag
+    FIELD_KIND_BASE,    // a nested struct whose rows appear in the same object (a base, an inlined
+                        // part)
 } FieldKind;
 
 #define COUNT_ABSENT UINT64_MAX
 #define CHOICE_ABSENT (-1)
 
-// Containers own what they hold. Typed twins (struct { Damper *at; size_t count; }) have the same layout
-// and are checked for it by FIELD_LIST.
+// Containers own what they hold. Typed twins (struct { Damper *at; size_t count; }) have the same
+// layout and are checked for it by FIELD_LIST.
 typedef struct Reals {
     double *at;
     size_t count;
@@ -46,13 +47,13 @@ typedef struct List {
 
 typedef struct Field Field;
 
-// What one member of a plural table (a contact law, an excitation, a solver) says of itself to a walker.
-// It is the first member of that table's struct.
+// What one member of a plural table (a contact law, an excitation, a solver) says of itself to a
+// walker. It is the first member of that table's struct.
 typedef struct Kind {
     const char *name;
     const char *doc;
-    const Field *fields;  // rows of the value struct, whose first member is a Variant
-    size_t size;          // of that value struct
+    const Field *fields; // rows of the value struct, whose first member is a Variant
+    size_t size;         // of that value struct
 } Kind;
 
 // First member of every value struct that is one of a plural table.
@@ -62,76 +63,86 @@ typedef struct Variant {
 
 // A plural table as walkers see it. at(0) is the default; at(i) is NULL past the end.
 typedef struct KindTable {
-    const char *tag;  // the JSON key that names the kind: "kind", "model", "solver"
+    const char *tag; // the JSON key that names the kind: "kind", "model", "solver"
     const Kind *(*at)(size_t index);
 } KindTable;
 
 // Bounds of a number; for REALS of each number.
 typedef struct Range {
     double least, most;
-    bool is_open_below, is_open_above;  // the bound itself is refused
+    bool is_open_below, is_open_above; // the bound itself is refused
 } Range;
 
 // Braces alone, no compound literals: those are no constants in ISO C.
-#define ABOVE(x) {(x), (double)INFINITY, true, false}
-#define AT_LEAST(x) {(x), (double)INFINITY, false, false}
-#define WITHIN(a, b) {(a), (b), false, false}
-#define WITHIN_ABOVE(a, b) {(a), (b), true, false}  // a < x <= b
-#define ANY {(double)-INFINITY, (double)INFINITY, false, false}
+#define ABOVE(x)                                                                                   \
+    { (x), (double)INFINITY, true, false }
+#define AT_LEAST(x)                                                                                \
+    { (x), (double)INFINITY, false, false }
+#define WITHIN(a, b)                                                                               \
+    { (a), (b), false, false }
+#define WITHIN_ABOVE(a, b)                                                                         \
+    { (a), (b), true, false } // a < x <= b
+#define ANY                                                                                        \
+    { (double)-INFINITY, (double)INFINITY, false, false }
 
 // How a row behaves when the member is not given.
 typedef enum Presence {
-    PRESENCE_DEFAULT,   // takes `initial`, or for text, lists and items the empty value or the item's defaults
-    PRESENCE_REQUIRED,  // a fault
-    PRESENCE_OPTIONAL,  // stays absent
+    PRESENCE_DEFAULT, // takes `initial`, or for text, lists and items the empty value or the item's
+                      // defaults
+    PRESENCE_REQUIRED, // a fault
+    PRESENCE_OPTIONAL, // stays absent
 } Presence;
 
 enum {
-    FIELD_NOTE = 1,           // changes nothing: left out of the canonical form (title, labels)
-    FIELD_NULL_IS_EMPTY = 2,  // ITEM: JSON null is allowed and makes every member absent (fields_clear)
-    FIELD_PAIRS = 4,          // TEXTS: a JSON object of strings is allowed too and kept as "key=value"
+    FIELD_NOTE = 1, // changes nothing: left out of the canonical form (title, labels)
+    FIELD_NULL_IS_EMPTY =
+        2,           // ITEM: JSON null is allowed and makes every member absent (fields_clear)
+    FIELD_PAIRS = 4, // TEXTS: a JSON object of strings is allowed too and kept as "key=value"
 };
 
 struct Field {
     const char *name;
     FieldKind kind;
     size_t offset;
-    const char *unit;  // NULL: none
-    Range range;       // REAL, COUNT, REALS: the value; TEXT, TEXTS, LIST: nothing
+    const char *unit; // NULL: none
+    Range range;      // REAL, COUNT, REALS: the value; TEXT, TEXTS, LIST: nothing
     Presence presence;
     double initial;             // REAL, COUNT, FLAG, CHOICE under PRESENCE_DEFAULT
     const char *const *choices; // CHOICE: NULL-terminated; TEXTS: NULL, or the texts allowed
-    const char *const *initial_texts;  // TEXTS under PRESENCE_DEFAULT: NULL-terminated, or NULL for none
-    const Field *fields;        // ITEM, LIST, BASE
-    size_t size;                // ITEM, LIST, BASE: of one
-    size_t most;                // TEXT: bytes, REALS, TEXTS, LIST: elements; 0: no bound of its own
-    const KindTable *kinds;     // VARIANT
-    const char *shorthand;      // ITEM: a JSON string in place of the object sets this TEXT row; NULL: none
+    const char *const
+        *initial_texts;     // TEXTS under PRESENCE_DEFAULT: NULL-terminated, or NULL for none
+    const Field *fields;    // ITEM, LIST, BASE
+    size_t size;            // ITEM, LIST, BASE: of one
+    size_t most;            // TEXT: bytes, REALS, TEXTS, LIST: elements; 0: no bound of its own
+    const KindTable *kinds; // VARIANT
+    const char
+        *shorthand; // ITEM: a JSON string in place of the object sets this TEXT row; NULL: none
     int flags;
     const char *doc;
 };
 
-// REQUIRED, OPTIONAL or a number, in the column "default". The two words are NaNs only in the reader's eye:
-// they are told apart by name through FIELD_PRESENCE below.
+// REQUIRED, OPTIONAL or a number, in the column "default". The two words are NaNs only in the
+// reader's eye: they are told apart by name through FIELD_PRESENCE below.
 #define REQUIRED (-HUGE_VAL)
 #define OPTIONAL (HUGE_VAL)
-#define FIELD_PRESENCE(x) \
+#define FIELD_PRESENCE(x)                                                                          \
     ((x) == REQUIRED ? PRESENCE_REQUIRED : (x) == OPTIONAL ? PRESENCE_OPTIONAL : PRESENCE_DEFAULT)
 
 // A member of the wrong type does not compile: the array in FIELD_AT has a negative size then.
-#define FIELD_AT(Type, member, Wanted) \
-    (offsetof(Type, member) +          \
-     0 * sizeof(char[_Generic(&((Type *)0)->member, Wanted *: 1, default: -1)]))
+#define FIELD_AT(Type, member, Wanted)                                                             \
+    (offsetof(Type, member) + 0 * sizeof(char[_Generic(&((Type *)0)->member, Wanted * : 1, default \
+                                                       : -1)]))
 // A typed twin of List: a pointer called `at`, then a size_t called `count`, and nothing else.
-#define FIELD_LIST_AT(Type, member)                                                             \
-    (offsetof(Type, member) +                                                                   \
-     0 * sizeof(char[_Generic(&((Type *)0)->member.count, size_t *: 1, default: -1)]) +         \
-     0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) &&                             \
-                             sizeof(((Type *)0)->member.at) == sizeof(void *) &&                \
-                             offsetof(Type, member.at) == offsetof(Type, member) &&             \
-                             offsetof(Type, member.count) ==                                    \
-                                 offsetof(Type, member) + offsetof(List, count)                 \
-                         ? 1                                                                    \
+#define FIELD_LIST_AT(Type, member)                                                                \
+    (offsetof(Type, member) +                                                                      \
+     0 * sizeof(char[_Generic(&((Type *)0)->member.count, size_t * : 1, default                    \
+                              : -1)]) +                                                            \
+     0 * sizeof(char[sizeof(((Type *)0)->member) == sizeof(List) &&                                \
+                             sizeof(((Type *)0)->member.at) == sizeof(void *) &&                   \
+                             offsetof(Type, member.at) == offsetof(Type, member) &&                \
+                             offsetof(Type, member.count) ==                                       \
+                                 offsetof(Type, member) + offsetof(List, count)                    \
+                         ? 1                                                                       \
                          : -1]))
 
 // Each macro takes the struct, the member, which is also the JSON name, and what the kind needs.
@@ -177,12 +188,14 @@ struct Field {
 // clang-format on
 
 // Sets every member to its default; REQUIRED ones become absent. `item` may be uninitialised.
-// A VARIANT under PRESENCE_DEFAULT becomes at(0) with its defaults. STATUS_NO_MEMORY leaves `item` clearable.
+// A VARIANT under PRESENCE_DEFAULT becomes at(0) with its defaults. STATUS_NO_MEMORY leaves `item`
+// clearable.
 Status fields_default(const Field *fields, void *item);
 
-// Judges every member against its row, below `pointer`: REAL and COUNT ranges, finite numbers, REQUIRED ones
-// present, lengths, texts allowed. A CHOICE under PRESENCE_DEFAULT may be absent: whoever completes the struct
-// erases what is not used. Adds all faults. Returns STATUS_OK or STATUS_INVALID.
+// Judges every member against its row, below `pointer`: REAL and COUNT ranges, finite numbers,
+// REQUIRED ones present, lengths, texts allowed. A CHOICE under PRESENCE_DEFAULT may be absent:
+// whoever completes the struct erases what is not used. Adds all faults. Returns STATUS_OK or
+// STATUS_INVALID.
 Status fields_check(const Field *fields, const void *item, const char *pointer, Problem *problem);
 
 // Frees what the members own and makes every member absent (FLAG: false). All-zero items are fine.
@@ -191,9 +204,10 @@ void fields_clear(const Field *fields, void *item);
 // Deep copy; `target` may be uninitialised and is left clear on failure.
 Status fields_copy(const Field *fields, const void *source, void *target);
 
-// Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ... Never absent are
-// FLAG, BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty list was asked for then). Any
-// other ITEM is absent if all its members are, whatever their presence (its flags do not count).
+// Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ...
+// Never absent are FLAG, BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty
+// list was asked for then). Any other ITEM is absent if all its members are, whatever their
+// presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);
 
 // Makes a new default value of `kind`; NULL without memory. Freed by variant_free.
@@ -201,17 +215,20 @@ Variant *variant_new(const Kind *kind);
 void variant_free(Variant *variant);
 const Kind *kind_find(const KindTable *table, const char *name);
 
-// The row called `name`, also inside BASE rows, whose offsets are added to *offset (which may be NULL; the row's
-// own is not), so that its member is row->offset bytes behind (char *)item + *offset.
+// The row called `name`, also inside BASE rows, whose offsets are added to *offset (which may be
+// NULL; the row's own is not), so that its member is row->offset bytes behind (char *)item +
+// *offset.
 const Field *fields_find(const Field *fields, const char *name, size_t *offset);
 
-// The nearest of the rows' names (BASE rows included), or of a NULL-terminated list; NULL if none is near
-// enough to be meant (a third of the letters may differ). For did_you_mean.
+// The nearest of the rows' names (BASE rows included), or of a NULL-terminated list; NULL if none
+// is near enough to be meant (a third of the letters may differ). For did_you_mean.
 const char *fields_nearest(const Field *fields, const char *name);
 const char *texts_nearest(const char *const *texts, const char *name);
 
-// Adds the fault "must be one of ..." for `text` at `pointer`, with the nearest of `texts`. Returns STATUS_INVALID.
-Status texts_refuse(const char *const *texts, const char *text, const char *pointer, Problem *problem);
+// Adds the fault "must be one of ..." for `text` at `pointer`, with the nearest of `texts`. Returns
+// STATUS_INVALID.
+Status texts_refuse(const char *const *texts, const char *text, const char *pointer,
+                    Problem *problem);
 
 // "pointer/name" with ~ and / escaped, cut at size.
 void pointer_join(char *target, size_t size, const char *pointer, const char *name);

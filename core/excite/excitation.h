@@ -1,6 +1,6 @@
-// What ONE excitation is; excitations.c lists all. It yields the base's acceleration over the whole run.
-// The initial state belongs to it because every kind takes one. Not the solver's view of a step: that is base.h.
-// Used by scene/, plan/ and simulation/.
+// What ONE excitation is; excitations.c lists all. It yields the base's acceleration over the whole
+// run. The initial state belongs to it because every kind takes one. Not the solver's view of a
+// step: that is base.h. Used by scene/, plan/ and simulation/.
 #ifndef CORE_EXCITE_EXCITATION_H
 #define CORE_EXCITE_EXCITATION_H
 
@@ -10,30 +10,33 @@
 
 // First member of every excitation's struct.
 typedef struct Excitation {
-    Variant variant;      // kind is an ExcitationKind's
-    double displacement;  // of the structure at t = 0, relative to the base [m]
-    double velocity;      // [m/s]
+    Variant variant;     // kind is an ExcitationKind's
+    double displacement; // of the structure at t = 0, relative to the base [m]
+    double velocity;     // [m/s]
 } Excitation;
 
 // What an excitation needs to know of the run it serves.
 typedef struct Span {
-    double duration;     // [s]
-    double sample_rate;  // [Hz]
-    size_t most;         // samples at most, 0: no limit
+    double duration;    // [s]
+    double sample_rate; // [Hz]
+    size_t most;        // samples at most, 0: no limit
 } Span;
 
 typedef struct ExcitationKind {
     Kind kind;
-    // Judges what ranges cannot say and completes defaults that depend on the run, below `pointer`. May be NULL.
-    Status (*complete)(Excitation *excitation, const Span *span, const char *pointer, Problem *problem);
-    // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when `watch` says so.
+    // Judges what ranges cannot say and completes defaults that depend on the run, below `pointer`.
+    // May be NULL.
+    Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
+                       Problem *problem);
+    // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
+    // `watch` says so.
     Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,
                    Problem *problem);
 } ExcitationKind;
 
-extern const ExcitationKind *const excitations[];  // NULL-terminated; "free" first
+extern const ExcitationKind *const excitations[]; // NULL-terminated; "free" first
 extern const KindTable excitation_kinds;
-extern const Field excitation_fields[];  // the rows that every kind has
+extern const Field excitation_fields[]; // the rows that every kind has
 extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record;
 
 static inline const ExcitationKind *excitation_kind(const Excitation *excitation) {

@@ -7,9 +7,9 @@
 
 typedef struct ExcitationRecord {
     Excitation excitation;
-    Reals samples;    // [m/s^2] before scaling
-    double interval;  // [s]
-    double scale;     // [-]
+    Reals samples;   // [m/s^2] before scaling
+    double interval; // [s]
+    double scale;    // [-]
 } ExcitationRecord;
 
 #endif

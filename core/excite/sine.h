@@ -9,9 +9,9 @@ typedef enum SineQuantity { SINE_ACCELERATION, SINE_DISPLACEMENT } SineQuantity;
 
 typedef struct ExcitationSine {
     Excitation excitation;
-    double frequency;  // [Hz]
-    double amplitude;  // [m/s^2] or [m]
-    int quantity;      // SineQuantity
+    double frequency; // [Hz]
+    double amplitude; // [m/s^2] or [m]
+    int quantity;     // SineQuantity
 } ExcitationSine;
 
 #endif

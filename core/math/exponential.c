@@ -65,7 +65,8 @@ void exponential(const long double *A, size_t n, long double h, long double *tra
         transition[i * n + i] += 1;
 }
 
-// Nodes and weights of Gauss-Legendre quadrature on [0, 1], by Newton's method on the Legendre polynomial.
+// Nodes and weights of Gauss-Legendre quadrature on [0, 1], by Newton's method on the Legendre
+// polynomial.
 static void gauss(long double *node, long double *weight) {
     for (int i = 0; i < NODES; i++) {
         long double x = cosl(3.14159265358979323846L * ((long double)i + 0.75L) / (NODES + 0.5L));
@@ -98,8 +99,8 @@ static void row_series(const long double *A, size_t n, long double h, const long
         }
 }
 
-void exponential_form(const long double *A, size_t n, long double h, const long double *c, const long double *d,
-                      long double *form) {
+void exponential_form(const long double *A, size_t n, long double h, const long double *c,
+                      const long double *d, long double *form) {
     const int count = halvings(A, n, h);
     const long double small = ldexpl(h, -count);
     long double left[TERMS][EXPONENTIAL_SIZE], right[TERMS][EXPONENTIAL_SIZE];

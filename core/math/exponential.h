@@ -1,6 +1,6 @@
-// exp(A h) by precise integration: Zhong and Williams, Computers & Structures 56 (1995) 113-120. The increment
-// exp(A h) - I is squared instead of the matrix, so that nothing is lost to the identity.
-// Small dense systems in long double, made once per plan. Used by plan/ and solve/.
+// exp(A h) by precise integration: Zhong and Williams, Computers & Structures 56 (1995) 113-120.
+// The increment exp(A h) - I is squared instead of the matrix, so that nothing is lost to the
+// identity. Small dense systems in long double, made once per plan. Used by plan/ and solve/.
 #ifndef CORE_MATH_EXPONENTIAL_H
 #define CORE_MATH_EXPONENTIAL_H
 
@@ -15,10 +15,10 @@ void exponential(const long double *A, size_t n, long double h, long double *tra
 void exponential_increment(const long double *A, size_t n, long double h, long double *increment);
 void exponential_double(size_t n, long double *increment);
 
-// The integral over 0 <= t <= h of (c' exp(A t))' (d' exp(A t)): the quadratic form whose value at y is the integral
-// of (c'y(t)) (d'y(t)) along y' = A y from y(0) = y. form[n * n], symmetric.
-void exponential_form(const long double *A, size_t n, long double h, const long double *c, const long double *d,
-                      long double *form);
+// The integral over 0 <= t <= h of (c' exp(A t))' (d' exp(A t)): the quadratic form whose value at
+// y is the integral of (c'y(t)) (d'y(t)) along y' = A y from y(0) = y. form[n * n], symmetric.
+void exponential_form(const long double *A, size_t n, long double h, const long double *c,
+                      const long double *d, long double *form);
 
 // What the form is over twice the time; `increment` is the single time's.
 void exponential_form_double(size_t n, const long double *increment, long double *form);

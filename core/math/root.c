@@ -1,7 +1,7 @@
-// With B >= -g'' on all of [0, 1], g(s + d) >= g(s) + g'(s) d - B d^2 / 2: the positive zero of that parabola is a
-// step which cannot pass a root. Towards a simple root it shrinks like Newton's; past a near miss it strides on.
-// Where many such steps would be needed (almost a double root under a coarse B) the interval is halved instead,
-// which makes B local and always ends.
+// With B >= -g'' on all of [0, 1], g(s + d) >= g(s) + g'(s) d - B d^2 / 2: the positive zero of
+// that parabola is a step which cannot pass a root. Towards a simple root it shrinks like Newton's;
+// past a near miss it strides on. Where many such steps would be needed (almost a double root under
+// a coarse B) the interval is halved instead, which makes B local and always ends.
 #include "core/math/root.h"
 
 #include <float.h>

@@ -9,9 +9,10 @@
 
 enum { ROOT_DEGREE = 31 };
 
-// c[0] + c[1] s + ... + c[degree] s^degree on 0 <= s <= 1; a c[0] of exactly 0 is a root at the start that does not
-// count. True if the polynomial becomes negative somewhere: *s is then where it first does (0 if at once), right to
-// the rounding of the coefficients. Touching zero from above within rounding counts as crossing.
+// c[0] + c[1] s + ... + c[degree] s^degree on 0 <= s <= 1; a c[0] of exactly 0 is a root at the
+// start that does not count. True if the polynomial becomes negative somewhere: *s is then where it
+// first does (0 if at once), right to the rounding of the coefficients. Touching zero from above
+// within rounding counts as crossing.
 bool root_first_crossing(const double *c, size_t degree, double *s);
 
 // The polynomial's value, and its derivative's, at s.

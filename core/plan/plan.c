@@ -16,7 +16,8 @@ static Identified identify(const Plan *plan, const Buffer *buffer) {
     if (plan->form == CONTACT_LINEAR)
         return isnan(buffer->stiffness)
                    ? identify_measured(mass, buffer->restitution, buffer->contact_time)
-                   : identify_given(mass, buffer->stiffness, isnan(buffer->damping) ? 0 : buffer->damping);
+                   : identify_given(mass, buffer->stiffness,
+                                    isnan(buffer->damping) ? 0 : buffer->damping);
     return (Identified){.effective_mass = mass,
                         .restitution = buffer->restitution,
                         .contact_time = NAN,
@@ -33,7 +34,8 @@ static Status derive(Plan *plan, const Damper *damper) {
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
         const Identified identified = identify(plan, buffer);
-        plan->stops[side] = (PlanStop){identified.restitution, identified.stiffness, identified.damping};
+        plan->stops[side] =
+            (PlanStop){identified.restitution, identified.stiffness, identified.damping};
         Derived *derived = &list->at[list->count++];
         *derived = (Derived){.damper = 1,
                              .side = side,
@@ -55,17 +57,19 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, contact);
     plan->form = law->form;
     if (!plan->has_damper)
-        return decisions_add(decisions, "contact_model", "none", NAN, NULL, "the scene has no damper");
+        return decisions_add(decisions, "contact_model", "none", NAN, NULL,
+                             "the scene has no damper");
     if (contact_law(contact)->form != CONTACT_CHOSEN)
-        return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL, "the scene asks for it");
+        return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
+                             "the scene asks for it");
     if (law->form == CONTACT_IMPULSIVE)
         return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
                              "only restitution is known, no contact time");
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(&scene->dampers.at[0], (Side)side);
         if (!isnan(buffer->contact_time))
-            return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time, "s",
-                                 "a contact time is known");
+            return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time,
+                                 "s", "a contact time is known");
     }
     return decisions_add(decisions, "contact_model", law->kind.name,
                          damper_buffer(&scene->dampers.at[0], SIDE_LEFT)->stiffness, "N/m",
@@ -86,8 +90,9 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     plan->has_damper = scene->dampers.count > 0;
     TRY(decide_contact(scene, plan));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL, "%s",
-                      strcmp(asked, solver) == 0 ? "the scene asks for it"
-                                                 : "every contact state is linear, so its motion is known exactly"));
+                      strcmp(asked, solver) == 0
+                          ? "the scene asks for it"
+                          : "every contact state is linear, so its motion is known exactly"));
     if (plan->has_damper) {
         const Damper *damper = &scene->dampers.at[0];
         plan->damper_mass = damper->mass;
@@ -100,10 +105,12 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     plan->report.contact_model = text_copy(plan->has_damper ? law->kind.name : "none");
     plan->report.solver = text_copy(solver);
-    return plan->report.contact_model != NULL && plan->report.solver != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+    return plan->report.contact_model != NULL && plan->report.solver != NULL ? STATUS_OK
+                                                                             : STATUS_NO_MEMORY;
 }
 
-Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan, Problem *problem) {
+Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
+                Problem *problem) {
     *plan = calloc(1, sizeof **plan);
     const Status status = *plan == NULL ? STATUS_NO_MEMORY : plan_fill(scene, asked, solver, *plan);
     if (status == STATUS_OK)

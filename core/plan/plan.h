@@ -1,5 +1,5 @@
-// A scene made ready to run, with the reasons for each choice. Never changes once made; shared between threads.
-// Not a run: it has no state. Used by solve/ and simulation/.
+// A scene made ready to run, with the reasons for each choice. Never changes once made; shared
+// between threads. Not a run: it has no state. Used by solve/ and simulation/.
 #ifndef CORE_PLAN_PLAN_H
 #define CORE_PLAN_PLAN_H
 
@@ -10,8 +10,8 @@
 // One choice of the planner, for people. Texts are static or live as long as the Decisions.
 typedef struct Decision {
     char *about, *chose, *why;
-    double value;  // NAN if there is none
-    char *unit;    // NULL if there is none
+    double value; // NAN if there is none
+    char *unit;   // NULL if there is none
 } Decision;
 typedef struct Decisions {
     Decision *at;
@@ -20,9 +20,9 @@ typedef struct Decisions {
 
 // What a buffer came to for this pair of masses: one per damper and side. What is not known is NAN.
 typedef struct Derived {
-    uint64_t damper;  // from 1
-    int side;         // Side
-    char *material;   // "sponge@1"; NULL if numbers were given
+    uint64_t damper; // from 1
+    int side;        // Side
+    char *material;  // "sponge@1"; NULL if numbers were given
     double restitution, contact_time, effective_mass, stiffness, damping, damping_ratio;
 } Derived;
 typedef struct DerivedList {
@@ -40,7 +40,7 @@ typedef struct Warnings {
 
 // The readable part of a plan: the API's "plan" object.
 typedef struct PlanReport {
-    char *contact_model;  // "none" where there is no damper
+    char *contact_model; // "none" where there is no damper
     char *solver;
     Decisions decisions;
     DerivedList derived;
@@ -50,28 +50,30 @@ extern const Field plan_report_fields[], derived_fields[], decision_fields[], wa
 
 // One stop's contact parameters, ready for a solver.
 typedef struct PlanStop {
-    double restitution;  // e, under CONTACT_IMPULSIVE
-    double stiffness;    // k_b [N/m], under CONTACT_LINEAR
-    double damping;      // c_b [N s/m]
+    double restitution; // e, under CONTACT_IMPULSIVE
+    double stiffness;   // k_b [N/m], under CONTACT_LINEAR
+    double damping;     // c_b [N s/m]
 } PlanStop;
 
 // Plain values, written once by plan_new.
 typedef struct Plan {
-    double mass, stiffness, damping;  // M, K, C of the structure
+    double mass, stiffness, damping; // M, K, C of the structure
     bool has_damper;
-    double damper_mass, clearance, offset;  // m, d, middle of the stops
-    ContactForm form;                       // CONTACT_IMPULSIVE or CONTACT_LINEAR
-    PlanStop stops[2];                      // by Side
-    double displacement, velocity;          // of the structure at t = 0
-    double position, relative_velocity;     // of the free mass at t = 0, relative to the stops' middle and the structure
+    double damper_mass, clearance, offset; // m, d, middle of the stops
+    ContactForm form;                      // CONTACT_IMPULSIVE or CONTACT_LINEAR
+    PlanStop stops[2];                     // by Side
+    double displacement, velocity;         // of the structure at t = 0
+    double position, relative_velocity; // of the free mass at t = 0, relative to the stops' middle
+                                        // and the structure
     double duration, sample_rate;
-    size_t count;  // samples
+    size_t count; // samples
     PlanReport report;
 } Plan;
 
-// Makes ready a scene that scene_complete has passed; `solver` is the chosen solver's name, `asked` what the
-// accuracy object said. Freed by plan_free.
-Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan, Problem *problem);
+// Makes ready a scene that scene_complete has passed; `solver` is the chosen solver's name, `asked`
+// what the accuracy object said. Freed by plan_free.
+Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
+                Problem *problem);
 void plan_free(Plan *plan);
 
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
@@ -79,7 +81,8 @@ void plan_free(Plan *plan);
 Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void warnings_clear(Warnings *warnings);
-Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value, const char *unit,
-                     const char *format, ...) __attribute__((format(printf, 6, 7)));
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
+                     const char *unit, const char *format, ...)
+    __attribute__((format(printf, 6, 7)));
 
 #endif

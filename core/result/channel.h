@@ -1,5 +1,5 @@
-// The quantities a run can be asked for, by name and unit. The solver fills them, the table drives everything else.
-// Used by simulation/, solve/ and docs.
+// The quantities a run can be asked for, by name and unit. The solver fills them, the table drives
+// everything else. Used by simulation/, solve/ and docs.
 #ifndef CORE_RESULT_CHANNEL_H
 #define CORE_RESULT_CHANNEL_H
 
@@ -24,6 +24,6 @@ typedef struct Channel {
 } Channel;
 
 extern const Channel channels[CHANNEL_COUNT];
-extern const char *const channel_names[];  // NULL-terminated
+extern const char *const channel_names[]; // NULL-terminated
 
 #endif

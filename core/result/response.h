@@ -1,6 +1,6 @@
-// What a solver hands back: sampled columns, the ledger of impacts, peaks and energies met on the way.
-// Statistics and spectra are made of it afterwards (statistics.h, spectrum.h).
-// Filled by solve/, read by everyone behind it.
+// What a solver hands back: sampled columns, the ledger of impacts, peaks and energies met on the
+// way. Statistics and spectra are made of it afterwards (statistics.h, spectrum.h). Filled by
+// solve/, read by everyone behind it.
 #ifndef CORE_RESULT_RESPONSE_H
 #define CORE_RESULT_RESPONSE_H
 
@@ -12,19 +12,20 @@
 
 typedef enum ImpactKind { IMPACT_IMPACT, IMPACT_RESTING } ImpactKind;
 
-// One event of the ledger. Magnitudes; what is not known (an open contact's end, a peak under impulse) is NAN.
+// One event of the ledger. Magnitudes; what is not known (an open contact's end, a peak under
+// impulse) is NAN.
 typedef struct Impact {
-    int kind;                 // ImpactKind
-    double start, end;        // [s]
-    uint64_t damper;          // from 1
-    int side;                 // Side
-    double approach_speed;    // [m/s]
-    double separation_speed;  // [m/s]
-    double restitution;       // separation over approach speed [-]
-    double duration;          // [s]
-    double peak_force;        // largest |N| of the contact [N]
-    double impulse;           // |integral of N| [N s]
-    double energy_lost;       // work of the dissipative part [J]
+    int kind;                // ImpactKind
+    double start, end;       // [s]
+    uint64_t damper;         // from 1
+    int side;                // Side
+    double approach_speed;   // [m/s]
+    double separation_speed; // [m/s]
+    double restitution;      // separation over approach speed [-]
+    double duration;         // [s]
+    double peak_force;       // largest |N| of the contact [N]
+    double impulse;          // |integral of N| [N s]
+    double energy_lost;      // work of the dissipative part [J]
 } Impact;
 
 typedef struct Impacts {
@@ -34,13 +35,13 @@ typedef struct Impacts {
 
 // Energies relative to the base [J]; `residual` is the largest |balance| over the largest energy.
 typedef struct Energy {
-    double initial;             // kinetic, of the springs and of the free masses at t = 0
-    double input;               // work of the base's motion
-    double structural_damping;  // lost in C
-    double contact;             // lost in contacts
-    double kinetic;             // at the end, structure and free masses
-    double strain;              // at the end, structure's springs and contact springs
-    double residual;            // [-]
+    double initial;            // kinetic, of the springs and of the free masses at t = 0
+    double input;              // work of the base's motion
+    double structural_damping; // lost in C
+    double contact;            // lost in contacts
+    double kinetic;            // at the end, structure and free masses
+    double strain;             // at the end, structure's springs and contact springs
+    double residual;           // [-]
 } Energy;
 
 // Peaks over samples and event instants, whether or not the channel was asked for.
@@ -49,13 +50,14 @@ typedef struct Peaks {
 } Peaks;
 
 typedef struct Response {
-    double sample_rate;  // [Hz]
-    size_t count;        // samples, i = 0 ... count - 1 at t = i / sample_rate
-    Columns series;      // the channels that were wanted, in the order wanted; rows == count (or none)
+    double sample_rate; // [Hz]
+    size_t count;       // samples, i = 0 ... count - 1 at t = i / sample_rate
+    Columns series; // the channels that were wanted, in the order wanted; rows == count (or none)
     Impacts impacts;
     Energy energy;
     Peaks peaks;
-    double sum_squares_displacement, sum_squares_acceleration;  // over samples from statistics_from on
+    double sum_squares_displacement,
+        sum_squares_acceleration; // over samples from statistics_from on
     size_t statistics_count;
 } Response;
 

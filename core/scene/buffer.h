@@ -7,14 +7,14 @@
 #include "core/base/field.h"
 #include "core/contact/contact.h"
 
-// What is not given is NAN. `material` alone is a name yet to be resolved; beside numbers ("sponge@1") it says where
-// they come from.
+// What is not given is NAN. `material` alone is a name yet to be resolved; beside numbers
+// ("sponge@1") it says where they come from.
 typedef struct Buffer {
     char *material;
-    double restitution;   // e [-]
-    double contact_time;  // T_c [s]
-    double stiffness;     // k_b [N/m]
-    double damping;       // c_b [N s/m]
+    double restitution;  // e [-]
+    double contact_time; // T_c [s]
+    double stiffness;    // k_b [N/m]
+    double damping;      // c_b [N s/m]
 } Buffer;
 
 extern const Field buffer_fields[];
@@ -29,7 +29,8 @@ bool buffer_equals(const Buffer *a, const Buffer *b);
 // Moves `source` into `target` and leaves it absent.
 void buffer_move(Buffer *target, Buffer *source);
 
-// Judges a given buffer under a form of contact, below `pointer`; silent where there is a fault already.
+// Judges a given buffer under a form of contact, below `pointer`; silent where there is a fault
+// already.
 Status buffer_check(const Buffer *buffer, ContactForm form, const char *pointer, Problem *problem);
 
 // Makes contact time, stiffness and damping absent.

@@ -1,6 +1,6 @@
 // A free mass between two buffered stops.
-// Not a buffer's numbers (buffer.h) and not what they come to for a pair of masses (contact/identify.h).
-// Used by scene/ and plan/.
+// Not a buffer's numbers (buffer.h) and not what they come to for a pair of masses
+// (contact/identify.h). Used by scene/ and plan/.
 #ifndef CORE_SCENE_DAMPER_H
 #define CORE_SCENE_DAMPER_H
 
@@ -11,18 +11,19 @@
 #include "core/contact/contact.h"
 #include "core/scene/buffer.h"
 
-// Stops at u = offset +- clearance / 2, u being the free mass's displacement relative to the structure.
+// Stops at u = offset +- clearance / 2, u being the free mass's displacement relative to the
+// structure.
 typedef struct Damper {
-    double mass;       // m [kg]
-    double clearance;  // d [m]
-    double offset;     // of the stops' middle [m]
-    double position;   // initial, relative to that middle [m]
-    double velocity;   // initial, relative to the structure [m/s]
-    uint64_t storey;   // from 1; COUNT_ABSENT: the top one
-    Buffer buffer;     // both sides, or
+    double mass;      // m [kg]
+    double clearance; // d [m]
+    double offset;    // of the stops' middle [m]
+    double position;  // initial, relative to that middle [m]
+    double velocity;  // initial, relative to the structure [m/s]
+    uint64_t storey;  // from 1; COUNT_ABSENT: the top one
+    Buffer buffer;    // both sides, or
     Buffer left_buffer;
     Buffer right_buffer;
-    int identified_for;  // what pair e and T_c belong to
+    int identified_for; // what pair e and T_c belong to
 } Damper;
 
 typedef struct Dampers {
@@ -35,13 +36,13 @@ extern const Field damper_fields[];
 // The buffer of one side: that side's own, else the common one.
 const Buffer *damper_buffer(const Damper *damper, Side side);
 
-// Which law a run of these dampers uses: what "auto" stands for is spring_damper wherever a contact time or k, c is
-// known on any side, else impulse.
+// Which law a run of these dampers uses: what "auto" stands for is spring_damper wherever a contact
+// time or k, c is known on any side, else impulse.
 const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact);
 
-// Faults that rows cannot see, below `pointer`, under the law that dampers_contact_law found. Then fills the storey,
-// erases what the law does not use, and gives equal buffers one form: `buffer` where both sides are the same,
-// else one for each side.
+// Faults that rows cannot see, below `pointer`, under the law that dampers_contact_law found. Then
+// fills the storey, erases what the law does not use, and gives equal buffers one form: `buffer`
+// where both sides are the same, else one for each side.
 Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
                        Problem *problem);
 

@@ -12,12 +12,12 @@
 #include "core/scene/structure.h"
 
 typedef struct Scene {
-    Variant *structure;   // a Structure
+    Variant *structure; // a Structure
     Dampers dampers;
-    Variant *contact;     // a Contact
-    Variant *excitation;  // an Excitation
-    double duration;      // [s]
-    double sample_rate;   // [Hz]
+    Variant *contact;    // a Contact
+    Variant *excitation; // an Excitation
+    double duration;     // [s]
+    double sample_rate;  // [Hz]
 } Scene;
 
 extern const Field scene_fields[];
@@ -35,10 +35,11 @@ static inline const Excitation *scene_excitation(const Scene *scene) {
 // Samples per channel: i = 0 ... floor(duration * sample_rate (1 + 1e-12)). Saturates at SIZE_MAX.
 size_t scene_sample_count(const Scene *scene);
 
-// Judges and completes: adds every fault that the rows alone cannot see (materials still unresolved, parts that
-// exclude each other, positions beyond a stop, more than `most_samples` samples; 0: no limit), fills defaults that
-// depend on other members and erases what the chosen model does not use, so that equal scenes have equal canonical
-// forms. Call after fields_check and after slugs are resolved; says nothing of what already has a fault.
+// Judges and completes: adds every fault that the rows alone cannot see (materials still
+// unresolved, parts that exclude each other, positions beyond a stop, more than `most_samples`
+// samples; 0: no limit), fills defaults that depend on other members and erases what the chosen
+// model does not use, so that equal scenes have equal canonical forms. Call after fields_check and
+// after slugs are resolved; says nothing of what already has a fault.
 Status scene_complete(Scene *scene, size_t most_samples, Problem *problem);
 
 #endif

@@ -13,10 +13,10 @@ typedef struct Structure {
 // Kind "sdof": M x'' + C x' + K x = -M a_g + N.
 typedef struct StructureSdof {
     Structure structure;
-    double mass;           // M [kg]
-    double stiffness;      // K [N/m]
-    double damping;        // C [N s/m]; absent where damping_ratio is given
-    double damping_ratio;  // xi, C = 2 xi sqrt(K M) [-]
+    double mass;          // M [kg]
+    double stiffness;     // K [N/m]
+    double damping;       // C [N s/m]; absent where damping_ratio is given
+    double damping_ratio; // xi, C = 2 xi sqrt(K M) [-]
 } StructureSdof;
 
 extern const KindTable structure_kinds;

@@ -10,7 +10,7 @@
 
 // The part nobody outside sees: how many hold it.
 typedef struct Held {
-    Outcome outcome;  // first, so that an Outcome's address is its Held's
+    Outcome outcome; // first, so that an Outcome's address is its Held's
     atomic_size_t holds;
 } Held;
 
@@ -20,8 +20,8 @@ static const Solver *chosen_solver(const Simulation *simulation) {
 }
 
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
-    return plan_new(&simulation->scene, simulation->accuracy->kind->name, chosen_solver(simulation)->kind.name, plan,
-                    problem);
+    return plan_new(&simulation->scene, simulation->accuracy->kind->name,
+                    chosen_solver(simulation)->kind.name, plan, problem);
 }
 
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
@@ -41,6 +41,21 @@ static int channel_find(const char *name) {
     return -1;
 }
 
+// A part of the journey tells its own 0 to 1; the watcher sees the whole.
+typedef struct Stage {
+    const Watch *whole;
+    double from, share;
+} Stage;
+
+static bool stage_advance(void *context, double fraction) {
+    const Stage *stage = context;
+    return watch_advance(stage->whole, stage->from + stage->share * fraction);
+}
+
+static Watch stage_watch(Stage *stage) {
+    return (Watch){stage, stage_advance};
+}
+
 // The journey's luggage: everything that must be put down again at its end.
 typedef struct Journey {
     const Simulation *simulation;
@@ -48,8 +63,8 @@ typedef struct Journey {
     const Watch *watch;
     Plan *plan;
     Base base;
-    Columns hidden;       // channels that only a spectrum wants
-    Columns transformed;  // borrowed values of the spectrum's channels
+    Columns hidden;      // channels that only a spectrum wants
+    Columns transformed; // borrowed values of the spectrum's channels
     Outcome *outcome;
 } Journey;
 
@@ -90,9 +105,11 @@ static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) 
         columns->at[i].values = run->columns[channel];
         units[i] = channels[channel].psd_unit;
     }
-    const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap, request->window,
-                                       request->detrend};
-    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, journey->watch,
+    Stage stage = {journey->watch, 0.9, 0.1};
+    const Watch watch = stage_watch(&stage);
+    const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
+                                       request->window, request->detrend};
+    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
                           &journey->outcome->spectrum, problem);
 }
 
@@ -102,26 +119,29 @@ static void summarize(Outcome *outcome) {
     uint64_t impacts = 0;
     for (size_t i = 0; i < response->impacts.count; i++)
         impacts += response->impacts.at[i].kind == IMPACT_IMPACT;
-    outcome->summary = (Summary){.peak_displacement = response->peaks.displacement,
-                                 .rms_displacement = sqrt(response->sum_squares_displacement / count),
-                                 .peak_acceleration = response->peaks.acceleration,
-                                 .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
-                                 .impacts = impacts,
-                                 .peak_contact_force = response->peaks.contact_force,
-                                 .energy_residual = response->energy.residual,
-                                 .error_estimate = NAN,
-                                 .trust_horizon = NAN};
+    outcome->summary =
+        (Summary){.peak_displacement = response->peaks.displacement,
+                  .rms_displacement = sqrt(response->sum_squares_displacement / count),
+                  .peak_acceleration = response->peaks.acceleration,
+                  .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
+                  .impacts = impacts,
+                  .peak_contact_force = response->peaks.contact_force,
+                  .energy_residual = response->energy.residual,
+                  .error_estimate = NAN,
+                  .trust_horizon = NAN};
 }
 
 // Finite inputs can still be too large for their products.
 static Status check_finite(const Outcome *outcome, Problem *problem) {
     const Summary *summary = &outcome->summary;
-    const double all = summary->peak_displacement + summary->rms_displacement + summary->peak_acceleration +
-                       summary->rms_acceleration + summary->peak_contact_force + summary->energy_residual;
+    const double all = summary->peak_displacement + summary->rms_displacement +
+                       summary->peak_acceleration + summary->rms_acceleration +
+                       summary->peak_contact_force + summary->energy_residual;
     if (isfinite(all))
         return STATUS_OK;
     return problem_set(problem, STATUS_UNSTABLE,
-                       "the scene's numbers are too large: peaks or energies leave what double precision can hold");
+                       "the scene's numbers are too large: peaks or energies leave what double "
+                       "precision can hold");
 }
 
 static Status travel(Journey *journey, Problem *problem) {
@@ -129,16 +149,21 @@ static Status travel(Journey *journey, Problem *problem) {
     const Scene *scene = &simulation->scene;
     Outcome *outcome = journey->outcome;
     TRY(make_plan(simulation, &journey->plan, problem));
-    const Span span = {scene->duration, scene->sample_rate, journey->limits == NULL ? 0 : journey->limits->samples};
+    const Span span = {scene->duration, scene->sample_rate,
+                       journey->limits == NULL ? 0 : journey->limits->samples};
     const Excitation *excitation = scene_excitation(scene);
-    TRY(excitation_kind(excitation)->make(excitation, &span, journey->watch, &journey->base, problem));
+    Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
+    const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
+    TRY(excitation_kind(excitation)
+            ->make(excitation, &span, &making_watch, &journey->base, problem));
     Run run = {.plan = journey->plan,
                .base = &journey->base,
-               .watch = journey->watch,
+               .watch = &solving_watch,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
-    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, &run, problem));
+    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, &run,
+                     problem));
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, &run, problem));
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     outcome->cost = run.steps;
@@ -150,16 +175,17 @@ static Status travel(Journey *journey, Problem *problem) {
     return STATUS_OK;
 }
 
-Status simulation_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-                      Outcome **outcome, Problem *problem) {
+Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
+                      const Watch *watch, Outcome **outcome, Problem *problem) {
     *outcome = NULL;
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
     atomic_init(&held->holds, 1);
-    Journey journey = {.simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
+    Journey journey = {
+        .simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
     const Status status = travel(&journey, problem);
-    free(journey.transformed.at);  // its values are the other columns'
+    free(journey.transformed.at); // its values are the other columns'
     columns_clear(&journey.hidden);
     base_clear(&journey.base);
     plan_free(journey.plan);
@@ -187,15 +213,24 @@ void outcome_drop(Outcome *outcome) {
 
 size_t outcome_bytes(const Outcome *outcome) {
     const Columns *series = &outcome->response.series, *densities = &outcome->spectrum.densities;
-    return sizeof(Held) + sizeof(double) * (series->count * series->rows + (densities->count + 1) * densities->rows) +
+    return sizeof(Held) +
+           sizeof(double) *
+               (series->count * series->rows + (densities->count + 1) * densities->rows) +
            outcome->response.impacts.count * sizeof(Impact);
 }
 
 Cost simulation_cost(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
-    const double channels_kept = (double)simulation->output.channels.count;
     const bool has_damper = simulation->scene.dampers.count > 0;
-    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
-    return (Cost){.steps = samples * (has_damper ? 1.1 : 1),
-                  .bytes = sizeof(Outcome) + samples * channels_kept * sizeof(double)};
+    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
+    // transformed sample costs about as much as a third of a step, and overlap transforms it
+    // several times.
+    double steps = samples * (has_damper ? 1.1 : 1);
+    if (psd->channels.count > 0 && psd->segment > psd->overlap)
+        steps += samples * (double)psd->channels.count * (double)psd->segment /
+                 (double)(psd->segment - psd->overlap) / 3;
+    return (Cost){.steps = steps,
+                  .bytes = sizeof(Outcome) +
+                           samples * (double)simulation->output.channels.count * sizeof(double)};
 }

@@ -9,28 +9,29 @@
 #include "core/result/spectrum.h"
 #include "core/scene/scene.h"
 
-// The engine's name and version; part of every result's id. Changes whenever any bit of any result may.
+// The engine's name and version; part of every result's id. Changes whenever any bit of any result
+// may.
 extern const char engine_version[];
 
 // "psd" in the output.
 typedef struct SpectrumRequest {
     Texts channels;
-    uint64_t segment;  // COUNT_ABSENT: min(4096, count)
-    uint64_t overlap;  // COUNT_ABSENT: segment / 2
-    int window;        // SpectrumWindow
-    int detrend;       // SpectrumDetrend
+    uint64_t segment; // COUNT_ABSENT: min(4096, count)
+    uint64_t overlap; // COUNT_ABSENT: segment / 2
+    int window;       // SpectrumWindow
+    int detrend;      // SpectrumDetrend
 } SpectrumRequest;
 
 typedef struct Output {
     Texts channels;
     SpectrumRequest psd;
-    double statistics_from;  // [s]
+    double statistics_from; // [s]
 } Output;
 
 // What was asked: the API's "scene".
 typedef struct Simulation {
     Scene scene;
-    Variant *accuracy;  // an Accuracy
+    Variant *accuracy; // an Accuracy
     Output output;
     char *title;
     Texts labels;
@@ -40,20 +41,23 @@ extern const Field simulation_fields[];
 
 // Limits that are the caller's policy.
 typedef struct SimulationLimits {
-    size_t samples;  // per channel; 0: none
-    size_t impacts;  // ledger rows; 0: none
-    double steps;    // solver steps of a run; 0: none
+    size_t samples; // per channel; 0: none
+    size_t impacts; // ledger rows; 0: none
+    double steps;   // solver steps of a run; 0: none
 } SimulationLimits;
 
-void simulation_clear(Simulation *simulation);  // fields_clear by another name; defaults by fields_default
+void simulation_clear(
+    Simulation *simulation); // fields_clear by another name; defaults by fields_default
 
-// Judges the whole (rows and what rows cannot see), completes it to its canonical form, and collects warnings
-// (implausible values, a cut segment). Slugs must be resolved before. All faults are added to `problem`; faults
-// already in it, a reader's, fail it too. `limits` and `warnings` may be NULL.
-Status simulation_complete(Simulation *simulation, const SimulationLimits *limits, Warnings *warnings,
-                           Problem *problem);
+// Judges the whole (rows and what rows cannot see), completes it to its canonical form, and
+// collects warnings (implausible values, a cut segment). Slugs must be resolved before. All faults
+// are added to `problem`; faults already in it, a reader's, fail it too. `limits` and `warnings`
+// may be NULL.
+Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
+                           Warnings *warnings, Problem *problem);
 
-// The plan alone, for a dry run, of a completed simulation. Cleared by fields_clear(plan_report_fields, ...).
+// The plan alone, for a dry run, of a completed simulation. Cleared by
+// fields_clear(plan_report_fields, ...).
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
 
 // The numbers people ask for first; NAN is unknown.
@@ -68,25 +72,25 @@ extern const Field summary_fields[];
 typedef struct Outcome Outcome;
 struct Outcome {
     PlanReport plan;
-    Response response;  // response.series holds output.channels in that order
-    Spectrum spectrum;  // of output.psd; empty where none was asked for
+    Response response; // response.series holds output.channels in that order
+    Spectrum spectrum; // of output.psd; empty where none was asked for
     Summary summary;
-    double cost;        // work counted, in solver steps
+    double cost; // work counted, in solver steps
 };
 
-// Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT at
-// limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold. The Outcome is the
-// caller's one hold on it, freed by the last outcome_drop.
-Status simulation_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-                      Outcome **outcome, Problem *problem);
+// Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
+// at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold. The Outcome
+// is the caller's one hold on it, freed by the last outcome_drop.
+Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
+                      const Watch *watch, Outcome **outcome, Problem *problem);
 Outcome *outcome_hold(Outcome *outcome);
 void outcome_drop(Outcome *outcome);
-size_t outcome_bytes(const Outcome *outcome);  // of memory, for caches
+size_t outcome_bytes(const Outcome *outcome); // of memory, for caches
 
 // Expected cost of a completed simulation, before running it.
 typedef struct Cost {
-    double steps;  // solver steps
-    double bytes;  // of the outcome in memory
+    double steps; // solver steps
+    double bytes; // of the outcome in memory
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
 

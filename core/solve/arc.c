@@ -1,7 +1,8 @@
 // The Taylor coefficients of a linear system follow from each other:
 //   (k + 1)(k + 2) x_{k+2} = -a_k - s_k + share n_k,   (k + 1)(k + 2) r_{k+2} = s_k - n_k.
-// In s = t / length they fall like rho^k / k!, so the degree that leaves only rounding is known beforehand. No
-// eigenvalues are taken, so underdamped, critical, overdamped and singular systems are all the same to it.
+// In s = t / length they fall like rho^k / k!, so the degree that leaves only rounding is known
+// beforehand. No eigenvalues are taken, so underdamped, critical, overdamped and singular systems
+// are all the same to it.
 #include "core/solve/arc.h"
 
 #include <math.h>
@@ -32,7 +33,8 @@ static void base_series(Arc *arc, const Slice *slice, double length) {
     }
 }
 
-void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice, double length) {
+void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
+              double length) {
     arc->length = length;
     arc->rho = length * motion->rate;
     arc->degree = degree_for(arc->rho);
@@ -49,8 +51,8 @@ void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *s
     for (size_t k = 0; k < arc->degree; k++) {
         const double next = (double)(k + 1);
         const double push = damping * next * x[k + 1] + omega2 * x[k];
-        const double force = motion->is_resting ? push
-                                                : contact_damping * next * r[k + 1] + contact2 * r[k];
+        const double force =
+            motion->is_resting ? push : contact_damping * next * r[k + 1] + contact2 * r[k];
         arc->push[k] = push;
         arc->force[k] = force;
         if (k + 2 <= arc->degree) {
@@ -67,7 +69,7 @@ void arc_cut(Arc *arc, double s) {
         arc->x[k] *= power;
         arc->r[k] *= power;
         arc->base[k] *= power;
-        arc->push[k] *= power * s * s;  // these carry length^2
+        arc->push[k] *= power * s * s; // these carry length^2
         arc->force[k] *= power * s * s;
     }
     arc->length *= s;
@@ -75,8 +77,9 @@ void arc_cut(Arc *arc, double s) {
 }
 
 State arc_at(const Arc *arc, double s) {
-    return (State){root_value(arc->x, arc->degree, s), root_slope(arc->x, arc->degree, s) / arc->length,
-                   root_value(arc->r, arc->degree, s), root_slope(arc->r, arc->degree, s) / arc->length};
+    return (State){
+        root_value(arc->x, arc->degree, s), root_slope(arc->x, arc->degree, s) / arc->length,
+        root_value(arc->r, arc->degree, s), root_slope(arc->r, arc->degree, s) / arc->length};
 }
 
 // Small terms first.
@@ -106,8 +109,8 @@ double arc_impulse(const Arc *arc) {
     return arc->length > 0 ? integral(arc->force, arc->degree - 1) / arc->length : 0;
 }
 
-// Gauss-Legendre quadrature on [0, 1]; its error for products of two solutions is (2 rho)^(2 n) times a constant
-// that 3, 5 and 8 points keep below 1e-14.
+// Gauss-Legendre quadrature on [0, 1]; its error for products of two solutions is (2 rho)^(2 n)
+// times a constant that 3, 5 and 8 points keep below 1e-14.
 typedef struct Quadrature {
     size_t count;
     double node[8], weight[8];
@@ -155,7 +158,8 @@ double arc_peak_force(const Arc *arc, double least, double *s) {
         bound += fabs(arc->force[k]);
     if (bound / square <= least)
         return least;
-    // |n| is largest at an end or where its slope changes sign; an arc is too short for a second such place.
+    // |n| is largest at an end or where its slope changes sign; an arc is too short for a second
+    // such place.
     double slope[ROOT_DEGREE + 1], at[3] = {0, 1, 1};
     const double sign = degree > 0 && arc->force[1] < 0 ? -1 : 1;
     for (size_t k = 0; k < degree; k++)

@@ -1,6 +1,6 @@
-// An arc: the motion over a stretch in which the contact state does not change and the base is linear or a sine,
-// as Taylor polynomials that are exact to rounding. Not a time step: it has no error to trade.
-// Used by the exact solver, wherever an event may lie.
+// An arc: the motion over a stretch in which the contact state does not change and the base is
+// linear or a sine, as Taylor polynomials that are exact to rounding. Not a time step: it has no
+// error to trade. Used by the exact solver, wherever an event may lie.
 #ifndef CORE_SOLVE_ARC_H
 #define CORE_SOLVE_ARC_H
 
@@ -9,15 +9,17 @@
 
 #include "core/math/root.h"
 
-// Structure and free mass. r is the free mass's displacement relative to the structure, counted from whatever the
-// solver chose as its origin (a stop after contact with it, so that small penetrations and bounces keep all digits).
+// Structure and free mass. r is the free mass's displacement relative to the structure, counted
+// from whatever the solver chose as its origin (a stop after contact with it, so that small
+// penetrations and bounces keep all digits).
 typedef struct State {
-    double x, v;  // displacement and velocity of the structure relative to the base [m], [m/s]
-    double r, w;  // relative displacement and velocity of the free mass [m], [m/s]
+    double x, v; // displacement and velocity of the structure relative to the base [m], [m/s]
+    double r, w; // relative displacement and velocity of the free mass [m], [m/s]
 } State;
 
 // The linear system of one contact state, divided by the masses.
-//   x'' = -a_g - s + share n,  r'' = s - n,  s = damping x' + omega2 x,  n = contact_damping r' + contact_omega2 r
+//   x'' = -a_g - s + share n,  r'' = s - n,  s = damping x' + omega2 x,  n = contact_damping r' +
+//   contact_omega2 r
 // and while resting on a stop x'' = -a_g - (1 - share) s, r'' = 0.
 typedef struct Motion {
     double omega2;          // K / M [1/s^2]
@@ -26,36 +28,38 @@ typedef struct Motion {
     double contact_omega2;  // k / m_e [1/s^2], 0 in flight
     double contact_damping; // c / m_e [1/s]
     bool is_resting;
-    double rate;            // no eigenvalue of the system, base included, is larger [1/s]
+    double rate; // no eigenvalue of the system, base included, is larger [1/s]
 } Motion;
 
-// The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope sin(omega t).
+// The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope
+// sin(omega t).
 typedef struct Slice {
-    double value;  // [m/s^2]
-    double slope;  // [m/s^3], or [m/s^2]
-    double omega;  // [rad/s]
+    double value; // [m/s^2]
+    double slope; // [m/s^3], or [m/s^2]
+    double omega; // [rad/s]
 } Slice;
 
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct Arc {
-    double length;  // [s]
-    double rho;     // length * rate, at most 1
-    size_t degree;  // of x and r; push and force have one less
+    double length; // [s]
+    double rho;    // length * rate, at most 1
+    size_t degree; // of x and r; push and force have one less
     double x[ROOT_DEGREE + 1], r[ROOT_DEGREE + 1];
-    double push[ROOT_DEGREE + 1];   // s length^2
-    double force[ROOT_DEGREE + 1];  // n length^2; while resting, the constraint's
-    double base[ROOT_DEGREE + 1];   // a_g
+    double push[ROOT_DEGREE + 1];  // s length^2
+    double force[ROOT_DEGREE + 1]; // n length^2; while resting, the constraint's
+    double base[ROOT_DEGREE + 1];  // a_g
 } Arc;
 
 // Integrals over an arc.
 typedef struct ArcIntegrals {
-    double vv, ww;  // of v^2, w^2 [m^2/s]
-    double av, aw;  // of a_g v, a_g w [m^2/s^2]
-    double a;       // of a_g [m/s]
+    double vv, ww; // of v^2, w^2 [m^2/s]
+    double av, aw; // of a_g v, a_g w [m^2/s^2]
+    double a;      // of a_g [m/s]
 } ArcIntegrals;
 
 // length * motion->rate must be at most 1.
-void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice, double length);
+void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
+              double length);
 
 // Keeps only the part up to s.
 void arc_cut(Arc *arc, double s);

@@ -29,7 +29,8 @@ static Slice sampled_slice(const Base *base, size_t j, double part) {
 
 static Slice aligned_slice(const BaseCursor *cursor, size_t n, double offset) {
     const size_t j = cursor->ratio == 1 ? n : n / cursor->ratio;
-    const double whole = cursor->ratio == 1 ? 0 : (double)(n - j * cursor->ratio) / (double)cursor->ratio;
+    const double whole =
+        cursor->ratio == 1 ? 0 : (double)(n - j * cursor->ratio) / (double)cursor->ratio;
     return sampled_slice(cursor->base, j, whole + offset / cursor->base->interval);
 }
 
@@ -67,7 +68,7 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
         return INFINITY;
     size_t j = (size_t)place;
     double knot = (double)(j + 1) * base->interval - time;
-    if (knot <= 8 * DBL_EPSILON * time) {  // as good as there
+    if (knot <= 8 * DBL_EPSILON * time) { // as good as there
         j++;
         knot += base->interval;
     }

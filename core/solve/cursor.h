@@ -11,7 +11,7 @@
 typedef struct BaseCursor {
     const Base *base;
     double sample_rate;
-    size_t ratio;  // BASE_SAMPLED: output samples per base sample where the grids coincide, else 0
+    size_t ratio; // BASE_SAMPLED: output samples per base sample where the grids coincide, else 0
 } BaseCursor;
 
 void base_cursor_make(BaseCursor *cursor, const Base *base, double sample_rate);
@@ -19,7 +19,8 @@ void base_cursor_make(BaseCursor *cursor, const Base *base, double sample_rate);
 // Over the whole interval after output sample n; false where a_g has a kink inside it.
 bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice);
 
-// From `offset` seconds after output sample n on. Returns for how long it holds, INFINITY if for the whole interval.
+// From `offset` seconds after output sample n on. Returns for how long it holds, INFINITY if for
+// the whole interval.
 double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slice *slice);
 
 // a_g at output sample n, right-continuous [m/s^2].

@@ -6,9 +6,10 @@
 //        +--(impulse)--> u' -> -e u' ----------------------------------> RESTING(side)
 //                                                 push becomes tensile -> FLIGHT
 //
-// Flight over a whole sample interval is one matrix step where a bound on the gap's curvature proves that no stop
-// can be reached; everything else goes by arcs (arc.h), whose polynomials locate events to rounding. Time is a
-// sample's number and an offset from it, so that short contacts keep their digits late in a run.
+// Flight over a whole sample interval is one matrix step where a bound on the gap's curvature
+// proves that no stop can be reached; everything else goes by arcs (arc.h), whose polynomials
+// locate events to rounding. Time is a sample's number and an offset from it, so that short
+// contacts keep their digits late in a run.
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -41,7 +42,8 @@ static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integ
         ledger_acceleration(&exact->ledger, exact->resting.share * n - own);
     }
     ledger_stretch(&exact->ledger, arc->length, mass * arc_impulse(arc),
-                   exact->phase == CONTACT ? exact->plan->stops[exact->side].damping * integrals->ww : 0);
+                   exact->phase == CONTACT ? exact->plan->stops[exact->side].damping * integrals->ww
+                                           : 0);
 }
 
 // After an arc of free flight: has the gap opened beyond rounding yet?
@@ -58,13 +60,15 @@ static Status keep_going(Exact *exact) {
     exact->arcs = 0;
     if (!isfinite(state->x) || !isfinite(state->v) || !isfinite(state->r) || !isfinite(state->w))
         return problem_set(exact->problem, STATUS_UNSTABLE,
-                           "the motion left what double precision can hold at t = %.6g s", exact_time(exact));
+                           "the motion left what double precision can hold at t = %.6g s",
+                           exact_time(exact));
     if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
         return problem_set(exact->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s", exact->run->steps_most,
-                           exact_time(exact), exact->plan->duration);
+                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
+                           exact->run->steps_most, exact_time(exact), exact->plan->duration);
     if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
-        return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s", exact_time(exact));
+        return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                           exact_time(exact));
     return STATUS_OK;
 }
 
@@ -99,7 +103,8 @@ static Status advance(Exact *exact, double length) {
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
     exact->run->steps++;
-    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER && hold(exact, &slice, length))
+    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
+        hold(exact, &slice, length))
         return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
     length = fmin(length, 1 / system->rate);
     Arc arc;
@@ -123,7 +128,8 @@ static Status advance(Exact *exact, double length) {
     if (is_event) {
         if (++exact->still_events > STILL_EVENTS)
             return problem_set(exact->problem, STATUS_UNSTABLE,
-                               "more than %d contact events at one instant, t = %.17g s", STILL_EVENTS, exact_time(exact));
+                               "more than %d contact events at one instant, t = %.17g s",
+                               STILL_EVENTS, exact_time(exact));
         if (exact->phase == FLIGHT)
             exact_touch(exact, side);
         else
@@ -136,18 +142,24 @@ static Status advance(Exact *exact, double length) {
 // The whole interval in one step, where no stop can be reached. False: it must go by arcs.
 static bool fly(Exact *exact) {
     Slice slice;
-    if (exact->phase != FLIGHT || exact->is_leaving || !base_cursor_interval(&exact->base, exact->sample, &slice))
+    if (exact->phase != FLIGHT || exact->is_leaving ||
+        !base_cursor_interval(&exact->base, exact->sample, &slice))
         return false;
     ArcIntegrals integrals;
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
     if (exact->plan->has_damper) {
-        const double first = fabs(slice.value), last = fabs(slice.value + slice.slope * exact->interval);
-        const double most = slice.omega > 0 ? first + fabs(slice.slope) : first > last ? first : last;
+        const double first = fabs(slice.value),
+                     last = fabs(slice.value + slice.slope * exact->interval);
+        const double most = slice.omega > 0 ? first + fabs(slice.slope)
+                            : first > last  ? first
+                                            : last;
         const double sag = flight_curvature(&exact->flight, &exact->state, most) * exact->interval *
                            exact->interval / 8;
-        const double nearest = exact_room(exact, SIDE_RIGHT) - sag, furthest = sag - exact_room(exact, SIDE_LEFT);
-        if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest && end.r > furthest))
+        const double nearest = exact_room(exact, SIDE_RIGHT) - sag,
+                     furthest = sag - exact_room(exact, SIDE_LEFT);
+        if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest &&
+              end.r > furthest))
             return false;
     }
     take_integrals(exact, &integrals);
@@ -166,7 +178,8 @@ static Status cross(Exact *exact, double length) {
         TRY(advance(exact, length - exact->offset));
         if (exact->offset == before && exact->still_events == events)
             return problem_set(exact->problem, STATUS_UNSTABLE,
-                               "the contact is too stiff to be followed: at t = %.6g s a step of 1/%.6g s is below "
+                               "the contact is too stiff to be followed: at t = %.6g s a step of "
+                               "1/%.6g s is below "
                                "the clock's resolution",
                                exact_time(exact), exact_motion(exact)->rate);
     }
@@ -182,7 +195,9 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->interval = 1 / plan->sample_rate;
     const double total = plan->mass + plan->damper_mass;
     const double share = plan->damper_mass / total, mass = plan->mass * share;
-    Motion flying = {.omega2 = plan->stiffness / plan->mass, .damping = plan->damping / plan->mass, .share = share};
+    Motion flying = {.omega2 = plan->stiffness / plan->mass,
+                     .damping = plan->damping / plan->mass,
+                     .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
     flying.rate = fmax(fmax(own, run->base->omega), 1e-300);
     exact->flying = exact->resting = flying;
@@ -192,17 +207,22 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
         *touching = flying;
         touching->contact_omega2 = plan->stops[side].stiffness / mass;
         touching->contact_damping = plan->stops[side].damping / mass;
-        touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping), flying.rate);
+        touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping),
+                              flying.rate);
     }
-    if (!isfinite(flying.rate) || !isfinite(exact->touching[SIDE_LEFT].rate + exact->touching[SIDE_RIGHT].rate) ||
+    if (!isfinite(flying.rate) ||
+        !isfinite(exact->touching[SIDE_LEFT].rate + exact->touching[SIDE_RIGHT].rate) ||
         !(share > 0 || !plan->has_damper) || !(share < 1))
-        return problem_set(problem, STATUS_UNSTABLE,
-                           "the scene's masses and stiffnesses are too far apart for double precision");
+        return problem_set(
+            problem, STATUS_UNSTABLE,
+            "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
-    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0, exact->interval);
+    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
+                exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
-    exact->state = (State){plan->displacement, plan->velocity, plan->position, plan->relative_velocity};
+    exact->state =
+        (State){plan->displacement, plan->velocity, plan->position, plan->relative_velocity};
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     recorder_start(&exact->recorder, run, response);
@@ -217,7 +237,8 @@ static Status settle(Exact *exact) {
         double s;
         Side side;
         (void)base_cursor_slice(&exact->base, 0, 0, &slice);
-        arc_make(&arc, exact_motion(exact), &exact->state, &slice, fmin(exact->interval, 1 / exact_motion(exact)->rate));
+        arc_make(&arc, exact_motion(exact), &exact->state, &slice,
+                 fmin(exact->interval, 1 / exact_motion(exact)->rate));
         is_event = exact->phase == FLIGHT && exact_find_event(exact, &arc, &s, &side) && s == 0;
         if (is_event)
             exact_touch(exact, side);
@@ -240,7 +261,8 @@ static Status solve(Exact *exact) {
         exact->sample++;
         exact->offset = 0;
         at = exact_moment(exact);
-        recorder_take(&exact->recorder, exact->sample, &at, base_cursor_at(&exact->base, exact->sample));
+        recorder_take(&exact->recorder, exact->sample, &at,
+                      base_cursor_at(&exact->base, exact->sample));
         ledger_peaks(&exact->ledger, &at);
         if (exact->sample % 64 == 0) {
             const EnergyState energy = exact_energy(exact);

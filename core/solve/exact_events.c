@@ -39,14 +39,14 @@ static void bounce(Exact *exact, Side side) {
     const Plan *plan = exact->plan;
     const double sign = exact_sign(side), e = plan->stops[side].restitution;
     const double approach = fabs(exact->state.w);
-    const double mass = exact_effective_mass(exact);  // m_e = m M / (M + m)
+    const double mass = exact_effective_mass(exact); // m_e = m M / (M + m)
     exact->origin = (Origin)side;
     exact->state.r = 0;
     exact->state.v += sign * exact->resting.share * (1 + e) * approach;
     exact->state.w = -sign * e * approach;
     ledger_bounce(&exact->ledger, exact_time(exact), side, approach, e * approach, mass);
-    // Bounces towards a pushing stop follow each other in a geometric series. When all that are left take less time
-    // than the clock resolves, they are one: the mass rests.
+    // Bounces towards a pushing stop follow each other in a geometric series. When all that are
+    // left take less time than the clock resolves, they are one: the mass rests.
     const double pull = sign * exact_push(exact);
     const double left = 2 * e * approach / (pull * (1 - e));
     const double clock = 4 * DBL_EPSILON * fmax(exact_time(exact), exact->interval);
@@ -73,10 +73,11 @@ void exact_release(Exact *exact) {
     exact->is_leaving = exact->phase == RESTING;
     exact->state.r = 0;
     exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
-    ledger_close(&exact->ledger, exact_time(exact), exact->phase == RESTING ? NAN : fabs(exact->state.w));
+    ledger_close(&exact->ledger, exact_time(exact),
+                 exact->phase == RESTING ? NAN : fabs(exact->state.w));
     const bool is_held = exact->phase == RESTING && exact->plan->clearance == 0;
     exact->phase = FLIGHT;
-    if (is_held)  // between stops without clearance the other one takes over
+    if (is_held) // between stops without clearance the other one takes over
         begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
     exact_note(exact);
 }

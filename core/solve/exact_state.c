@@ -12,7 +12,8 @@ double exact_room(const Exact *exact, Side side) {
 // u = x-relative displacement of the free mass [m].
 static double relative(const Exact *exact) {
     const double stop = exact->plan->clearance / 2;
-    const double origin = exact->origin == ORIGIN_MIDDLE ? 0 : exact_sign((Side)exact->origin) * stop;
+    const double origin =
+        exact->origin == ORIGIN_MIDDLE ? 0 : exact_sign((Side)exact->origin) * stop;
     return exact->plan->offset + origin + exact->state.r;
 }
 
@@ -33,7 +34,8 @@ double exact_push(const Exact *exact) {
 double exact_force(const Exact *exact) {
     const Plan *plan = exact->plan;
     if (exact->phase == CONTACT)
-        return plan->stops[exact->side].stiffness * exact->state.r + plan->stops[exact->side].damping * exact->state.w;
+        return plan->stops[exact->side].stiffness * exact->state.r +
+               plan->stops[exact->side].damping * exact->state.w;
     if (exact->phase == RESTING)
         return exact_effective_mass(exact) * exact_push(exact);
     return 0;
@@ -48,7 +50,8 @@ Moment exact_moment(const Exact *exact) {
     if (exact->plan->has_damper) {
         moment.damper_x = exact->state.x + relative(exact);
         moment.damper_v = exact->state.v + exact->state.w;
-        moment.penetration = exact->phase == CONTACT ? fmax(exact_sign(exact->side) * exact->state.r, 0) : 0;
+        moment.penetration =
+            exact->phase == CONTACT ? fmax(exact_sign(exact->side) * exact->state.r, 0) : 0;
     }
     return moment;
 }
@@ -59,7 +62,8 @@ EnergyState exact_energy(const Exact *exact) {
     const double z = state->v + state->w;
     const double k = exact->phase == CONTACT ? plan->stops[exact->side].stiffness : 0;
     return (EnergyState){0.5 * plan->mass * state->v * state->v + 0.5 * plan->damper_mass * z * z,
-                         0.5 * plan->stiffness * state->x * state->x + 0.5 * k * state->r * state->r};
+                         0.5 * plan->stiffness * state->x * state->x +
+                             0.5 * k * state->r * state->r};
 }
 
 const Motion *exact_motion(const Exact *exact) {

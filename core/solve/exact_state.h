@@ -1,5 +1,5 @@
-// What the exact solver knows while it runs, and how it looks from outside: origin, room, forces, energies.
-// Not the stepping (exact.c) nor the events (exact_events.c); these three alone use it.
+// What the exact solver knows while it runs, and how it looks from outside: origin, room, forces,
+// energies. Not the stepping (exact.c) nor the events (exact_events.c); these three alone use it.
 #ifndef CORE_SOLVE_EXACT_STATE_H
 #define CORE_SOLVE_EXACT_STATE_H
 
@@ -21,20 +21,21 @@ typedef struct Exact {
     Motion flying, touching[2], resting;
     Flight flight;
     Phase phase;
-    Side side;      // of CONTACT and RESTING
-    Origin origin;  // what state.r is counted from
-    bool is_leaving;  // released from rest a moment ago: gap, its speed and its acceleration are exactly 0
+    Side side;       // of CONTACT and RESTING
+    Origin origin;   // what state.r is counted from
+    bool is_leaving; // released from rest a moment ago: gap, its speed and its acceleration are
+                     // exactly 0
     State state;
-    size_t sample;  // the last one passed
-    double offset;  // time since then [s]
+    size_t sample; // the last one passed
+    double offset; // time since then [s]
     double interval;
     BaseCursor base;
     Ledger ledger;
     Recorder recorder;
-    Hold *holds[2];       // by Side; made when a contact first lasts long
-    size_t contact_arcs;  // since it began
-    size_t arcs;          // since the watch was asked
-    size_t still_events;  // in a row, without time passing
+    Hold *holds[2];      // by Side; made when a contact first lasts long
+    size_t contact_arcs; // since it began
+    size_t arcs;         // since the watch was asked
+    size_t still_events; // in a row, without time passing
 } Exact;
 
 // +1 for the right stop, -1 for the left.
@@ -42,12 +43,13 @@ static inline double exact_sign(Side side) {
     return side == SIDE_RIGHT ? 1 : -1;
 }
 
-double exact_time(const Exact *exact);                 // [s]
-double exact_room(const Exact *exact, Side side);      // between free mass and stop at r = 0 of the origin [m]
-double exact_push(const Exact *exact);                 // s = (C v + K x) / M [m/s^2]
-double exact_force(const Exact *exact);                // on the structure, positive to the right [N]
-double exact_effective_mass(const Exact *exact);       // m_e [kg]
-const Motion *exact_motion(const Exact *exact);        // of the present phase
+double exact_time(const Exact *exact); // [s]
+double exact_room(const Exact *exact,
+                  Side side);           // between free mass and stop at r = 0 of the origin [m]
+double exact_push(const Exact *exact);  // s = (C v + K x) / M [m/s^2]
+double exact_force(const Exact *exact); // on the structure, positive to the right [N]
+double exact_effective_mass(const Exact *exact); // m_e [kg]
+const Motion *exact_motion(const Exact *exact);  // of the present phase
 Moment exact_moment(const Exact *exact);
 EnergyState exact_energy(const Exact *exact);
 

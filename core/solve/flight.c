@@ -4,7 +4,16 @@
 
 #include "core/math/exponential.h"
 
-enum { X, V, R, W, A, B, SUM, SIZE };  // B is the slope or the sine's other half, SUM the integral of a_g
+enum {
+    X,
+    V,
+    R,
+    W,
+    A,
+    B,
+    SUM,
+    SIZE
+}; // B is the slope or the sine's other half, SUM the integral of a_g
 
 static void pick_row(const long double *transition, int row, double target[4]) {
     static const int columns[4] = {X, V, A, B};
@@ -29,7 +38,7 @@ void flight_make(Flight *flight, const Motion *motion, double base_omega, double
     system[W * SIZE + X] = motion->omega2;
     system[W * SIZE + V] = motion->damping;
     system[SUM * SIZE + A] = 1;
-    if (base_omega > 0) {  // a_g = A cos + B sin, seen from wherever the interval starts
+    if (base_omega > 0) { // a_g = A cos + B sin, seen from wherever the interval starts
         system[A * SIZE + B] = base_omega;
         system[B * SIZE + A] = -(long double)base_omega;
     } else {

@@ -1,9 +1,11 @@
-// With Y = x + share r (the pair's common motion) the contact's system splits into blocks that hardly touch:
+// With Y = x + share r (the pair's common motion) the contact's system splits into blocks that
+// hardly touch:
 //   Y'' = -a - (1 - share) (D Y' + W2 Y) + (1 - share) share (D w + W2 r)
 //   r'' = D Y' + W2 Y - (c + share D) w - (k + share W2) r
-// L and H remove what is left, by the iterations of singular perturbation theory, which converge like the ratio of
-// the two time scales. Then r is a slow part, whose change over a step is bounded through its slope, and a fast part,
-// whose norm does not grow. Contact lasts while the first outweighs the second.
+// L and H remove what is left, by the iterations of singular perturbation theory, which converge
+// like the ratio of the two time scales. Then r is a slow part, whose change over a step is bounded
+// through its slope, and a fast part, whose norm does not grow. Contact lasts while the first
+// outweighs the second.
 #include "core/solve/hold.h"
 
 #include <math.h>
@@ -27,7 +29,7 @@ static void multiply(Square a, Square b, Square out) {
 static void invert(Square a, Square out) {
     const double determinant = a[0][0] * a[1][1] - a[0][1] * a[1][0];
     Square c = {{a[1][1] / determinant, -a[0][1] / determinant},
-                      {-a[1][0] / determinant, a[0][0] / determinant}};
+                {-a[1][0] / determinant, a[0][0] / determinant}};
     memcpy(out, c, sizeof c);
 }
 
@@ -45,8 +47,9 @@ static bool decouple(Hold *hold) {
     Square A11 = {{0, 1}, {-rest * m->omega2, -rest * m->damping}};
     Square A12 = {{0, 0}, {rest * m->share * m->omega2, rest * m->share * m->damping}};
     Square A21 = {{0, 0}, {m->omega2, m->damping}};
-    Square A22 = {{0, 1},
-                        {-m->contact_omega2 - m->share * m->omega2, -m->contact_damping - m->share * m->damping}};
+    Square A22 = {
+        {0, 1},
+        {-m->contact_omega2 - m->share * m->omega2, -m->contact_damping - m->share * m->damping}};
     Square inverse, next, part;
     invert(A22, inverse);
     memset(hold->L, 0, sizeof hold->L);
@@ -96,8 +99,8 @@ static void pick_form(const long double *form, double target[HOLD_FORM]) {
 
 enum { FORM_VV, FORM_WW, FORM_AV, FORM_AW, FORMS };
 
-static void pick_level(const long double *increment, long double forms[FORMS][SIZE * SIZE], double length,
-                       HoldLevel *level) {
+static void pick_level(const long double *increment, long double forms[FORMS][SIZE * SIZE],
+                       double length, HoldLevel *level) {
     long double transition[SIZE * SIZE];
     memcpy(transition, increment, sizeof transition);
     for (int i = 0; i < SIZE; i++)
@@ -139,7 +142,8 @@ void hold_make(Hold *hold, const Motion *motion, double base_omega, double inter
     hold->count = 0;
     const double slow = sqrt(motion->omega2) + motion->damping + base_omega;
     const double k = motion->contact_omega2, c = motion->contact_damping;
-    const double slowest = c * c < 4 * k ? sqrt(k) : k / c;  // of the contact's own motion, a lower bound
+    const double slowest =
+        c * c < 4 * k ? sqrt(k) : k / c; // of the contact's own motion, a lower bound
     hold->is_usable = slowest > SEPARATION * slow && decouple(hold);
     if (!hold->is_usable)
         return;
@@ -161,7 +165,8 @@ void hold_make(Hold *hold, const Motion *motion, double base_omega, double inter
     system[SUM_A * SIZE + A] = 1;
     system[SUM_N * SIZE + R] = k;
     system[SUM_N * SIZE + W] = c;
-    for (double length = interval; hold->count < HOLD_LEVELS && length * motion->rate > 4; length /= 2)
+    for (double length = interval; hold->count < HOLD_LEVELS && length * motion->rate > 4;
+         length /= 2)
         hold->count++;
     make_levels(hold, system, interval);
 }
@@ -180,11 +185,12 @@ static State transit(const HoldLevel *level, const State *start, const Slice *sl
 // What bounds need of a state: the slow coordinates and the size of the fast ones.
 typedef struct Split {
     double Z[2];
-    double fast;  // norm of G + quasi a_g
+    double fast; // norm of G + quasi a_g
 } Split;
 
 static Split split(const Hold *hold, const State *state, double a) {
-    const double S[2] = {state->x + hold->motion.share * state->r, state->v + hold->motion.share * state->w};
+    const double S[2] = {state->x + hold->motion.share * state->r,
+                         state->v + hold->motion.share * state->w};
     const double F[2] = {state->r, state->w};
     double G[2];
     Split out;
@@ -197,13 +203,14 @@ static Split split(const Hold *hold, const State *state, double a) {
 }
 
 // Whether contact surely lasts over `length`, and the most |n| can be.
-static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, double length, double sign,
-                         double *force_most) {
+static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, double length,
+                         double sign, double *force_most) {
     const Motion *m = &hold->motion;
     const double omega = sqrt(m->omega2);
     // Bounds of a_g and a_g' over the stretch.
-    const double a_most = slice->omega > 0 ? fabs(slice->value) + fabs(slice->slope)
-                                           : fmax(fabs(slice->value), fabs(slice->value + slice->slope * length));
+    const double a_most =
+        slice->omega > 0 ? fabs(slice->value) + fabs(slice->slope)
+                         : fmax(fabs(slice->value), fabs(slice->value + slice->slope * length));
     const double a_rate = slice->omega > 0 ? slice->omega * a_most : fabs(slice->slope);
     // r = L1 Z + (e1 + L1 H) G with G = fast - quasi a_g.
     const double *L1 = hold->L[0];
@@ -213,29 +220,34 @@ static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, 
     const double mix_norm = hypot(mix[0], mix[1] * hold->fast_omega);
     const double quasi_norm = hypot(hold->quasi[0], hold->quasi[1] / hold->fast_omega);
     const double fast = (at->fast + length * quasi_norm * a_rate) * exp(hold->fast_growth * length);
-    // The slow part at the start, and the most it can change: Omega |Z1| + |Z2| bounds what Z becomes.
+    // The slow part at the start, and the most it can change: Omega |Z1| + |Z2| bounds what Z
+    // becomes.
     const double slow = L1[0] * at->Z[0] + L1[1] * at->Z[1] - kappa * slice->value;
     const double reach = (omega * fabs(at->Z[0]) + fabs(at->Z[1]) + length * a_most) *
                          exp(hold->slow_growth * length);
     const double slope1 = L1[0] * hold->slow[0][0] + L1[1] * hold->slow[1][0];
     const double slope2 = L1[0] * hold->slow[0][1] + L1[1] * hold->slow[1][1];
-    const double entry = L1[1] + L1[0] * (hold->H[0][0] * hold->L[0][1] + hold->H[0][1] * hold->L[1][1]) +
+    const double entry = L1[1] +
+                         L1[0] * (hold->H[0][0] * hold->L[0][1] + hold->H[0][1] * hold->L[1][1]) +
                          L1[1] * (hold->H[1][0] * hold->L[0][1] + hold->H[1][1] * hold->L[1][1]);
-    const double change = length * ((omega > 0 ? fabs(slope1) / omega : 0) * reach + fabs(slope2) * reach +
-                                    fabs(entry) * a_most + fabs(kappa) * a_rate);
+    const double change =
+        length * ((omega > 0 ? fabs(slope1) / omega : 0) * reach + fabs(slope2) * reach +
+                  fabs(entry) * a_most + fabs(kappa) * a_rate);
     *force_most = m->contact_omega2 * (fabs(slow) + change + mix_norm * fast) +
                   m->contact_damping * (change / length + mix_norm * fast * hold->fast_omega);
     return sign * slow - change > mix_norm * fast;
 }
 
-const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *slice, double length, double sign,
-                           double peak, State *end) {
+const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *slice, double length,
+                           double sign, double peak, State *end) {
     if (!hold->is_usable || hold->count == 0)
         return NULL;
     const Split at = split(hold, start, slice->value);
     const double n = hold_force(&hold->motion, start);
-    const double slope = hold->motion.damping * start->v + hold->motion.omega2 * start->x - n;  // of w
-    const double rise = hold->motion.contact_damping * slope + hold->motion.contact_omega2 * start->w;
+    const double slope =
+        hold->motion.damping * start->v + hold->motion.omega2 * start->x - n; // of w
+    const double rise =
+        hold->motion.contact_damping * slope + hold->motion.contact_omega2 * start->w;
     for (size_t i = 0; i < hold->count; i++) {
         const HoldLevel *level = &hold->levels[i];
         double force_most;
@@ -247,8 +259,10 @@ const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *sl
             return level;
         // A new peak may lie inside unless |n| only rises or only falls.
         const double n_end = hold_force(&hold->motion, end);
-        const double slope_end = hold->motion.damping * end->v + hold->motion.omega2 * end->x - n_end;
-        const double rise_end = hold->motion.contact_damping * slope_end + hold->motion.contact_omega2 * end->w;
+        const double slope_end =
+            hold->motion.damping * end->v + hold->motion.omega2 * end->x - n_end;
+        const double rise_end =
+            hold->motion.contact_damping * slope_end + hold->motion.contact_omega2 * end->w;
         if (rise * rise_end >= 0)
             return level;
     }
@@ -263,10 +277,11 @@ static double form_value(const double *form, const double *y) {
     return sum;
 }
 
-ArcIntegrals hold_integrals(const HoldLevel *level, const State *start, const Slice *slice, double *impulse) {
+ArcIntegrals hold_integrals(const HoldLevel *level, const State *start, const Slice *slice,
+                            double *impulse) {
     const double y[6] = {start->x, start->v, start->r, start->w, slice->value, slice->slope};
-    ArcIntegrals out = {form_value(level->vv, y), form_value(level->ww, y), form_value(level->av, y),
-                        form_value(level->aw, y), 0};
+    ArcIntegrals out = {form_value(level->vv, y), form_value(level->ww, y),
+                        form_value(level->av, y), form_value(level->aw, y), 0};
     *impulse = 0;
     for (int i = 0; i < 6; i++) {
         out.a += level->base[i] * y[i];

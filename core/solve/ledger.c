@@ -2,7 +2,8 @@
 
 #include <stdlib.h>
 
-// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught elsewhere.
+// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught
+// elsewhere.
 static inline double larger(double a, double b) {
     return a > b ? a : b;
 }
@@ -70,7 +71,8 @@ void ledger_close(Ledger *ledger, double time, double separation) {
     ledger->is_open = false;
 }
 
-void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation, double mass) {
+void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
+                   double mass) {
     const Impact impact = {.kind = IMPACT_IMPACT,
                            .start = time,
                            .end = time,
@@ -81,7 +83,8 @@ void ledger_bounce(Ledger *ledger, double time, Side side, double approach, doub
                            .restitution = approach > 0 ? separation / approach : NAN,
                            .peak_force = NAN,
                            .impulse = mass * (approach + separation),
-                           .energy_lost = 0.5 * mass * (approach - separation) * (approach + separation)};
+                           .energy_lost =
+                               0.5 * mass * (approach - separation) * (approach + separation)};
     ledger->energy.contact += impact.energy_lost;
     add(ledger, &impact);
 }
@@ -115,7 +118,8 @@ void ledger_acceleration(Ledger *ledger, double acceleration) {
 
 Status ledger_status(const Ledger *ledger, Problem *problem) {
     if (ledger->status == STATUS_LIMIT)
-        return problem_set(problem, STATUS_LIMIT, "more than %zu impacts; the last one kept was at t = %.6g s",
+        return problem_set(problem, STATUS_LIMIT,
+                           "more than %zu impacts; the last one kept was at t = %.6g s",
                            ledger->most, ledger->response->impacts.at[ledger->most - 1].start);
     if (ledger->status == STATUS_NO_MEMORY)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for more than %zu impacts",
@@ -133,7 +137,8 @@ Status ledger_finish(Ledger *ledger, const EnergyState *state, Problem *problem)
     Energy *energy = &ledger->energy;
     energy->kinetic = state->kinetic;
     energy->strain = state->strain;
-    energy->residual = ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
+    energy->residual =
+        ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
     ledger->response->energy = *energy;
     return ledger_status(ledger, problem);
 }

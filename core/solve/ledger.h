@@ -8,13 +8,13 @@
 
 // What can be seen at one instant.
 typedef struct Moment {
-    double x, v, acceleration;  // of the structure; acceleration is absolute
-    double damper_x, damper_v;  // relative to the base
+    double x, v, acceleration; // of the structure; acceleration is absolute
+    double damper_x, damper_v; // relative to the base
     double penetration, force;
 } Moment;
 
 typedef struct EnergyState {
-    double kinetic, strain;  // [J]
+    double kinetic, strain; // [J]
 } EnergyState;
 
 typedef struct Ledger {
@@ -33,10 +33,11 @@ void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyS
 void ledger_open(Ledger *ledger, ImpactKind kind, double time, Side side, double approach);
 // A stretch of it: its length [s], the integral of N [N s] and the work lost [J].
 void ledger_stretch(Ledger *ledger, double length, double impulse, double lost);
-void ledger_force(Ledger *ledger, double magnitude);  // a candidate for the peak [N]
+void ledger_force(Ledger *ledger, double magnitude); // a candidate for the peak [N]
 void ledger_close(Ledger *ledger, double time, double separation);
 // An instantaneous impact of two bodies with effective mass `mass`.
-void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation, double mass);
+void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
+                   double mass);
 
 void ledger_work(Ledger *ledger, double input, double structural_damping);
 void ledger_balance(Ledger *ledger, const EnergyState *energy);

@@ -6,7 +6,8 @@ void recorder_start(Recorder *recorder, const Run *run, Response *response) {
     memset(recorder, 0, sizeof *recorder);
     memcpy(recorder->columns, run->columns, sizeof recorder->columns);
     recorder->sample_rate = run->plan->sample_rate;
-    recorder->statistics_start = (size_t)ceil(run->statistics_from * run->plan->sample_rate * (1 - 1e-12));
+    recorder->statistics_start =
+        (size_t)ceil(run->statistics_from * run->plan->sample_rate * (1 - 1e-12));
     response->sample_rate = run->plan->sample_rate;
     response->count = run->plan->count;
 }
@@ -21,10 +22,12 @@ void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double b
     put(columns[CHANNEL_DISPLACEMENT], sample, at->x);
     put(columns[CHANNEL_VELOCITY], sample, at->v);
     put(columns[CHANNEL_ACCELERATION], sample, at->acceleration);
-    // What a filtered accelerometer keeps: the velocity gained over the interval, impulses included.
+    // What a filtered accelerometer keeps: the velocity gained over the interval, impulses
+    // included.
     put(columns[CHANNEL_MEAN_ACCELERATION], sample,
-        sample == 0 ? at->acceleration
-                    : (at->v - recorder->last_velocity + recorder->base_speed) * recorder->sample_rate);
+        sample == 0
+            ? at->acceleration
+            : (at->v - recorder->last_velocity + recorder->base_speed) * recorder->sample_rate);
     put(columns[CHANNEL_DAMPER_DISPLACEMENT], sample, at->damper_x);
     put(columns[CHANNEL_DAMPER_VELOCITY], sample, at->damper_v);
     put(columns[CHANNEL_PENETRATION], sample, at->penetration);

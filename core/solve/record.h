@@ -9,10 +9,10 @@
 typedef struct Recorder {
     double *columns[CHANNEL_COUNT];
     double sample_rate;
-    size_t statistics_start;  // the first sample that counts
-    double base_speed;        // integral of a_g since the last sample [m/s]
+    size_t statistics_start; // the first sample that counts
+    double base_speed;       // integral of a_g since the last sample [m/s]
     double last_velocity;
-    double sum_displacement, sum_acceleration;  // of squares
+    double sum_displacement, sum_acceleration; // of squares
     size_t count;
 } Recorder;
 

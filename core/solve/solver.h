@@ -1,5 +1,5 @@
-// What ONE solver is; solvers.c lists all. A solver turns a plan and a base's motion into a response.
-// Used by simulation/ and tests/truth, which runs every solver on every case.
+// What ONE solver is; solvers.c lists all. A solver turns a plan and a base's motion into a
+// response. Used by simulation/ and tests/truth, which runs every solver on every case.
 #ifndef CORE_SOLVE_SOLVER_H
 #define CORE_SOLVE_SOLVER_H
 
@@ -11,20 +11,20 @@
 
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {
-    Variant variant;  // kind is a Solver's
+    Variant variant; // kind is a Solver's
 } Accuracy;
-extern const Field accuracy_fields[];  // the rows that every solver has
+extern const Field accuracy_fields[]; // the rows that every solver has
 
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Watch *watch;
-    double *columns[CHANNEL_COUNT];  // plan->count values each; NULL: not wanted
-    double statistics_from;          // [s]
-    size_t impacts_most;             // ledger rows; 0: no limit
-    double steps_most;               // solver steps; 0: no limit
-    double steps;                    // out: work counted, in solver steps
+    double *columns[CHANNEL_COUNT]; // plan->count values each; NULL: not wanted
+    double statistics_from;         // [s]
+    size_t impacts_most;            // ledger rows; 0: no limit
+    double steps_most;              // solver steps; 0: no limit
+    double steps;                   // out: work counted, in solver steps
 } Run;
 
 typedef struct Solver {

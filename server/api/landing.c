@@ -21,9 +21,10 @@ typedef struct Step {
 static const Step steps[] = {
     {"Simulate the paper's sponge damper, released from 15 mm:",
      "curl -s --json '" SCENE "' @/v1/jobs"},
-    {"Keep the id of its result:", "R=$(curl -s @/v1/examples/paper_free_sponge | curl -s --json "
-                                   "@- @/v1/jobs | grep -o '\"result\": "
-                                   "\"r-[0-9a-f]*' | cut -d'\"' -f4)"},
+    {"Keep the id of its result:",
+     "R=$(curl -s @/v1/examples/paper_free_sponge | curl -s -H 'Prefer: "
+     "wait=30' --json @- @/v1/jobs | grep -o '\"result\": "
+     "\"r-[0-9a-f]*' | cut -d'\"' -f4)"},
     {"The impacts, the time series, the spectrum:", "curl -s @/v1/results/$R/impacts.json"},
     {NULL, "curl -s \"@/v1/results/$R/series.csv?channels=displacement&to=0.1\""},
     {NULL, "curl -s -O @/v1/results/$R/series.npy"},

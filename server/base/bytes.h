@@ -1,6 +1,6 @@
-// A growing buffer of bytes with a limit it is born with; text is built in it. Once it failed (limit or memory) it
-// stays failed and empty, so that writers need not check each call.
-// Used by everything in server/ that writes.
+// A growing buffer of bytes with a limit it is born with; text is built in it. Once it failed
+// (limit or memory) it stays failed and empty, so that writers need not check each call. Used by
+// everything in server/ that writes.
 #ifndef SERVER_BASE_BYTES_H
 #define SERVER_BASE_BYTES_H
 
@@ -8,21 +8,24 @@
 #include <stddef.h>
 
 typedef struct Bytes {
-    char *at;       // NUL-terminated when not NULL
-    size_t count;   // without the NUL
+    char *at;     // NUL-terminated when not NULL
+    size_t count; // without the NUL
     size_t room;
-    size_t most;    // of count; 0: no limit
+    size_t most; // of count; 0: no limit
     bool is_failed;
 } Bytes;
 
-void bytes_clear(Bytes *bytes);  // empty and sound again, under the same limit
+void bytes_clear(Bytes *bytes); // empty and sound again, under the same limit
 void bytes_put(Bytes *bytes, const void *data, size_t size);
 void bytes_text(Bytes *bytes, const char *text);
 void bytes_format(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
-bool bytes_reserve(Bytes *bytes, size_t more);  // room for `more` beyond count; false once failed
-void bytes_real(Bytes *bytes, double value);    // shortest digits that read back; "null" where not finite
-void bytes_json_string(Bytes *bytes, const char *text);  // quoted and escaped; NULL is null, bad UTF-8 U+FFFD
-// Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with free(). NULL if failed.
+bool bytes_reserve(Bytes *bytes, size_t more); // room for `more` beyond count; false once failed
+void bytes_real(Bytes *bytes,
+                double value); // shortest digits that read back; "null" where not finite
+void bytes_json_string(Bytes *bytes,
+                       const char *text); // quoted and escaped; NULL is null, bad UTF-8 U+FFFD
+// Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with
+// free(). NULL if failed.
 char *bytes_take(Bytes *bytes, size_t *size);
 
 #endif

@@ -6,8 +6,8 @@
 
 typedef struct Digest Digest;
 
-Digest *digest_new(void);  // NULL without memory
-void digest_take(void *digest, const void *bytes, size_t size);  // fits canonical_write's callback
+Digest *digest_new(void);                                       // NULL without memory
+void digest_take(void *digest, const void *bytes, size_t size); // fits canonical_write's callback
 // Ends and frees; 64 lower-case hexadecimal digits and a NUL.
 void digest_end(Digest *digest, char target[65]);
 

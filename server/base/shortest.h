@@ -11,9 +11,9 @@ enum { SHORTEST_SIZE = 32 };
 extern "C" {
 #endif
 
-// Writes a finite double as valid JSON ("0.015", "1e-9", "10001", "-0.5", "-0.0"; plain digits where the first one's
-// power of ten is within -5..16, else d.ddde±x) without a NUL; returns the length. `target` has room for
-// SHORTEST_SIZE bytes, all of which may be written to.
+// Writes a finite double as valid JSON ("0.015", "1e-9", "10001", "-0.5", "-0.0"; plain digits
+// where the first one's power of ten is within -5..16, else d.ddde±x) without a NUL; returns the
+// length. `target` has room for SHORTEST_SIZE bytes, all of which may be written to.
 size_t shortest_write(char *target, double value);
 
 #ifdef __cplusplus

@@ -14,7 +14,6 @@
 #include "server/command/scene_file.h"
 #include "server/encode/encoder.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
 #include "server/options.h"
 

@@ -21,7 +21,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/http/body.h"
 #include "server/http/gate.h"
@@ -157,7 +156,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         code = body_code(problem.status);
     const char *length = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Content-Length");
     const unsigned long long body_size = length != NULL ? strtoull(length, NULL, 10) : 0;
-    const size_t most = listener->settings.body_most;
+    const size_t most = request->body_most;
     const bool waits_for_leave =
         request->expect != NULL && strcasecmp(request->expect, "100-continue") == 0;
     if (code == 0 && request->expect != NULL && !waits_for_leave) {
@@ -389,8 +388,7 @@ void listener_stop(Listener *listener, int grace_ms) {
         nanosleep(&pause, NULL);
     MHD_stop_daemon(listener->daemon);
     listener->daemon = NULL;
-    if (descriptor != MHD_INVALID_SOCKET)
-        close(descriptor);
+    close(descriptor); // MHD_INVALID_SOCKET is -1: no harm
 }
 
 void listener_free(Listener *listener) {

@@ -7,7 +7,7 @@
 #include "server/jobs/index.h"
 
 typedef struct Entry {
-    IndexEntry indexed;  // by id
+    IndexEntry indexed; // by id
     struct Entry *newer, *older;
     Outcome *outcome;
     size_t bytes;

@@ -11,7 +11,8 @@ void document_summary(Bytes *bytes, const Summary *summary) {
 }
 
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
-    write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at, WRITE_REPORT);
+    write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
+               WRITE_REPORT);
 }
 
 void document_energy(Bytes *bytes, const Energy *energy) {
@@ -24,8 +25,10 @@ void document_impacts(Bytes *bytes, const Impacts *impacts) {
     size_t count = 0;
     for (size_t i = 0; i < impacts->count; i++)
         count += impacts->at[i].kind == IMPACT_IMPACT;
-    bytes_format(bytes, "{\"count\": %zu, \"resting\": %zu, \"impacts\": ", count, impacts->count - count);
-    write_list(bytes, impact_fields, impacts->at, impacts->count, sizeof *impacts->at, WRITE_REPORT);
+    bytes_format(bytes, "{\"count\": %zu, \"resting\": %zu, \"impacts\": ", count,
+                 impacts->count - count);
+    write_list(bytes, impact_fields, impacts->at, impacts->count, sizeof *impacts->at,
+               WRITE_REPORT);
     bytes_text(bytes, "}");
 }
 
@@ -48,7 +51,8 @@ void document_psd(Bytes *bytes, const Spectrum *spectrum) {
         bytes_text(bytes, "null");
         return;
     }
-    bytes_format(bytes, "{\"method\": \"welch\", \"segment\": %zu, \"overlap\": %zu, \"window\": \"%s\", ",
+    bytes_format(bytes,
+                 "{\"method\": \"welch\", \"segment\": %zu, \"overlap\": %zu, \"window\": \"%s\", ",
                  settings->segment, settings->overlap, spectrum_window_names[settings->window]);
     bytes_format(bytes, "\"detrend\": \"%s\", \"segments\": %zu, \"frequency\": ",
                  spectrum_detrend_names[settings->detrend], spectrum->segments);
@@ -64,7 +68,7 @@ void document_psd(Bytes *bytes, const Spectrum *spectrum) {
 }
 
 void document_scene(Bytes *bytes, const Simulation *simulation) {
-    Simulation plain = *simulation;  // a borrowed view: nothing is cleared
+    Simulation plain = *simulation; // a borrowed view: nothing is cleared
     plain.title = NULL;
     plain.labels = (Texts){NULL, 0};
     write_item(bytes, simulation_fields, &plain, WRITE_SCENE);

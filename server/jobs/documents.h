@@ -1,5 +1,5 @@
-// The JSON documents of a result: what API.md calls plan, summary, warnings, energy, impacts.json and psd.json.
-// Not the series: those are the encoders'. Used by worker.c and by `impactd run`.
+// The JSON documents of a result: what API.md calls plan, summary, warnings, energy, impacts.json
+// and psd.json. Not the series: those are the encoders'. Used by worker.c and by `impactd run`.
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 

@@ -43,6 +43,13 @@ void index_remove(Index *index, IndexEntry *entry) {
         }
 }
 
+void *index_any(const Index *index) {
+    for (size_t i = 0; i < BUCKETS; i++)
+        if (index->buckets[i] != NULL)
+            return index->buckets[i];
+    return NULL;
+}
+
 void *index_find(const Index *index, const char *key) {
     for (IndexEntry *at = index->buckets[bucket(key)]; at != NULL; at = at->next)
         if (strcmp(at->key, key) == 0)

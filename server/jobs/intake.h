@@ -1,6 +1,6 @@
-// The door for work: names to numbers, check, digest, known or new, queue. Both the daemon's POST and the tests
-// come through here; `impactd run` uses intake_prepare alone.
-// Not HTTP and not JSON replies.
+// The door for work: names to numbers, check, digest, known or new, queue. Both the daemon's POST
+// and the tests come through here; `impactd run` uses intake_prepare alone. Not HTTP and not JSON
+// replies.
 #ifndef SERVER_JOBS_INTAKE_H
 #define SERVER_JOBS_INTAKE_H
 
@@ -11,9 +11,10 @@
 typedef struct Intake Intake;
 
 typedef struct IntakeSettings {
-    size_t workers;          // threads, at least 1
-    size_t queue_most;       // unfinished jobs at most
-    size_t cache_bytes;      // of finished outcomes in memory
+    size_t workers;     // threads, at least 1
+    size_t queue_most;  // unfinished jobs at most
+    size_t queue_bytes; // of their scenes at most; 0: 256 MiB
+    size_t cache_bytes; // of finished outcomes in memory
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -27,12 +28,13 @@ void intake_result_id(const Simulation *simulation, char target[72]);
 
 // Opens the queue, takes up unfinished jobs of the store, starts the workers. Borrows `store`.
 Status intake_open(Store *store, const IntakeSettings *settings, Intake **intake, Problem *problem);
-// Stops: no new jobs, running ones are interrupted and stay unfinished in the store for the next start.
+// Stops: no new jobs, running ones are interrupted and stay unfinished in the store for the next
+// start.
 void intake_close(Intake *intake);
 
-// Accepts a scene: a job of its own, durable when this returns. Known results finish it at once (cached), a
-// scene in flight shares that computation. STATUS_BUSY when the queue is full, STATUS_INVALID with the faults.
-// The Job is a hold of the caller's.
+// Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
+// (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
+// STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const char *text, size_t size, Job **job, Problem *problem);
 
 // The same without running: everything a dry run answers.
@@ -45,7 +47,8 @@ typedef struct DryRun {
     char result[72];
     bool is_cached;
 } DryRun;
-Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run, Problem *problem);
+Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
+                      Problem *problem);
 void dry_run_clear(DryRun *dry_run);
 
 // A job by its id, from memory or the store. STATUS_NOT_FOUND.
@@ -54,9 +57,9 @@ Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 // Dismisses; STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is NULL and the
-// return is STATUS_OK while it is being computed: `waker` is then called once when it is worth asking again.
-// STATUS_NOT_FOUND, STATUS_GONE for another engine version.
+// The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is
+// NULL and the return is STATUS_OK while it is being computed: `waker` is then called once when it
+// is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
 

@@ -1,5 +1,5 @@
-// What the jobs room knows, under one lock: jobs, the computations they share, the queue, the cache.
-// Not the door (intake.h). Used by intake.c, job.c and worker.c.
+// What the jobs room knows, under one lock: jobs, the computations they share, the queue, the
+// cache. Not the door (intake.h). Used by intake.c, job.c and worker.c.
 #ifndef SERVER_JOBS_INTAKE_STATE_H
 #define SERVER_JOBS_INTAKE_STATE_H
 
@@ -19,28 +19,29 @@ typedef struct Wakers {
 
 // One computation of one scene, for all jobs and readers who want it.
 typedef struct Computation {
-    IndexEntry indexed;  // in flight, by result; not once it was stopped
+    IndexEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
     Simulation simulation;
-    char *scene, *warnings;  // documents
-    struct Computation *next;  // in the queue
+    char *scene, *warnings;   // documents
+    struct Computation *next; // in the queue
     bool is_running;
-    bool is_again;  // only its series is wanted: the result is saved already
-    Job *jobs;      // those who wait for it, by next_shared
-    Wakers askers;  // readers of the outcome
+    bool is_again; // only its series is wanted: the result is saved already
+    Job *jobs;     // those who wait for it, by next_shared
+    Wakers askers; // readers of the outcome
     atomic_bool is_stopped;
-    atomic_uint progress;  // in 1/10,000
+    atomic_uint progress; // in 1/10,000
 } Computation;
 
 struct Job {
-    IndexEntry indexed;  // live, by id
+    IndexEntry indexed; // live, by id
     atomic_size_t holds;
-    Intake *intake;  // NULL: read from the store, never changes
-    JobRow row;      // `state` and all else as seen by others
-    JobRow closing;  // as it will be once the store has it; borrows row's texts, owns `problem`
+    Intake *intake; // held, for its lock; NULL: read from the store, never changes
+    JobRow row;     // `state` and all else as seen by others
+    JobRow closing; // as it will be once the store has it; borrows row's texts, owns `problem`
     bool is_closing;
+    size_t scene_size; // in bytes, counted while it is live
     char *plan, *summary;
-    Computation *computation;  // NULL: not yet or no more
+    Computation *computation; // NULL: not yet or no more
     Job *next_shared;
     int64_t submitted_ns, started_ns;
     Wakers wakers;
@@ -55,39 +56,51 @@ typedef struct Failure {
 typedef struct Worker {
     Intake *intake;
     pthread_t thread;
-    Computation *running;  // or NULL
+    Computation *running; // or NULL
 } Worker;
 
 struct Intake {
+    atomic_size_t holds; // the owner's and one of each Job: a job may be looked at after the intake
+                         // has closed
     Store *store;
     IntakeSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;
-    Worker *workers;      // settings.workers of them
-    size_t worker_count;  // started
+    Worker *workers;     // settings.workers of them
+    size_t worker_count; // started
     bool is_closing;
-    Index *jobs;       // not yet finished
-    Index *in_flight;  // computations
+    Index *jobs;      // not yet finished
+    Index *in_flight; // computations
     Computation *first, *last;
-    size_t queued, live;    // computations in the queue; jobs not yet finished
+    size_t queued, live; // computations in the queue; jobs not yet finished
+    size_t scene_bytes;  // of all live jobs
     Cache *cache;
-    Failure failures[OUTCOME_FAILURES];  // of computations for readers, told once
+    Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
 };
 
-bool wakers_add(Wakers *wakers, const Waker *waker);  // false without memory
+bool wakers_add(Wakers *wakers, const Waker *waker); // false without memory
 void wakers_remove(Wakers *wakers, const Waker *waker);
-void wakers_call(Wakers *wakers);  // calls and forgets all
+void wakers_call(Wakers *wakers); // calls and forgets all
 
-Job *job_new(Intake *intake);  // one hold; NULL without memory
+Job *job_new(Intake *intake); // one hold; NULL without memory
 bool job_state_is_final(int state);
 
 Computation *computation_new(const char *result);
 void computation_free(Computation *computation);
 
+void intake_drop(Intake *intake); // frees what is left with the last hold
+
 // With the lock held.
+void intake_retire(Job *job); // it is live no more; drops the index's hold
 void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent);
-void intake_detach(Job *job);  // from its computation, which stops when nobody is left
+void intake_admit(Intake *intake, Job *job); // it is live, held by the index
+void intake_attach(Job *job, Computation *computation);
+void intake_detach(Job *job); // from its computation, which stops when nobody is left
+
+// An unfinished job of the store, from an earlier life. Takes the row. Only what concerns the whole
+// program is an error.
+Status intake_take_up(Intake *intake, JobRow *row, Problem *problem);
 
 void *worker_main(void *worker);
 

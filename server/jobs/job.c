@@ -6,13 +6,14 @@
 #include "server/base/clock.h"
 #include "server/jobs/intake_state.h"
 
-const char *const job_state_names[] = {"accepted", "running", "successful", "failed", "dismissed", NULL};
+const char *const job_state_names[] = {"accepted", "running",   "successful",
+                                       "failed",   "dismissed", NULL};
 
 bool job_state_is_final(int state) {
     return state != JOB_ACCEPTED && state != JOB_RUNNING;
 }
 
-// --- wakers ----------------------------------------------------------------------------------------------
+// --- wakers ------------------------------------------------------------------------------------
 
 bool wakers_add(Wakers *wakers, const Waker *waker) {
     for (size_t i = 0; i < wakers->count; i++)
@@ -41,7 +42,7 @@ void wakers_call(Wakers *wakers) {
     *wakers = (Wakers){NULL, 0};
 }
 
-// --- jobs ------------------------------------------------------------------------------------------------
+// --- jobs --------------------------------------------------------------------------------------
 
 Job *job_new(Intake *intake) {
     Job *job = calloc(1, sizeof *job);
@@ -49,6 +50,8 @@ Job *job_new(Intake *intake) {
         return NULL;
     atomic_init(&job->holds, 1);
     job->intake = intake;
+    if (intake != NULL)
+        atomic_fetch_add(&intake->holds, 1);
     return job;
 }
 
@@ -64,6 +67,7 @@ void job_drop(Job *job) {
     free(job->plan);
     free(job->summary);
     free(job->wakers.at);
+    intake_drop(job->intake);
     free(job);
 }
 
@@ -115,8 +119,8 @@ Status job_show(Job *job, JobShow *show) {
         show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
     const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
-                          copy(&show->summary, job->summary) && copy(&show->warnings, row->warnings) &&
-                          copy(&show->title, row->title);
+                          copy(&show->summary, job->summary) &&
+                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title);
     unlock(job);
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }

@@ -28,16 +28,16 @@ typedef struct Waker {
 typedef struct JobShow {
     char id[40];
     JobState state;
-    double progress;  // percent
+    double progress; // percent
     bool is_cached;
-    char result[72];  // "" while there is none
-    int64_t created_unix_ms, started_unix_ms, finished_unix_ms;  // 0: not yet
-    double queued, run, total;  // [s]
-    char *problem;    // problem+json of a failed job; NULL
-    char *plan;       // JSON; NULL while unknown
-    char *summary;    // JSON; NULL while unknown
-    char *warnings;   // JSON array
-    char *title;      // NULL if none
+    char result[72];                                            // "" while there is none
+    int64_t created_unix_ms, started_unix_ms, finished_unix_ms; // 0: not yet
+    double queued, run, total;                                  // [s]
+    char *problem;  // problem+json of a failed job; NULL
+    char *plan;     // JSON; NULL while unknown
+    char *summary;  // JSON; NULL while unknown
+    char *warnings; // JSON array
+    char *title;    // NULL if none
 } JobShow;
 
 Job *job_hold(Job *job);

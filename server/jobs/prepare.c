@@ -1,4 +1,5 @@
-// A scene's text made ready: read, its materials' names turned into numbers, judged and completed, and its id.
+// A scene's text made ready: read, its materials' names turned into numbers, judged and completed,
+// and its id.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,7 +43,8 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
             if (slugs != NULL)
                 slugs[i] = known.at[i].slug;
             if (used < sizeof list)
-                used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", known.at[i].slug);
+                used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "",
+                                         known.at[i].slug);
         }
         const char *nearest = slugs == NULL ? NULL : texts_nearest(slugs, slug);
         if (nearest != NULL)
@@ -55,9 +57,23 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
+// The slug is known, the revision is not.
+static Status refuse_revision(const MaterialRevision *head, const char *name, const char *pointer,
+                              Problem *problem) {
+    Fault fault = {.detail = ""};
+    text_fit(fault.pointer, sizeof fault.pointer, pointer);
+    text_quote(fault.value, sizeof fault.value, name);
+    snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%.40s@%llu", head->slug,
+             (unsigned long long)head->revision);
+    snprintf(fault.detail, sizeof fault.detail,
+             "the material %.64s has no such revision; its head is %s", head->slug,
+             fault.did_you_mean);
+    return problem_put(problem, STATUS_INVALID, &fault);
+}
+
 // A number that came beside the name must be the revision's.
-static Status match(double *given, double known, const char *pointer, const char *member, const char *unit,
-                    const char *name, Problem *problem) {
+static Status match(double *given, double known, const char *pointer, const char *member,
+                    const char *unit, const char *name, Problem *problem) {
     if (isnan(*given) || *given == known) {
         *given = known;
         return STATUS_OK;
@@ -65,19 +81,23 @@ static Status match(double *given, double known, const char *pointer, const char
     char place[sizeof((Fault){0}.pointer)], is[32], is_known[32];
     pointer_join(place, sizeof place, pointer, member);
     text_real(is, *given);
-    text_real(is_known, known);
+    if (isnan(known))
+        text_fit(is_known, sizeof is_known, "none");
+    else
+        text_real(is_known, known);
     return problem_add_real(problem, STATUS_INVALID, place, *given, unit,
                             "is %s, but %s has %s: leave one of them out", is, name, is_known);
 }
 
-static Status fill(Buffer *buffer, const MaterialRevision *material, const char *pointer, Warnings *warnings,
-                   Problem *problem) {
+static Status fill(Buffer *buffer, const MaterialRevision *material, const char *pointer,
+                   Warnings *warnings, Problem *problem) {
     char name[160];
     snprintf(name, sizeof name, "%s@%llu", material->slug, (unsigned long long)material->revision);
     // Under impulse a canonical scene has no contact time: completion leaves it out again.
-    Status status = match(&buffer->restitution, material->restitution, pointer, "restitution", NULL, name, problem);
-    const Status second = match(&buffer->contact_time, material->contact_time, pointer, "contact_time", "s", name,
-                                problem);
+    Status status = match(&buffer->restitution, material->restitution, pointer, "restitution", NULL,
+                          name, problem);
+    const Status second = match(&buffer->contact_time, material->contact_time, pointer,
+                                "contact_time", "s", name, problem);
     if (status != STATUS_OK || second != STATUS_OK)
         return STATUS_INVALID;
     if (strcmp(material->status, "draft") == 0)
@@ -92,7 +112,8 @@ static Status fill(Buffer *buffer, const MaterialRevision *material, const char 
     return STATUS_OK;
 }
 
-static Status resolve(Store *store, Buffer *buffer, const char *pointer, Warnings *warnings, Problem *problem) {
+static Status resolve(Store *store, Buffer *buffer, const char *pointer, Warnings *warnings,
+                      Problem *problem) {
     char slug[128];
     uint64_t revision;
     MaterialRevision material = {0};
@@ -101,17 +122,22 @@ static Status resolve(Store *store, Buffer *buffer, const char *pointer, Warning
     if (!split_name(buffer->material, slug, &revision))
         return refuse_unknown(store, buffer->material, buffer->material, pointer, problem);
     Status status = store_material(store, slug, revision, &material, NULL);
-    if (status == STATUS_NOT_FOUND)
+    if (status == STATUS_NOT_FOUND && revision > 0 &&
+        store_material(store, slug, 0, &material, NULL) == STATUS_OK)
+        status = refuse_revision(&material, buffer->material, pointer, problem);
+    else if (status == STATUS_NOT_FOUND)
         status = refuse_unknown(store, buffer->material, slug, pointer, problem);
     else if (status == STATUS_OK)
         status = fill(buffer, &material, pointer, warnings, problem);
     else
-        status = problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+        status =
+            problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
     fields_clear(material_fields, &material);
     return status;
 }
 
-static Status resolve_all(Store *store, Simulation *simulation, Warnings *warnings, Problem *problem) {
+static Status resolve_all(Store *store, Simulation *simulation, Warnings *warnings,
+                          Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
         Damper *damper = &simulation->scene.dampers.at[i];

@@ -1,6 +1,6 @@
-// A worker takes computations from the queue, runs them, saves result and jobs in one transaction, and only then says
-// that they are finished. A computation stopped because nobody wants it leaves no trace; one stopped because the
-// daemon ends leaves its jobs unfinished in the store.
+// A worker takes computations from the queue, runs them, saves result and jobs in one transaction,
+// and only then says that they are finished. A computation stopped because nobody wants it leaves
+// no trace; one stopped because the daemon ends leaves its jobs unfinished in the store.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,9 +21,9 @@ static bool advance(void *context, double fraction) {
 // What a computation came to, as documents.
 typedef struct Findings {
     Status status;
-    Outcome *outcome;  // NULL unless STATUS_OK
+    Outcome *outcome; // NULL unless STATUS_OK
     ResultRow result;
-    char *problem;  // of failed jobs
+    char *problem; // of failed jobs
     char detail[256];
     int64_t began_ns, ended_ns;
 } Findings;
@@ -33,6 +33,9 @@ static void findings_clear(Findings *findings) {
     result_row_clear(&findings->result);
     free(findings->problem);
 }
+
+// Of one document; the database takes a billion.
+enum { DOCUMENT_BYTES = 900000000 };
 
 static char *take(Bytes *bytes, Status *status) {
     char *text = bytes_take(bytes, NULL);
@@ -44,7 +47,8 @@ static char *take(Bytes *bytes, Status *status) {
 static Status describe(const Computation *computation, Findings *findings) {
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
-    Bytes plan = {0}, summary = {0}, energy = {0}, impacts = {0}, psd = {0};
+    Bytes plan = {0}, summary = {0}, energy = {0};
+    Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
@@ -65,14 +69,16 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
-    return row->engine == NULL || row->scene == NULL || row->warnings == NULL ? STATUS_NO_MEMORY : status;
+    return row->engine == NULL || row->scene == NULL || row->warnings == NULL ? STATUS_NO_MEMORY
+                                                                              : status;
 }
 
 static void fail(Findings *findings, Status status, const Problem *problem) {
     findings->status = status;
     text_fit(findings->detail, sizeof findings->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
-    const bool is_scene = status == STATUS_LIMIT || status == STATUS_UNSTABLE || status == STATUS_INVALID;
+    const bool is_scene =
+        status == STATUS_LIMIT || status == STATUS_UNSTABLE || status == STATUS_INVALID;
     write_problem(&bytes, problem, is_scene ? 422 : 500, NULL);
     free(findings->problem);
     findings->problem = bytes_take(&bytes, NULL);
@@ -84,7 +90,8 @@ static void run(Intake *intake, Computation *computation, Findings *findings, Pr
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
-    Status status = simulation_run(&computation->simulation, limits, &watch, &findings->outcome, problem);
+    Status status =
+        simulation_run(&computation->simulation, limits, &watch, &findings->outcome, problem);
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);
@@ -96,11 +103,12 @@ static void run(Intake *intake, Computation *computation, Findings *findings, Pr
     findings->status = status;
 }
 
-// --- finishing -----------------------------------------------------------------------------------------------
+// --- finishing ---------------------------------------------------------------------------------
 
-// With the lock held: the rows as they go to the store, of jobs that have none yet. Returns how many.
-static size_t close_jobs(Computation *computation, const Findings *findings, Job **jobs, const JobRow **rows,
-                         size_t most) {
+// With the lock held: the rows as they go to the store, of jobs that have none yet. Returns how
+// many.
+static size_t close_jobs(Computation *computation, const Findings *findings, Job **jobs,
+                         const JobRow **rows, size_t most) {
     size_t count = 0;
     for (Job *job = computation->jobs; job != NULL && count < most; job = job->next_shared) {
         if (job->is_closing)
@@ -119,22 +127,40 @@ static size_t close_jobs(Computation *computation, const Findings *findings, Job
     return count;
 }
 
-static Status save(Intake *intake, const Findings *findings, const JobRow *const *rows, size_t count,
-                   Problem *problem) {
-    const ResultRow *result = findings->status == STATUS_OK ? &findings->result : NULL;
-    return store_result_save(intake->store, result, rows, count, problem);
+// A full disk and the like pass; then the jobs are worth another try.
+static bool is_passing(Status status) {
+    return status == STATUS_IO || status == STATUS_BUSY || status == STATUS_NO_MEMORY;
 }
 
-// With the lock held: the jobs are what the store says they are. If it could not be told, they are failed here and
-// unfinished there: the next start computes them again.
-static void publish(Intake *intake, const Findings *findings, Job **jobs, size_t count, Status saved,
+// A result that can never be saved, because it is too large, makes its jobs failed ones.
+static Status save(Intake *intake, const Findings *findings, Job *const *jobs,
+                   const JobRow *const *rows, size_t count, Problem *problem) {
+    const ResultRow *result = findings->status == STATUS_OK ? &findings->result : NULL;
+    const Status status = store_result_save(intake->store, result, rows, count, problem);
+    if (status == STATUS_OK || is_passing(status))
+        return status;
+    for (size_t i = 0; i < count; i++) {
+        Bytes bytes = {.most = 1 << 20};
+        write_problem(&bytes, problem, 422, NULL);
+        free(jobs[i]->closing.problem);
+        jobs[i]->closing.problem = bytes_take(&bytes, NULL);
+        jobs[i]->closing.state = JOB_FAILED;
+    }
+    problem_clear(problem);
+    return store_result_save(intake->store, NULL, rows, count, problem);
+}
+
+// With the lock held: the jobs are what the store says they are. If it could not be told, they are
+// failed here and unfinished there: the next start computes them again.
+static void publish(const Findings *findings, Job **jobs, size_t count, Status saved,
                     const Problem *problem) {
     for (size_t i = 0; i < count; i++) {
         Job *job = jobs[i];
         job->row = job->closing;
-        if (saved == STATUS_OK && findings->status == STATUS_OK) {
+        if (job->row.state == JOB_SUCCESSFUL && saved == STATUS_OK) {
             job->plan = findings->result.plan == NULL ? NULL : strdup(findings->result.plan);
-            job->summary = findings->result.summary == NULL ? NULL : strdup(findings->result.summary);
+            job->summary =
+                findings->result.summary == NULL ? NULL : strdup(findings->result.summary);
         }
         if (saved != STATUS_OK) {
             Bytes bytes = {.most = 1 << 20};
@@ -143,12 +169,10 @@ static void publish(Intake *intake, const Findings *findings, Job **jobs, size_t
             job->row.problem = bytes_take(&bytes, NULL);
             job->row.state = JOB_FAILED;
         } else {
-            index_remove(intake->jobs, &job->indexed);
-            intake->live--;
-            job_drop(job);  // the index's hold
+            intake_retire(job);
         }
         wakers_call(&job->wakers);
-        job_drop(job);  // close_jobs's hold
+        job_drop(job); // close_jobs's hold
     }
 }
 
@@ -162,7 +186,8 @@ static void tell_askers(Intake *intake, Computation *computation, const Findings
     wakers_call(&computation->askers);
 }
 
-static void finish(Intake *intake, Computation *computation, const Findings *findings, Problem *problem) {
+static void finish(Intake *intake, Computation *computation, const Findings *findings,
+                   Problem *problem) {
     enum { BATCH = 256 };
     Job *jobs[BATCH];
     const JobRow *rows[BATCH];
@@ -174,13 +199,16 @@ static void finish(Intake *intake, Computation *computation, const Findings *fin
             break;
         pthread_mutex_unlock(&intake->lock);
         problem_clear(problem);
-        const Status saved = save(intake, findings, rows, count, problem);
+        const Status saved = save(intake, findings, jobs, rows, count, problem);
         if (saved != STATUS_OK)
-            fprintf(stderr, "impactd: the result %s could not be saved: %s\n", computation->result, problem->detail);
+            fprintf(stderr, "impactd: the result %s could not be saved: %s\n", computation->result,
+                    problem->detail);
         pthread_mutex_lock(&intake->lock);
-        if (findings->outcome != NULL)
+        // What is in the cache is known, so it must be in the store.
+        if (findings->outcome != NULL && saved == STATUS_OK &&
+            jobs[0]->closing.state == JOB_SUCCESSFUL)
             cache_put(intake->cache, computation->result, findings->outcome);
-        publish(intake, findings, jobs, count, saved, problem);
+        publish(findings, jobs, count, saved, problem);
         pthread_mutex_unlock(&intake->lock);
     }
     if (findings->outcome != NULL && computation->is_again)
@@ -192,12 +220,13 @@ static void finish(Intake *intake, Computation *computation, const Findings *fin
         computation->jobs = job->next_shared;
         job->computation = NULL;
         job->next_shared = NULL;
-        job_drop(job);  // the computation's hold
+        job_drop(job); // the computation's hold
     }
     pthread_mutex_unlock(&intake->lock);
 }
 
-// With the lock held: nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
+// With the lock held: nobody waits for it any more, or the daemon ends and its jobs stay unfinished
+// in the store.
 static void abandon(Intake *intake, Computation *computation) {
     index_remove(intake->in_flight, &computation->indexed);
     while (computation->jobs != NULL) {
@@ -205,11 +234,9 @@ static void abandon(Intake *intake, Computation *computation) {
         computation->jobs = job->next_shared;
         job->computation = NULL;
         job->next_shared = NULL;
-        index_remove(intake->jobs, &job->indexed);
-        intake->live--;
+        intake_retire(job);
         wakers_call(&job->wakers);
-        job_drop(job);  // the computation's hold
-        job_drop(job);  // the index's
+        job_drop(job); // the computation's hold
     }
     wakers_call(&computation->askers);
 }
@@ -241,15 +268,15 @@ static Computation *next_computation(Worker *worker) {
 void *worker_main(void *context) {
     Worker *worker = context;
     Intake *intake = worker->intake;
-    Problem *problem = calloc(1, sizeof *problem);
+    Problem problem; // large, but a thread's stack is larger
     pthread_mutex_lock(&intake->lock);
     Computation *computation;
-    while (problem != NULL && (computation = next_computation(worker)) != NULL) {
+    while ((computation = next_computation(worker)) != NULL) {
         pthread_mutex_unlock(&intake->lock);
         Findings findings = {0};
-        run(intake, computation, &findings, problem);
+        run(intake, computation, &findings, &problem);
         if (findings.status != STATUS_CANCELLED)
-            finish(intake, computation, &findings, problem);
+            finish(intake, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
         worker->running = NULL;
         if (findings.status == STATUS_CANCELLED)
@@ -260,6 +287,5 @@ void *worker_main(void *context) {
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);
-    free(problem);
     return NULL;
 }

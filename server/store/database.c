@@ -56,7 +56,7 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
                        has_path ? ", in " : "", has_path ? path : "");
 }
 
-// --- statements --------------------------------------------------
+// --- statements --------------------------------------------------------------------------------
 
 Status database_execute(Database *database, const char *sql, Problem *problem) {
     if (sqlite3_exec(database->connection, sql, NULL, NULL, NULL) == SQLITE_OK)
@@ -106,8 +106,8 @@ Status statement_step(Statement *statement, bool *has_row, Problem *problem) {
         return STATUS_OK;
     sqlite3 *connection = sqlite3_db_handle(statement);
     return report(connection,
-                  sqlite3_stmt_readonly(statement) ? "reading the database"
-                                                   : "writing to the database",
+                  sqlite3_column_count(statement) > 0 ? "reading the database"
+                                                      : "writing to the database",
                   problem);
 }
 
@@ -130,7 +130,7 @@ Status database_change(Database *database, const char *sql, const RowColumn *col
     return status;
 }
 
-// --- opening -----------------------------------------------------
+// --- opening -----------------------------------------------------------------------------------
 
 // Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
 static const char writer_settings[] = "PRAGMA page_size = 16384;"
@@ -220,7 +220,7 @@ void database_close(Database *database) {
     free(database);
 }
 
-// --- migration ---------------------------------------------------
+// --- migration ---------------------------------------------------------------------------------
 
 static Status migrate_step(Database *database, const EmbeddedFile *file, int64_t version,
                            Problem *problem) {

@@ -81,6 +81,11 @@ Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *
     return load(store, sql, id, row, problem);
 }
 
+Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem) {
+    static const char sql[] = "SELECT id, engine, scene FROM results WHERE id = :id";
+    return load(store, sql, id, row, problem);
+}
+
 bool store_result_exists(Store *store, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;

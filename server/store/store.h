@@ -19,7 +19,7 @@ typedef struct Store Store;
 Status store_open(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
 
-// --- materials ---------------------------------------------------
+// --- materials ---------------------------------------------------------------------------------
 typedef struct MaterialRevision {
     char *slug, *name, *status, *source;
     uint64_t revision;
@@ -38,7 +38,7 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
 Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
-// --- jobs --------------------------------------------------------
+// --- jobs --------------------------------------------------------------------------------------
 typedef struct JobRow {
     char id[40];
     int state; // JobState
@@ -67,7 +67,7 @@ Status store_job_list(Store *store, const char *before, size_t most, JobRows *ro
 Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
-// --- results -----------------------------------------------------
+// --- results -----------------------------------------------------------------------------------
 // Everything of a result but its series, which is computed anew when asked for.
 typedef struct ResultRow {
     char id[72];
@@ -86,6 +86,8 @@ Status store_result_save(Store *store, const ResultRow *result, const JobRow *co
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts and psd, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
+// Id, engine and scene alone: what computing it anew takes.
+Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
 
 #endif

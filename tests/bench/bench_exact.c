@@ -1,5 +1,6 @@
-// ns of CPU per sample of the exact solver at the paper's scenes, 60 s at 1 kHz and 5 channels, beside a memset and a
-// memcpy of the same output in the same run. The making of the random base is timed apart. Smallest of the repeats.
+// ns of CPU per sample of the exact solver at the paper's scenes, 60 s at 1 kHz and 5 channels,
+// beside a memset and a memcpy of the same output in the same run. The making of the random base is
+// timed apart. Smallest of the repeats.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,13 +19,17 @@ typedef struct Case {
 } Case;
 
 static const Case cases[] = {
-    {"no contact, free", 0.61, 0.025, false, false}, {"no contact, random", 0.61, 0.025, true, false},
-    {"free sponge", 0.61, 0.025, false, true},       {"free aluminium", 0.46, 0.0003, false, true},
-    {"random sponge", 0.61, 0.025, true, true},      {"random aluminium", 0.46, 0.0003, true, true},
+    {"no contact, free", 0.61, 0.025, false, false},
+    {"no contact, random", 0.61, 0.025, true, false},
+    {"free sponge", 0.61, 0.025, false, true},
+    {"free aluminium", 0.46, 0.0003, false, true},
+    {"random sponge", 0.61, 0.025, true, true},
+    {"random aluminium", 0.46, 0.0003, true, true},
 };
 
-static const ChannelId wanted[CHANNELS] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
-                                           CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_CONTACT_FORCE};
+static const ChannelId wanted[CHANNELS] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY,
+                                           CHANNEL_ACCELERATION, CHANNEL_DAMPER_DISPLACEMENT,
+                                           CHANNEL_CONTACT_FORCE};
 
 static double least(double a, double b) {
     return a < b ? a : b;
@@ -34,7 +39,8 @@ int main(void) {
     fourier_start();
     const double duration = 60;
     const size_t count = 60001;
-    double *block = malloc(count * CHANNELS * sizeof *block), *copy = malloc(count * CHANNELS * sizeof *copy);
+    double *block = malloc(count * CHANNELS * sizeof *block),
+           *copy = malloc(count * CHANNELS * sizeof *copy);
     if (block == NULL || copy == NULL)
         return 1;
     memset(copy, 1, count * CHANNELS * sizeof *copy);
@@ -49,8 +55,10 @@ int main(void) {
         set_ns = least(set_ns, (double)(middle - start) / (double)count);
         copy_ns = least(copy_ns, (double)(clock_thread_cpu_ns() - middle) / (double)count);
     }
-    printf("%-20s %9s %10s %8s %10s %12s\n", "scene", "ns/sample", "x memset", "impacts", "plan us", "base ns/smp");
-    printf("%-20s %9.2f %10.2f\n%-20s %9.2f %10.2f\n", "memset", set_ns, 1.0, "memcpy", copy_ns, copy_ns / set_ns);
+    printf("%-20s %9s %10s %8s %10s %12s\n", "scene", "ns/sample", "x memset", "impacts", "plan us",
+           "base ns/smp");
+    printf("%-20s %9.2f %10.2f\n%-20s %9.2f %10.2f\n", "memset", set_ns, 1.0, "memcpy", copy_ns,
+           copy_ns / set_ns);
     for (size_t c = 0; c < COUNT(cases); c++) {
         Simulation simulation;
         Warnings warnings = {NULL, 0};
@@ -75,7 +83,8 @@ int main(void) {
             if (plan_new(&simulation.scene, "auto", "exact", &plan, &problem) != STATUS_OK)
                 return 1;
             const int64_t planned = clock_thread_cpu_ns();
-            if (excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) != STATUS_OK)
+            if (excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) !=
+                STATUS_OK)
                 return 1;
             const int64_t based = clock_thread_cpu_ns();
             Run run = {.plan = plan, .base = &base};
@@ -92,8 +101,8 @@ int main(void) {
             base_clear(&base);
             plan_free(plan);
         }
-        printf("%-20s %9.2f %10.2f %8zu %10.2f %12.2f\n", cases[c].name, run_ns, run_ns / set_ns, impacts,
-               plan_ns / 1e3, base_ns);
+        printf("%-20s %9.2f %10.2f %8zu %10.2f %12.2f\n", cases[c].name, run_ns, run_ns / set_ns,
+               impacts, plan_ns / 1e3, base_ns);
         simulation_clear(&simulation);
         warnings_clear(&warnings);
     }

@@ -7,16 +7,17 @@
 
 typedef struct PaperBuffer {
     const char *name;
-    double restitution, contact_time;  // Table I
-    double stiffness, damping;         // as printed, in N/m and N s/m
+    double restitution, contact_time; // Table I
+    double stiffness, damping;        // as printed, in N/m and N s/m
 } PaperBuffer;
-extern const PaperBuffer paper_buffers[5];  // sponge, soft_rubber, hard_rubber, hard_acrylic, aluminium
+extern const PaperBuffer
+    paper_buffers[5]; // sponge, soft_rubber, hard_rubber, hard_acrylic, aluminium
 
 // Free vibration from 15 mm with a buffer of e and T_c; everything else at its default. Cleared by
 // simulation_clear. Change what you mean, then simulation_complete.
 void paper_scene(Simulation *simulation, double restitution, double contact_time, double duration);
 void paper_free(Simulation *simulation, double displacement);
-void paper_random(Simulation *simulation, double rms, uint64_t seed);  // 0-15 Hz
+void paper_random(Simulation *simulation, double rms, uint64_t seed); // 0-15 Hz
 void paper_sine(Simulation *simulation, double amplitude, double frequency);
 void paper_model(Simulation *simulation, const char *model);
 void paper_channels(Simulation *simulation, const char *const *names, size_t count);

@@ -1,4 +1,5 @@
-// Facts of the physics that a correct program meets: closed forms, Table I, known orbits, the paper's thesis.
+// Facts of the physics that a correct program meets: closed forms, Table I, known orbits, the
+// paper's thesis.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -71,7 +72,8 @@ static void the_first_impact_comes_at_the_same_instant_with_every_model(void **s
     for (size_t i = 0; i < COUNT(paper_buffers); i++)
         for (int is_impulse = 0; is_impulse < 2; is_impulse++) {
             Simulation simulation;
-            paper_scene(&simulation, paper_buffers[i].restitution, paper_buffers[i].contact_time, 0.2);
+            paper_scene(&simulation, paper_buffers[i].restitution, paper_buffers[i].contact_time,
+                        0.2);
             paper_model(&simulation, is_impulse ? "impulse" : "spring_damper");
             Outcome *outcome = run(&simulation);
             assert_true(fabs(impact(outcome, 0)->start - 0.0416214083419515) <= 1e-13);
@@ -102,7 +104,8 @@ static void where_contact_takes_time_the_models_part_at_the_third_impact(void **
 // Two bodies alone: the contact returns just what it was identified from.
 static void an_isolated_pair_returns_restitution_and_contact_time(void **state) {
     (void)state;
-    const double restitutions[] = {0.02, 0.1, 0.46, 0.61, 0.9, 0.99}, ratios[] = {1e-3, 0.082, 1, 10};
+    const double restitutions[] = {0.02, 0.1, 0.46, 0.61, 0.9, 0.99},
+                 ratios[] = {1e-3, 0.082, 1, 10};
     const double times[] = {1e-6, 0.0003, 0.025};
     for (size_t i = 0; i < COUNT(restitutions); i++)
         for (size_t j = 0; j < COUNT(ratios); j++)
@@ -166,7 +169,7 @@ static void a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts(void **s
     simulation.scene.dampers.at[0].mass = 1e-3;
     simulation.scene.dampers.at[0].clearance = 2;
     constant_base(&simulation, -g, 2);
-    ((Excitation *)(void *)simulation.scene.excitation)->displacement = g * 1e-6;  // M g / K
+    ((Excitation *)(void *)simulation.scene.excitation)->displacement = g * 1e-6; // M g / K
     Outcome *outcome = run(&simulation);
     double speed = sqrt(2 * g);
     size_t count = 0;
@@ -201,10 +204,11 @@ static void the_masri_caughey_orbit_is_reached_and_kept(void **state) {
     double most = 0;
     for (size_t i = count - 2000; i < count; i++) {
         const double t = (double)i / 20;
-        assert_near(fabs(channel(outcome, "damper_velocity")[i] + amplitude * cos(t)), 6.441388128148, 1e-9);
+        assert_near(fabs(channel(outcome, "damper_velocity")[i] + amplitude * cos(t)),
+                    6.441388128148, 1e-9);
         most = fmax(most, fabs(channel(outcome, "displacement")[i] + amplitude * sin(t)));
     }
-    assert_near(most, 0.186892479 * 10, 2e-3);  // of samples, so a little less than the true peak
+    assert_near(most, 0.186892479 * 10, 2e-3); // of samples, so a little less than the true peak
     const Impacts *impacts = &outcome->response.impacts;
     for (size_t i = impacts->count - 40; i < impacts->count; i++)
         assert_near(impacts->at[i].start - impacts->at[i - 1].start, TURN / 2, 1e-9);
@@ -247,17 +251,19 @@ static void the_models_agree_on_aluminium_and_differ_on_the_sponge(void **state)
     double soft[2], hard[2];
     model_distance(sponge, false, soft);
     model_distance(aluminium, false, hard);
-    printf("free:   sponge %.1f / %.1f dB, aluminium %.1f / %.1f dB\n", soft[0], soft[1], hard[0], hard[1]);
+    printf("free:   sponge %.1f / %.1f dB, aluminium %.1f / %.1f dB\n", soft[0], soft[1], hard[0],
+           hard[1]);
     assert_true(fabs(soft[0] - 8.6) < 0.1 && fabs(soft[1] - 20.4) < 0.1);
     assert_true(fabs(hard[0] - 2.8) < 0.1 && fabs(hard[1] - 7.6) < 0.1);
     model_distance(sponge, true, soft);
     model_distance(aluminium, true, hard);
-    printf("random: sponge %.1f / %.1f dB, aluminium %.1f / %.1f dB\n", soft[0], soft[1], hard[0], hard[1]);
+    printf("random: sponge %.1f / %.1f dB, aluminium %.1f / %.1f dB\n", soft[0], soft[1], hard[0],
+           hard[1]);
     assert_true(soft[1] > 4 * hard[1] && hard[1] < 4);
 }
 
-// A free mass that misses its stops leaves the structure to itself; white base acceleration of density G gives
-// var(x) = G / (8 xi w^3).
+// A free mass that misses its stops leaves the structure to itself; white base acceleration of
+// density G gives var(x) = G / (8 xi w^3).
 static void white_noise_gives_the_variance_of_theory(void **state) {
     (void)state;
     Simulation simulation;

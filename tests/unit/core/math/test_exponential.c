@@ -32,7 +32,7 @@ static void a_singular_system_is_as_good_as_any(void **state) {
 
 static void a_stiff_system_decays_and_keeps_its_slow_part(void **state) {
     (void)state;
-    const long double A[4] = {-1e12L, 1e12L, 0, -1};  // y1 follows y2
+    const long double A[4] = {-1e12L, 1e12L, 0, -1}; // y1 follows y2
     long double E[4];
     exponential(A, 2, 1, E);
     assert_true(E[0] < 1e-15L);
@@ -42,7 +42,8 @@ static void a_stiff_system_decays_and_keeps_its_slow_part(void **state) {
 
 static void a_form_is_the_integral_of_the_product(void **state) {
     (void)state;
-    // y = (cos t, -sin t) from (1, 0): the integral of y1 y1 over 0..h is h/2 + sin(2h)/4, of y1 y2 -sin(h)^2/2.
+    // y = (cos t, -sin t) from (1, 0): the integral of y1 y1 over 0..h is h/2 + sin(2h)/4, of y1 y2
+    // -sin(h)^2/2.
     const long double A[4] = {0, 1, -1, 0}, one[2] = {1, 0}, two[2] = {0, 1};
     for (long double h = 1e-3L; h < 100; h *= 3) {
         long double form[4];

@@ -47,7 +47,7 @@ static void a_near_miss_is_not_a_crossing(void **state) {
     (void)state;
     for (int power = 1; power <= 14; power++) {
         const double miss = pow(10, -power);
-        const double c[3] = {0.16 + miss, -0.8, 1};  // (s - 0.4)^2 + miss
+        const double c[3] = {0.16 + miss, -0.8, 1}; // (s - 0.4)^2 + miss
         double s;
         assert_false(root_first_crossing(c, 2, &s));
     }

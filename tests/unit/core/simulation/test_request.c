@@ -8,8 +8,8 @@
 #include <cmocka.h>
 
 #include "core/base/canonical.h"
-#include "core/solve/solvers.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/solvers.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 

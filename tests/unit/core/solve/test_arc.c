@@ -19,12 +19,14 @@ static Motion contact_motion(double contact_omega, double contact_ratio) {
                      .share = 0.0758,
                      .contact_omega2 = contact_omega * contact_omega,
                      .contact_damping = 2 * contact_ratio * contact_omega};
-    motion.rate = sqrt(motion.omega2) + motion.damping + fmax(contact_omega, motion.contact_damping);
+    motion.rate =
+        sqrt(motion.omega2) + motion.damping + fmax(contact_omega, motion.contact_damping);
     return motion;
 }
 
 // The state after `length` by exp(A t) in long double.
-static State by_exponential(const Motion *m, const State *start, const Slice *slice, double length) {
+static State by_exponential(const Motion *m, const State *start, const Slice *slice,
+                            double length) {
     long double system[SIZE * SIZE] = {0}, transition[SIZE * SIZE], end[SIZE];
     const long double share = m->share, rest = m->is_resting;
     system[X * SIZE + V] = 1;
@@ -56,7 +58,8 @@ static void assert_close(double value, double wanted, double scale) {
 }
 
 static void assert_state(const State *state, const State *wanted, double rate) {
-    const double scale = fabs(wanted->x) + fabs(wanted->r) + (fabs(wanted->v) + fabs(wanted->w)) / rate + 1e-3;
+    const double scale =
+        fabs(wanted->x) + fabs(wanted->r) + (fabs(wanted->v) + fabs(wanted->w)) / rate + 1e-3;
     assert_close(state->x, wanted->x, scale);
     assert_close(state->r, wanted->r, scale);
     assert_close(state->v, wanted->v, scale * rate);
@@ -82,7 +85,8 @@ static void an_arc_ends_where_the_exponential_does(void **state) {
                         Arc arc;
                         arc_make(&arc, &motion, &begin, &slices[k], rho / motion.rate);
                         const State end = arc_end(&arc);
-                        const State wanted = by_exponential(&motion, &begin, &slices[k], rho / motion.rate);
+                        const State wanted =
+                            by_exponential(&motion, &begin, &slices[k], rho / motion.rate);
                         assert_state(&end, &wanted, motion.rate);
                     }
                 }
@@ -128,7 +132,8 @@ static void integrals_are_exact(void **state) {
             system[W * SIZE + V] = m.damping;
             system[W * SIZE + R] = -(long double)m.contact_omega2;
             system[W * SIZE + W] = -(long double)m.contact_damping;
-            const long double y[SIZE] = {start.x, start.v, start.r, start.w, slices[k].value, slices[k].slope};
+            const long double y[SIZE] = {start.x, start.v,         start.r,
+                                         start.w, slices[k].value, slices[k].slope};
             const long double rows[3][SIZE] = {{[V] = 1}, {[W] = 1}, {[A] = 1}};
             const int pairs[4][2] = {{0, 0}, {1, 1}, {2, 0}, {2, 1}};
             const double values[4] = {integrals.vv, integrals.ww, integrals.av, integrals.aw};
@@ -157,7 +162,8 @@ static void the_peak_force_is_found_inside_an_arc(void **state) {
         arc_make(&arc, &motion, &at, &slice, 1 / motion.rate);
         peak = arc_peak_force(&arc, peak, &s);
         for (int j = 0; j <= 10000; j++)
-            scanned = fmax(scanned, fabs(root_value(arc.force, arc.degree - 1, j / 1e4)) / (arc.length * arc.length));
+            scanned = fmax(scanned, fabs(root_value(arc.force, arc.degree - 1, j / 1e4)) /
+                                        (arc.length * arc.length));
         at = arc_end(&arc);
     }
     assert_true(peak >= scanned * (1 - 1e-14) && peak <= scanned * (1 + 1e-7));

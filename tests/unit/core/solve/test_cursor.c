@@ -19,10 +19,12 @@ static void walk(const Base *base, double sample_rate) {
         const double interval = 1 / sample_rate;
         double offset = 0;
         int pieces = 0;
-        assert_true(fabs(base_cursor_at(&cursor, n) - base_at(base, (double)n / sample_rate)) < 1e-12);
+        assert_true(fabs(base_cursor_at(&cursor, n) - base_at(base, (double)n / sample_rate)) <
+                    1e-12);
         while (interval - offset > 1e-12) {
             Slice slice;
-            const double length = fmin(base_cursor_slice(&cursor, n, offset, &slice), interval - offset);
+            const double length =
+                fmin(base_cursor_slice(&cursor, n, offset, &slice), interval - offset);
             const double middle = (double)n / sample_rate + offset + length / 2;
             assert_true(length > 0);
             assert_true(fabs(slice_at(&slice, length / 2) - base_at(base, middle)) < 1e-12);
@@ -31,7 +33,8 @@ static void walk(const Base *base, double sample_rate) {
         }
         Slice whole;
         if (base_cursor_interval(&cursor, n, &whole))
-            assert_true(fabs(slice_at(&whole, interval / 3) - base_at(base, ((double)n + 1.0 / 3) / sample_rate)) < 1e-12);
+            assert_true(fabs(slice_at(&whole, interval / 3) -
+                             base_at(base, ((double)n + 1.0 / 3) / sample_rate)) < 1e-12);
     }
 }
 
@@ -41,7 +44,10 @@ static void every_slice_is_the_base(void **state) {
     const double rates[] = {10, 20, 33, 100, 1000};
     for (size_t i = 0; i < 6; i++)
         for (size_t j = 0; j < 5; j++)
-            walk(&(Base){.form = BASE_SAMPLED, .values = values, .count = 5, .interval = intervals[i]}, rates[j]);
+            walk(
+                &(Base){
+                    .form = BASE_SAMPLED, .values = values, .count = 5, .interval = intervals[i]},
+                rates[j]);
     walk(&(Base){.form = BASE_SINE, .amplitude = 2, .omega = 11}, 100);
     walk(&(Base){.form = BASE_STILL}, 10);
 }
@@ -63,7 +69,7 @@ static void a_late_sine_keeps_its_phase(void **state) {
     BaseCursor cursor;
     Slice slice;
     base_cursor_make(&cursor, &base, 1);
-    assert_true(base_cursor_interval(&cursor, 100000000, &slice));  // whole turns of 1 Hz
+    assert_true(base_cursor_interval(&cursor, 100000000, &slice)); // whole turns of 1 Hz
     assert_true(fabs(slice.value) < 1e-7 && fabs(slice.slope - 1) < 1e-12);
 }
 

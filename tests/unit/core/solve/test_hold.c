@@ -17,11 +17,13 @@ static Motion stiff_motion(double contact_time, double restitution) {
                      .share = 0.0758,
                      .contact_omega2 = (pi * pi + ln * ln) / (contact_time * contact_time),
                      .contact_damping = -2 * ln / contact_time};
-    motion.rate = sqrt(motion.omega2) + motion.damping + fmax(sqrt(motion.contact_omega2), motion.contact_damping);
+    motion.rate = sqrt(motion.omega2) + motion.damping +
+                  fmax(sqrt(motion.contact_omega2), motion.contact_damping);
     return motion;
 }
 
-static State by_arcs(const Motion *motion, State state, const Slice *slice, double length, double *least) {
+static State by_arcs(const Motion *motion, State state, const Slice *slice, double length,
+                     double *least) {
     const double step = 1 / motion->rate;
     double done = 0;
     *least = state.r;
@@ -65,14 +67,17 @@ static void no_step_passes_over_an_end(void **context) {
     srand(5);
     int taken = 0, refused = 0;
     for (int trial = 0; trial < 1000; trial++) {
-        const double e = 0.05 + 0.9 * rand() / RAND_MAX, T = 1e-5 * pow(10, -1.0 * rand() / RAND_MAX);
+        const double e = 0.05 + 0.9 * rand() / RAND_MAX,
+                     T = 1e-5 * pow(10, -1.0 * rand() / RAND_MAX);
         const Motion motion = stiff_motion(T, e);
         Hold hold = {0};
         hold_make(&hold, &motion, 0, 3e-4);
-        const double x = 0.01 * (2.0 * rand() / RAND_MAX - 1), v = 0.3 * (2.0 * rand() / RAND_MAX - 1);
+        const double x = 0.01 * (2.0 * rand() / RAND_MAX - 1),
+                     v = 0.3 * (2.0 * rand() / RAND_MAX - 1);
         const double push = motion.omega2 * x + motion.damping * v;
         const double r = fabs(push) / motion.contact_omega2 * 3 * rand() / RAND_MAX;
-        const double w = r * sqrt(motion.contact_omega2) * (2.0 * rand() / RAND_MAX - 1) * (trial % 3);
+        const double w =
+            r * sqrt(motion.contact_omega2) * (2.0 * rand() / RAND_MAX - 1) * (trial % 3);
         const State start = {x, v, r, w};
         const Slice slice = {3.0 * rand() / RAND_MAX, 100.0 * rand() / RAND_MAX, 0};
         State end;

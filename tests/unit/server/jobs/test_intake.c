@@ -1,6 +1,8 @@
-// The jobs room with the real engine and a real database: nothing lost, nothing twice, one state at the end.
+// The jobs room with the real engine and a real database: nothing lost, nothing twice, one state at
+// the end.
 #include <pthread.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -8,12 +10,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
 
 #include <cmocka.h>
 
 #include "core/math/fourier.h"
 #include "server/jobs/intake.h"
+#include "server/store/database.h"
 
 typedef struct Room {
     char directory[64];
@@ -57,11 +61,13 @@ static void room_end(Room *room) {
 }
 
 // The paper's scene; `displacement` makes scenes differ, `duration` makes them long.
-static void scene_text(char target[1024], double displacement, double duration, const char *buffer) {
+static void scene_text(char target[1024], double displacement, double duration,
+                       const char *buffer) {
     snprintf(target, 1024,
              "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},"
              " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"%s\"}],"
-             " \"excitation\": {\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1, \"displacement\": %.17g},"
+             " \"excitation\": {\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1, "
+             "\"displacement\": %.17g},"
              " \"duration\": %.17g, \"sample_rate\": 1000,"
              " \"output\": {\"channels\": [\"displacement\"], \"psd\": {\"channels\": []}}}",
              buffer, displacement, duration);
@@ -160,7 +166,8 @@ static void equal_scenes_in_flight_share_a_computation(void **state) {
 static void a_dismissed_job_stops_and_stays_dismissed(void **state) {
     (void)state;
     Room room = room_make(1);
-    Job *running = submit(&room, 0.001, 30000), *queued = submit(&room, 0.002, 30000), *again = NULL;
+    Job *running = submit(&room, 0.001, 30000), *queued = submit(&room, 0.002, 30000),
+        *again = NULL;
     JobShow a = show(running), b = show(queued);
     const struct timespec moment = {0, 5000000};
     for (int i = 0; i < 2000 && a.state != JOB_RUNNING; i++) {
@@ -248,7 +255,8 @@ static Outcome *outcome_of(Room *room, const char *result) {
     Outcome *outcome = NULL;
     for (int i = 0; i < 20000; i++) {
         const int seen = atomic_load(&wakes);
-        assert_int_equal(intake_outcome(room->intake, result, &waker, &outcome, &problem), STATUS_OK);
+        assert_int_equal(intake_outcome(room->intake, result, &waker, &outcome, &problem),
+                         STATUS_OK);
         if (outcome != NULL)
             return outcome;
         for (int j = 0; j < 20000 && atomic_load(&wakes) == seen; j++)
@@ -274,7 +282,8 @@ static void a_series_that_is_gone_is_computed_again_with_the_same_bytes(void **s
                         kept->response.count * sizeof(double));
     const Waker waker = {NULL, note_wake};
     Outcome *none = NULL;
-    assert_int_equal(intake_outcome(room.intake, "r-none", &waker, &none, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(intake_outcome(room.intake, "r-none", &waker, &none, &problem),
+                     STATUS_NOT_FOUND);
     outcome_drop(kept);
     outcome_drop(anew);
     job_show_clear(&now);
@@ -307,33 +316,40 @@ static void names_are_resolved_and_all_faults_told(void **state) {
     char text[1024];
     scene_text(text, 0.015, 1, "spnge");
     problem_clear(&problem);
-    assert_int_equal(intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
-                     STATUS_INVALID);
+    assert_int_equal(
+        intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+        STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
     assert_string_equal(problem.faults[0].did_you_mean, "sponge");
     simulation_clear(&simulation);
     warnings_clear(&warnings);
     static const struct {
-        const char *buffer, *pointer;
+        const char *buffer, *pointer, *did_you_mean;
     } cases[] = {
-        {"{\"material\": \"sponge\", \"restitution\": 0.7}", "/dampers/0/buffer/restitution"},
-        {"\"sponge@9\"", "/dampers/0/buffer"},
-        {"\"sponge@x\"", "/dampers/0/buffer"},
-        {"\"\"", "/dampers/0/buffer"},
+        {"{\"material\": \"sponge\", \"restitution\": 0.7}", "/dampers/0/buffer/restitution", ""},
+        {"\"sponge@9\"", "/dampers/0/buffer", "sponge@1"},
+        {"\"soft_ruber@9\"", "/dampers/0/buffer", "soft_rubber"},
+        {"\"sponge@x\"", "/dampers/0/buffer", "sponge"},
+        {"\"\"", "/dampers/0/buffer", ""},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         snprintf(text, sizeof text,
-                 "{\"structure\": {\"mass\": -1, \"stiffness\": 865}, \"duration\": 1, \"sample_rate\": 100,"
+                 "{\"structure\": {\"mass\": -1, \"stiffness\": 865}, \"duration\": 1, "
+                 "\"sample_rate\": 100,"
                  " \"dampers\": [{\"mass\": 0.1, \"clearance\": 0.01, \"buffer\": %s}]}",
                  cases[i].buffer);
         problem_clear(&problem);
-        assert_int_equal(intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
-                         STATUS_INVALID);
+        assert_int_equal(
+            intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+            STATUS_INVALID);
         assert_true(problem_concerns(&problem, "/structure/mass"));
         if (problem.count != 2 || !problem_concerns(&problem, cases[i].pointer))
-            fail_msg("%s: %zu faults, %s: %s", cases[i].buffer, problem.count, problem.faults[0].pointer,
-                     problem.faults[0].detail);
+            fail_msg("%s: %zu faults, %s: %s", cases[i].buffer, problem.count,
+                     problem.faults[0].pointer, problem.faults[0].detail);
+        for (size_t k = 0; k < problem.count; k++)
+            if (strncmp(problem.faults[k].pointer, "/dampers", 8) == 0)
+                assert_string_equal(problem.faults[k].did_you_mean, cases[i].did_you_mean);
         simulation_clear(&simulation);
         warnings_clear(&warnings);
     }
@@ -356,7 +372,8 @@ static void *hammer(void *context) {
         char text[1024];
         Job *job = NULL, *gone = NULL;
         Outcome *outcome = NULL;
-        scene_text(text, 0.001 * (1 + rand_r(&own->seed) % 12), 5 + rand_r(&own->seed) % 3, "aluminium");
+        scene_text(text, 0.001 * (1 + rand_r(&own->seed) % 12), 5 + rand_r(&own->seed) % 3,
+                   "aluminium");
         problem_clear(fault);
         if (intake_submit(own->room->intake, text, strlen(text), &job, fault) != STATUS_OK)
             continue;
@@ -402,6 +419,141 @@ static void many_clients_at_once_leave_nothing_behind(void **state) {
     room_end(&room);
 }
 
+// A limit on file sizes stands in for a full disk.
+static void limit_files(rlim_t size) {
+    struct rlimit limit;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    limit.rlim_cur = size;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+}
+
+static void a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    signal(SIGXFSZ, SIG_IGN);
+    Job *job = submit(&room, 0.015, 2000);
+    limit_files(1);
+    wait_for(job);
+    limit_files(RLIM_INFINITY);
+    JobShow failed = show(job);
+    assert_int_equal(failed.state, JOB_FAILED);
+    assert_non_null(failed.problem);
+    assert_false(store_result_exists(room.store, failed.result));
+    job_drop(job);
+
+    Job *again = submit(&room, 0.015, 2000);
+    assert_false(job_is_finished(again));
+    wait_for(again);
+    JobShow second = show(again);
+    assert_int_equal(second.state, JOB_SUCCESSFUL);
+    assert_true(store_result_exists(room.store, second.result));
+    job_show_clear(&second);
+    job_drop(again);
+
+    room_close(&room);
+    room_open(&room);
+    assert_int_equal(intake_find(room.intake, failed.id, &job, &problem), STATUS_OK);
+    wait_for(job);
+    second = show(job);
+    assert_int_equal(second.state, JOB_SUCCESSFUL);
+    job_show_clear(&second);
+    job_show_clear(&failed);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void a_job_may_outlive_the_intake(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    static atomic_int wakes;
+    const Waker waker = {&wakes, note_wake};
+    Job *running = submit(&room, 0.015, 20000), *queued = submit(&room, 0.016, 20000);
+    assert_true(job_watch(queued, &waker));
+    room_close(&room);
+    JobShow now = show(queued);
+    assert_int_equal(now.state, JOB_ACCEPTED);
+    assert_false(job_is_finished(running));
+    job_unwatch(queued, &waker);
+    job_show_clear(&now);
+    job_drop(running);
+    job_drop(queued);
+    room_open(&room);
+    room_end(&room);
+}
+
+static void *dismiss_it(void *context) {
+    void **both = context;
+    Job *dismissed = NULL;
+    const Status status = intake_dismiss(both[0], both[1], &dismissed, NULL);
+    job_drop(dismissed);
+    return status == STATUS_OK ? both : NULL;
+}
+
+static void a_dismissed_job_is_dismissed_for_all_before_the_store_has_it(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    Job *blocker = submit(&room, 0.001, 20000), *job = submit(&room, 0.015, 20000), *found = NULL;
+    JobShow now = show(job);
+    char path[128];
+    Database *other;
+    pthread_t thread;
+    void *returned;
+    snprintf(path, sizeof path, "%s/impactd.db", room.directory);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    assert_int_equal(pthread_create(&thread, NULL, dismiss_it, (void *[]){room.intake, now.id}), 0);
+    wait_for(job);
+    assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_true(job_is_finished(found));
+    job_drop(found);
+    assert_int_equal(intake_dismiss(room.intake, now.id, &found, &problem), STATUS_CONFLICT);
+    assert_non_null(strstr(problem.detail, "dismissed already"));
+    assert_int_equal(database_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    database_close(other);
+    pthread_join(thread, &returned);
+    assert_non_null(returned);
+    assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_OK);
+    assert_true(job_is_finished(found));
+    job_drop(found);
+    job_show_clear(&now);
+    job_drop(job);
+    job_drop(blocker);
+    room_end(&room);
+}
+
+static void waiting_scenes_have_a_limit_in_bytes(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    room_close(&room);
+    room.settings.queue_bytes = 2000;
+    room_open(&room);
+    Job *first = submit(&room, 0.015, 20000), *second = NULL, *gone = NULL;
+    char text[1024];
+    Status status = STATUS_OK;
+    int accepted = 1;
+    for (; accepted < 10 && status == STATUS_OK; accepted++) {
+        scene_text(text, 0.001 * accepted, 20000, "sponge");
+        problem_clear(&problem);
+        status = intake_submit(room.intake, text, strlen(text), &second, &problem);
+        if (status == STATUS_OK && accepted > 1)
+            job_drop(second);
+        else if (status == STATUS_OK)
+            gone = second;
+    }
+    assert_int_equal(status, STATUS_BUSY);
+    assert_true(accepted > 2 && accepted < 8);
+    // What leaves makes room.
+    JobShow now = show(gone);
+    job_drop(gone);
+    assert_int_equal(intake_dismiss(room.intake, now.id, &gone, &problem), STATUS_OK);
+    job_drop(gone);
+    job_show_clear(&now);
+    assert_int_equal(intake_submit(room.intake, text, strlen(text), &second, &problem), STATUS_OK);
+    job_drop(second);
+    job_drop(first);
+    room_end(&room);
+}
+
 int main(void) {
     fourier_start();
     const struct CMUnitTest tests[] = {
@@ -415,6 +567,10 @@ int main(void) {
         cmocka_unit_test(a_failing_job_says_why),
         cmocka_unit_test(names_are_resolved_and_all_faults_told),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
+        cmocka_unit_test(a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost),
+        cmocka_unit_test(a_job_may_outlive_the_intake),
+        cmocka_unit_test(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it),
+        cmocka_unit_test(waiting_scenes_have_a_limit_in_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
