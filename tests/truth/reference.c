@@ -50,10 +50,10 @@ __extension__ typedef __float128 Quad;
 #define CLOSING 1e-14
 #include "tests/truth/reference_walk.h"
 
-void reference_quad(const ReferenceScene *scene, double most, ReferenceAnswer *answer) {
-    quad_run(scene, most, answer);
+void reference_quad(const ReferenceScene *scene, double stride, double most, ReferenceAnswer *answer) {
+    quad_run(scene, stride, most, answer);
 }
 
-void reference_double(const ReferenceScene *scene, double most, ReferenceAnswer *answer) {
-    plain_run(scene, most, answer);
+void reference_double(const ReferenceScene *scene, double stride, double most, ReferenceAnswer *answer) {
+    plain_run(scene, stride, most, answer);
 }

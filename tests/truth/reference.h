@@ -52,9 +52,10 @@ typedef struct ReferenceAnswer {
     double steps;   // series made
 } ReferenceAnswer;
 
-// Both are cleared by reference_clear. A run of more than `most` steps ends unfinished.
-void reference_quad(const ReferenceScene *scene, double most, ReferenceAnswer *answer);
-void reference_double(const ReferenceScene *scene, double most, ReferenceAnswer *answer);
+// Both are cleared by reference_clear. A run of more than `most` steps ends unfinished. `stride` within (0, 1] is the
+// longest sub-step as an angle of the fastest motion: other strides, other roundings.
+void reference_quad(const ReferenceScene *scene, double stride, double most, ReferenceAnswer *answer);
+void reference_double(const ReferenceScene *scene, double stride, double most, ReferenceAnswer *answer);
 void reference_clear(ReferenceAnswer *answer);
 
 #endif

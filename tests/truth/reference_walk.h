@@ -463,7 +463,7 @@ static bool NAME(begin)(NAME(Walk) *walk, real value, real slope) {
     return true;
 }
 
-static void NAME(run)(const ReferenceScene *scene, double most, ReferenceAnswer *answer) {
+static void NAME(run)(const ReferenceScene *scene, double stride, double most, ReferenceAnswer *answer) {
     NAME(Walk) walk;
     NAME(Series) series;
     memset(answer, 0, sizeof *answer);
@@ -474,21 +474,23 @@ static void NAME(run)(const ReferenceScene *scene, double most, ReferenceAnswer 
     NAME(start)(&walk, scene, answer);
     real value, slope;
     const real rate = scene->sample_rate;
-    while (walk.sample < answer->count) {
-        const real kink = NAME(base)(&walk, &value, &slope), next = (real)walk.sample / rate;
-        if (walk.t >= next) {
+    const real last = scene->duration;
+    while (walk.sample < answer->count || walk.t < last) {
+        const real kink = NAME(base)(&walk, &value, &slope);
+        real target = walk.sample < answer->count ? (real)walk.sample / rate : last;
+        if (walk.t >= target) {
             // What happens at the start comes before the first sample, which is right-continuous.
             if (walk.sample == 0 && !NAME(begin)(&walk, value, slope))
                 return;
             NAME(sample)(&walk);
             continue;
         }
-        const real target = kink < next ? kink : next;
+        target = kink < target ? kink : target;
         const real fastest = walk.phase == NAME(CONTACT) ? walk.rate[walk.side] : walk.flight_rate;
         real h = target - walk.t;
-        const bool is_cut = h * fastest > 1;
+        const bool is_cut = h * fastest > (real)stride;
         if (is_cut)
-            h = 1 / fastest;
+            h = (real)stride / fastest;
         NAME(series)(&walk, h, value, slope, h * fastest, &series);
         bool is_event;
         if (!NAME(stretch)(&walk, &series, &is_event) || ++answer->steps > most)

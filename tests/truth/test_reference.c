@@ -21,11 +21,13 @@ static size_t scenes = 60;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 
-static const double STEPS_MOST = 40000;
+enum { DOUBLES = 3 };  // of other sub-steps, for one may be right by luck
+static const double STEPS_MOST = 25000;
 static const double CHAOTIC = 1e-8;   // a double that misses more cannot be judged by
 static const double FACTOR = 100;     // of what that double misses
 static const double FLOOR = 1e-12;
 static const double AUDIBLE = 1e-9;   // of the largest approach speed: impacts below are not compared
+static const double SILENT = 1e-13;   // of the free mass's largest speed: neither are those
 
 // What is compared, each as an error relative to the run's own scale.
 typedef enum Metric {
@@ -82,9 +84,11 @@ static void scene_draw(ReferenceScene *scene, uint64_t number) {
     random_state = number * 0x2545f4914f6cdd1dU;
     const double reach = scattered(1e-3, 0.1), omega = TURN * scattered(0.3, 15);
     scene->mass = scattered(0.1, 100);
-    scene->stiffness = chance(0.05) ? 0 : scene->mass * omega * omega;
+    scene->stiffness = chance(0.07) ? 0 : scene->mass * omega * omega;
     scene->damping = 2 * scene->mass * omega *
-                     (chance(0.1) ? 0 : chance(0.05) ? uniform(1, 3) : scattered(1e-3, 0.2));
+                     (chance(scene->stiffness == 0 ? 0.5 : 0.1) ? 0
+                      : chance(0.05)                            ? uniform(1, 3)
+                                                                : scattered(1e-3, 0.2));
     scene->damper_mass = scene->mass * scattered(1e-3, 10);
     scene->clearance = reach * uniform(0.05, 2);
     scene->is_impulse = chance(0.4);
@@ -235,11 +239,12 @@ static double largest(const double *values, size_t count) {
 
 // Scales of a run.
 typedef struct Scale {
+    double least;  // approach speed that counts
     double speed, peak, impulse, lost, length, rest_peak;
 } Scale;
 
 static Scale scale_of(const ReferenceScene *scene, const ReferenceAnswer *answer) {
-    Scale scale = {0, 0, 0, 0, scene->clearance, 0};
+    Scale scale = {0, 0, 0, 0, 0, scene->clearance, 0};
     scale.length = fmax(scale.length, largest(answer->channels[REFERENCE_DISPLACEMENT], answer->count));
     for (size_t i = 0; i < answer->impact_count; i++) {
         const ReferenceImpact *impact = &answer->impacts[i];
@@ -252,6 +257,8 @@ static Scale scale_of(const ReferenceScene *scene, const ReferenceAnswer *answer
         scale.impulse = fmax(scale.impulse, impact->impulse);
         scale.lost = fmax(scale.lost, impact->lost);
     }
+    scale.least = fmax(AUDIBLE * scale.speed,
+                       SILENT * largest(answer->channels[REFERENCE_DAMPER_VELOCITY], answer->count));
     return scale;
 }
 
@@ -286,12 +293,12 @@ static void compare_impacts(const ReferenceAnswer *answer, const ReferenceAnswer
                             Misses *misses) {
     size_t i = 0, j = 0;
     for (size_t number = 0;; number++) {
-        const ReferenceImpact *want = next_impact(truth, &j, false, AUDIBLE * scale->speed);
-        const ReferenceImpact *have = next_impact(answer, &i, false, 0.99 * AUDIBLE * scale->speed);
+        const ReferenceImpact *want = next_impact(truth, &j, false, scale->least);
+        const ReferenceImpact *have = next_impact(answer, &i, false, 0.99 * scale->least);
         // Speeds that lie astride the threshold.
         while (have != NULL && (want == NULL || have->start < want->start - 1e-9) &&
-               have->approach < 1.01 * AUDIBLE * scale->speed)
-            have = next_impact(answer, &i, false, 0.99 * AUDIBLE * scale->speed);
+               have->approach < 1.01 * scale->least)
+            have = next_impact(answer, &i, false, 0.99 * scale->least);
         if (want == NULL && have == NULL)
             break;
         if (want == NULL || have == NULL || want->side != have->side ||
@@ -375,7 +382,7 @@ typedef struct Tally {
 
 static void fault(Tally *tally, bool *is_told, const ReferenceScene *scene, size_t number, const char *text) {
     if (!*is_told) {
-        printf("scene %zu of seed %llu:\n", number, (unsigned long long)seed);
+        printf("scene %zu (seed %llu):\n", number, (unsigned long long)seed);
         scene_print(scene);
         tally->failed++;
     }
@@ -383,32 +390,39 @@ static void fault(Tally *tally, bool *is_told, const ReferenceScene *scene, size
     printf("  %s\n", text);
 }
 
-static void judge(size_t number, Tally *tally) {
-    ReferenceScene scene;
-    scene_draw(&scene, seed * 1000003 + number);
-    ReferenceAnswer quad, plain, solved;
+static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
+    ReferenceAnswer quad, plain[DOUBLES], solved;
     memset(&solved, 0, sizeof solved);
     memset(&quad, 0, sizeof quad);
     bool is_told = false;
     char text[400];
     const clock_t before = clock();
-    reference_double(&scene, STEPS_MOST, &plain);
-    if (plain.is_whole)
-        reference_quad(&scene, STEPS_MOST, &quad);
+    for (int i = 0; i < DOUBLES; i++)
+        reference_double(scene, 1 - 0.2 * i, 2 * STEPS_MOST, &plain[i]);
+    if (plain[0].is_whole)
+        reference_quad(scene, 1, STEPS_MOST, &quad);
     tally->quad_seconds += (double)(clock() - before) / CLOCKS_PER_SEC;
-    Outcome *outcome = solver_run(&scene);
+    Outcome *outcome = solver_run(scene);
     if (outcome == NULL)
-        fault(tally, &is_told, &scene, number, "the solver gave up");
+        fault(tally, &is_told, scene, number, "the solver gave up");
     else if (!(outcome->summary.energy_residual < 1e-9)) {
         snprintf(text, sizeof text, "energy residual %g", outcome->summary.energy_residual);
-        fault(tally, &is_told, &scene, number, text);
+        fault(tally, &is_told, scene, number, text);
     }
     if (!quad.is_whole)
         tally->heavy++;
     else if (outcome != NULL && answer_of(outcome, &solved)) {
         Misses by_double, by_solver;
-        compare(&scene, &plain, &quad, &by_double);
-        compare(&scene, &solved, &quad, &by_solver);
+        compare(scene, &plain[0], &quad, &by_double);
+        for (int i = 1; i < DOUBLES; i++) {
+            Misses other;
+            compare(scene, &plain[i], &quad, &other);
+            for (int k = 0; k < METRIC_COUNT; k++)
+                by_double.of[k] = fmax(by_double.of[k], other.of[k]);
+            if (!other.is_same)
+                by_double = other;
+        }
+        compare(scene, &solved, &quad, &by_solver);
         if (!by_double.is_same || by_double.of[METRIC_DISPLACEMENT] > CHAOTIC || by_double.of[METRIC_START] > CHAOTIC) {
             tally->chaotic++;
             if (is_verbose)
@@ -420,7 +434,7 @@ static void judge(size_t number, Tally *tally) {
             for (size_t i = 0; i < quad.impact_count; i++)
                 tally->rests += quad.impacts[i].is_resting;
             if (!by_solver.is_same)
-                fault(tally, &is_told, &scene, number, by_solver.why);
+                fault(tally, &is_told, scene, number, by_solver.why);
             for (int i = 0; i < METRIC_COUNT && by_solver.is_same; i++) {
                 const double limit = fmax(FACTOR * by_double.of[i], i <= METRIC_START ? FLOOR : 100 * FLOOR);
                 if (i <= METRIC_START)
@@ -428,29 +442,111 @@ static void judge(size_t number, Tally *tally) {
                 if (!(by_solver.of[i] <= limit)) {
                     snprintf(text, sizeof text, "%s misses %g, a plain double %g", metric_names[i], by_solver.of[i],
                              by_double.of[i]);
-                    fault(tally, &is_told, &scene, number, text);
+                    fault(tally, &is_told, scene, number, text);
                 }
             }
         }
     }
     outcome_drop(outcome);
     reference_clear(&quad);
-    reference_clear(&plain);
+    for (int i = 0; i < DOUBLES; i++)
+        reference_clear(&plain[i]);
     reference_clear(&solved);
-    free((void *)(uintptr_t)scene.samples);
 }
 
 static void random_scenes_agree_with_quad_precision(void **state) {
     (void)state;
     Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
-    for (size_t i = 0; i < scenes; i++)
-        judge(i, &tally);
+    for (size_t i = 0; i < scenes; i++) {
+        ReferenceScene scene;
+        scene_draw(&scene, seed * 1000003 + i);
+        judge(&scene, i, &tally);
+        free((void *)(uintptr_t)scene.samples);
+    }
     printf("%zu scenes: %zu judged with %zu impacts and %zu rests, %zu too chaotic, %zu too heavy, %zu failed; "
            "worst at %.2g of the limit; %.1f s in the reference\n",
            scenes, tally.judged, tally.impacts, tally.rests, tally.chaotic, tally.heavy, tally.failed,
            tally.worst_ratio, tally.quad_seconds);
     assert_true(tally.failed == 0);
     assert_true(2 * tally.judged > scenes);
+}
+
+// Scenes in which something is exactly 0, or happens within one sample, one arc or one unit of the clock.
+static void awkward_scenes_agree_with_quad_precision(void **state) {
+    (void)state;
+    const ReferenceScene usual = {.mass = 1, .damper_mass = 0.1, .clearance = 0.01, .restitution = {0.5, 0.5},
+                                  .contact_time = {1e-3, 1e-3}, .duration = 3, .sample_rate = 1000};
+    ReferenceScene awkward[12];
+    size_t count = 0;
+    // Nothing holds the structure: it pushes no stop, and -0 is not a push either.
+    ReferenceScene scene = usual;
+    scene.is_impulse = true;
+    scene.relative_velocity = 0.1;
+    awkward[count++] = scene;
+    scene.base = REFERENCE_SINE;
+    scene.frequency = scene.amplitude = 1;
+    awkward[count++] = scene;
+    scene.is_impulse = false;
+    awkward[count++] = scene;
+    // Chatter within one long sample interval.
+    scene = usual;
+    scene.is_impulse = true;
+    scene.stiffness = 1e4;
+    scene.damping = 10;
+    scene.position = 0.0049;
+    scene.restitution[0] = scene.restitution[1] = 0.97;
+    scene.base = REFERENCE_SINE;
+    scene.frequency = 0.1;
+    scene.amplitude = 5;
+    scene.sample_rate = 1;
+    awkward[count++] = scene;
+    // Leaving its stop after a rest, the mass is back before half a millisecond is over.
+    awkward[count++] = (ReferenceScene){
+        .mass = 0.46701926499704804, .stiffness = 1924.7210902027753, .damping = 0.060269535257521302,
+        .damper_mass = 0.2921284657236275, .clearance = 0.015945329076344859, .position = -1.217937248267568e-05,
+        .relative_velocity = -2.3701621139095943, .is_impulse = true,
+        .restitution = {0.88196233379853894, 0.81533580694737784}, .contact_time = {1e-3, 1e-3},
+        .base = REFERENCE_SINE, .frequency = 0.20463130410327543, .amplitude = 67.171029374396454,
+        .is_amplitude_displacement = true, .duration = 3, .sample_rate = 333};
+    // A structure with damping alone, a base whose samples fall between the output's.
+    static const double samples[] = {0, 0.5, -0.3, 0.8, -0.6, 0.2, 0.4, -0.7, 0.1, 0.9, -0.8, 0.3, 0.6};
+    scene = usual;
+    scene.damping = 0.025;
+    scene.clearance = 1;
+    scene.base = REFERENCE_RECORD;
+    scene.samples = samples;
+    scene.sample_count = COUNT(samples);
+    scene.interval = 0.11;
+    scene.sample_rate = 20;
+    awkward[count++] = scene;
+    // No clearance; a start at a stop.
+    scene = usual;
+    scene.stiffness = 600;
+    scene.damping = 0.5;
+    scene.displacement = 0.01;
+    scene.position = 0.005;
+    awkward[count++] = scene;
+    scene.is_impulse = true;
+    awkward[count++] = scene;
+    scene.clearance = scene.position = 0;
+    awkward[count++] = scene;
+    scene.is_impulse = false;
+    awkward[count++] = scene;
+    scene.base = REFERENCE_SINE;
+    scene.displacement = 0;
+    scene.frequency = scene.amplitude = 3;
+    awkward[count++] = scene;
+    // A sine above the sample rate.
+    scene.frequency = 700;
+    scene.amplitude = 300;
+    scene.clearance = 1e-4;
+    scene.sample_rate = 100;
+    awkward[count++] = scene;
+    Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
+    for (size_t i = 0; i < count; i++)
+        judge(&awkward[i], i, &tally);
+    assert_true(tally.failed == 0);
+    assert_true(tally.judged == count);
 }
 
 int main(int argc, char **argv) {
@@ -460,6 +556,7 @@ int main(int argc, char **argv) {
         seed = strtoull(argv[2], NULL, 10);
     is_verbose = argc > 3;
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(awkward_scenes_agree_with_quad_precision),
         cmocka_unit_test(random_scenes_agree_with_quad_precision),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
