@@ -7,10 +7,11 @@
 
 #include <math.h>
 
-// Smallest degree n with rho^n / n! below rounding, at least 4: a base's slope reaches r at t^5.
+// Smallest degree n with 3! rho^(n - 3) / n! below rounding, since a base's slope enters x at t^3
+// only; at least 5.
 static size_t degree_for(double rho) {
-    size_t degree = 1;
-    double term = rho;
+    size_t degree = 3;
+    double term = 1;
     while ((term > 4e-18 || degree < 5) && degree < ROOT_DEGREE)
         term *= rho / (double)++degree;
     return degree;

@@ -46,12 +46,13 @@ static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integ
                                            : 0);
 }
 
-// After an arc of free flight: has the gap opened beyond rounding yet?
-static void leave(Exact *exact) {
+// After an arc of free flight: has the gap opened beyond rounding yet? Where the arc ends by
+// closing it, the speed stays.
+static void leave(Exact *exact, bool is_event) {
     const double sign = exact_sign((Side)exact->origin);
-    if (sign * exact->state.r < 0 && sign * exact->state.w < 0)
+    if (sign * exact->state.r < 0)
         exact->is_leaving = false;
-    else
+    else if (!is_event || sign * exact->state.w < 0)
         exact->state.r = exact->state.w = 0;
 }
 
@@ -123,9 +124,10 @@ static Status advance(Exact *exact, double length) {
         exact->offset += arc.length;
         exact->still_events = 0;
         if (exact->is_leaving && exact->phase == FLIGHT)
-            leave(exact);
+            leave(exact, is_event);
     }
     if (is_event) {
+        exact->events++;
         if (++exact->still_events > STILL_EVENTS)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "more than %d contact events at one instant, t = %.17g s",
@@ -174,9 +176,9 @@ static Status cross(Exact *exact, double length) {
     const double clock = 2 * DBL_EPSILON * length;
     while (length - exact->offset > clock) {
         const double before = exact->offset;
-        const size_t events = exact->still_events;
+        const size_t events = exact->events;
         TRY(advance(exact, length - exact->offset));
-        if (exact->offset == before && exact->still_events == events)
+        if (exact->offset == before && exact->events == events)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "the contact is too stiff to be followed: at t = %.6g s a step of "
                                "1/%.6g s is below "

@@ -50,7 +50,9 @@ static void bounce(Exact *exact, Side side) {
     const double pull = sign * exact_push(exact);
     const double left = 2 * e * approach / (pull * (1 - e));
     const double clock = 4 * DBL_EPSILON * fmax(exact_time(exact), exact->interval);
-    if (pull >= 0 && (e * approach == 0 || left <= clock))
+    // Without a pull, be it 0 or -0, only a mass without speed rests; left is not a number where e
+    // = 1 and it has none.
+    if (pull > 0 ? !(left > clock) : pull == 0 && e * approach == 0)
         begin_rest(exact, side);
 }
 

@@ -22,7 +22,8 @@ double exact_time(const Exact *exact) {
 }
 
 double exact_effective_mass(const Exact *exact) {
-    return exact->plan->damper_mass * (1 - exact->resting.share);
+    return exact->plan->mass *
+           exact->resting.share; // 1 - share would lose digits where m is the larger
 }
 
 // s = (C v + K x) / M: what pushes the free mass to the right, seen from the structure [m/s^2].

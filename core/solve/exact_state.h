@@ -35,6 +35,7 @@ typedef struct Exact {
     Hold *holds[2];      // by Side; made when a contact first lasts long
     size_t contact_arcs; // since it began
     size_t arcs;         // since the watch was asked
+    size_t events;       // all so far
     size_t still_events; // in a row, without time passing
 } Exact;
 

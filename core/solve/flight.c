@@ -46,6 +46,9 @@ void flight_make(Flight *flight, const Motion *motion, double base_omega, double
     }
     long double transition[SIZE * SIZE], forms[2][SIZE * SIZE];
     exponential(system, SIZE, length, transition);
+    // What x and v gain: rounding 1 - small would err the same way in every step.
+    transition[X * SIZE + X] -= 1;
+    transition[V * SIZE + V] -= 1;
     pick_row(transition, X, flight->x);
     pick_row(transition, V, flight->v);
     pick_row(transition, R, flight->r);

@@ -33,8 +33,10 @@ static inline State flight_step(const Flight *flight, const State *start, const 
                                 ArcIntegrals *integrals) {
     const double y[4] = {start->x, start->v, slice->value, slice->slope};
     const State end = {
-        flight->x[0] * y[0] + flight->x[1] * y[1] + (flight->x[2] * y[2] + flight->x[3] * y[3]),
-        flight->v[0] * y[0] + flight->v[1] * y[1] + (flight->v[2] * y[2] + flight->v[3] * y[3]),
+        start->x + (flight->x[0] * y[0] + flight->x[1] * y[1] +
+                    (flight->x[2] * y[2] + flight->x[3] * y[3])),
+        start->v + (flight->v[0] * y[0] + flight->v[1] * y[1] +
+                    (flight->v[2] * y[2] + flight->v[3] * y[3])),
         start->r + (flight->length * start->w + (flight->r[0] * y[0] + flight->r[1] * y[1] +
                                                  (flight->r[2] * y[2] + flight->r[3] * y[3]))),
         start->w + (flight->w[0] * y[0] + flight->w[1] * y[1] +

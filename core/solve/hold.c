@@ -16,6 +16,9 @@
 enum { X, V, R, W, A, B, SUM_A, SUM_N, SIZE };
 enum { DECOUPLE_STEPS = 60, SEPARATION = 30 };
 
+// Of |n|: what a fast part may still add to a peak without being looked at.
+static const double ripple_most = 1e-12;
+
 typedef double Square[2][2];
 
 static void multiply(Square a, Square b, Square out) {
@@ -75,9 +78,11 @@ static bool decouple(Hold *hold) {
         add(next, 1, A12, next);
         multiply(next, inverse, hold->H);
     }
-    // G' = fast G + a_g L(:, 2): it follows the base like -inverse L(:, 2) a_g.
+    // G' = fast G + a_g L(:, 2): it follows the base like -inverse L(:, 2) a_g, and so on.
     for (int i = 0; i < 2; i++)
         hold->quasi[i] = inverse[i][0] * hold->L[0][1] + inverse[i][1] * hold->L[1][1];
+    for (int i = 0; i < 2; i++)
+        hold->quasi_rate[i] = inverse[i][0] * hold->quasi[0] + inverse[i][1] * hold->quasi[1];
     hold->slow_growth = sqrt(m->omega2) + m->damping + fabs(part[1][1]);
     double sum = 0;
     for (int i = 0; i < 2; i++)
@@ -181,48 +186,72 @@ static State transit(const HoldLevel *level, const State *start, const Slice *sl
     return (State){end[0], end[1], end[2], end[3]};
 }
 
+// a_g and its first two derivatives over a stretch: a_g and a_g' at its start, and bounds of all.
+typedef struct BaseBounds {
+    double a, rate;
+    double a_most, rate_most, bend_most;
+} BaseBounds;
+
+static BaseBounds base_bounds(const Slice *slice, double length) {
+    const double omega = slice->omega;
+    if (omega > 0) {
+        const double most = fabs(slice->value) + fabs(slice->slope);
+        return (BaseBounds){slice->value, omega * slice->slope, most, omega * most,
+                            omega * omega * most};
+    }
+    const double end = slice->value + slice->slope * length;
+    return (BaseBounds){slice->value, slice->slope, fmax(fabs(slice->value), fabs(end)),
+                        fabs(slice->slope), 0};
+}
+
 // What bounds need of a state: the slow coordinates and the size of the fast ones.
 typedef struct Split {
     double Z[2];
-    double fast; // norm of G + quasi a_g
+    double fast; // norm of G + quasi a_g + quasi_rate a_g'
 } Split;
 
-static Split split(const Hold *hold, const State *state, double a) {
+static Split split(const Hold *hold, const State *state, const BaseBounds *base) {
     const double S[2] = {state->x + hold->motion.share * state->r,
                          state->v + hold->motion.share * state->w};
     const double F[2] = {state->r, state->w};
-    double G[2];
+    double G[2], own[2];
     Split out;
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
         G[i] = F[i] - hold->L[i][0] * S[0] - hold->L[i][1] * S[1];
+        own[i] = G[i] + hold->quasi[i] * base->a + hold->quasi_rate[i] * base->rate;
+    }
     for (int i = 0; i < 2; i++)
         out.Z[i] = S[i] - hold->H[i][0] * G[0] - hold->H[i][1] * G[1];
-    out.fast = hypot(G[0] + hold->quasi[0] * a, (G[1] + hold->quasi[1] * a) / hold->fast_omega);
+    out.fast = hypot(own[0], own[1] / hold->fast_omega);
     return out;
 }
 
-// Whether contact surely lasts over `length`, and the most |n| can be.
-static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, double length,
-                         double sign, double *force_most) {
+// What can be said of r and n over a stretch of contact.
+typedef struct Foresight {
+    bool lasts;        // surely
+    double force_most; // |n| is not larger
+    double ripple;     // the fast part's share of n is not larger
+} Foresight;
+
+static Foresight foresee(const Hold *hold, const Split *at, const BaseBounds *base, double length,
+                         double sign) {
     const Motion *m = &hold->motion;
     const double omega = sqrt(m->omega2);
-    // Bounds of a_g and a_g' over the stretch.
-    const double a_most =
-        slice->omega > 0 ? fabs(slice->value) + fabs(slice->slope)
-                         : fmax(fabs(slice->value), fabs(slice->value + slice->slope * length));
-    const double a_rate = slice->omega > 0 ? slice->omega * a_most : fabs(slice->slope);
-    // r = L1 Z + (e1 + L1 H) G with G = fast - quasi a_g.
+    // r = L1 Z + (e1 + L1 H) G with G = fast - quasi a_g - quasi_rate a_g'.
     const double *L1 = hold->L[0];
     const double mix[2] = {1 + L1[0] * hold->H[0][0] + L1[1] * hold->H[1][0],
                            L1[0] * hold->H[0][1] + L1[1] * hold->H[1][1]};
     const double kappa = mix[0] * hold->quasi[0] + mix[1] * hold->quasi[1];
-    const double mix_norm = hypot(mix[0], mix[1] * hold->fast_omega);
-    const double quasi_norm = hypot(hold->quasi[0], hold->quasi[1] / hold->fast_omega);
-    const double fast = (at->fast + length * quasi_norm * a_rate) * exp(hold->fast_growth * length);
+    const double kappa_rate = mix[0] * hold->quasi_rate[0] + mix[1] * hold->quasi_rate[1];
+    const double drive = hypot(hold->quasi_rate[0], hold->quasi_rate[1] / hold->fast_omega);
+    const double fast = hypot(mix[0], mix[1] * hold->fast_omega) *
+                        (at->fast + length * drive * base->bend_most) *
+                        exp(hold->fast_growth * length);
     // The slow part at the start, and the most it can change: Omega |Z1| + |Z2| bounds what Z
     // becomes.
-    const double slow = L1[0] * at->Z[0] + L1[1] * at->Z[1] - kappa * slice->value;
-    const double reach = (omega * fabs(at->Z[0]) + fabs(at->Z[1]) + length * a_most) *
+    const double slow =
+        L1[0] * at->Z[0] + L1[1] * at->Z[1] - kappa * base->a - kappa_rate * base->rate;
+    const double reach = (omega * fabs(at->Z[0]) + fabs(at->Z[1]) + length * base->a_most) *
                          exp(hold->slow_growth * length);
     const double slope1 = L1[0] * hold->slow[0][0] + L1[1] * hold->slow[1][0];
     const double slope2 = L1[0] * hold->slow[0][1] + L1[1] * hold->slow[1][1];
@@ -231,38 +260,43 @@ static bool surely_lasts(const Hold *hold, const Split *at, const Slice *slice, 
                          L1[1] * (hold->H[1][0] * hold->L[0][1] + hold->H[1][1] * hold->L[1][1]);
     const double change =
         length * ((omega > 0 ? fabs(slope1) / omega : 0) * reach + fabs(slope2) * reach +
-                  fabs(entry) * a_most + fabs(kappa) * a_rate);
-    *force_most = m->contact_omega2 * (fabs(slow) + change + mix_norm * fast) +
-                  m->contact_damping * (change / length + mix_norm * fast * hold->fast_omega);
-    return sign * slow - change > mix_norm * fast;
+                  fabs(entry) * base->a_most + fabs(kappa) * base->rate_most +
+                  fabs(kappa_rate) * base->bend_most);
+    const double ripple = (m->contact_omega2 + m->contact_damping * hold->fast_omega) * fast;
+    return (Foresight){.lasts = sign * slow - change > fast,
+                       .force_most = m->contact_omega2 * (fabs(slow) + change) +
+                                     m->contact_damping * change / length + ripple,
+                       .ripple = ripple};
+}
+
+// How fast n changes [m/s^3].
+static double force_rate(const Motion *motion, const State *state) {
+    const double slope =
+        motion->damping * state->v + motion->omega2 * state->x - hold_force(motion, state); // of w
+    return motion->contact_damping * slope + motion->contact_omega2 * state->w;
 }
 
 const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *slice, double length,
                            double sign, double peak, State *end) {
     if (!hold->is_usable || hold->count == 0)
         return NULL;
-    const Split at = split(hold, start, slice->value);
-    const double n = hold_force(&hold->motion, start);
-    const double slope =
-        hold->motion.damping * start->v + hold->motion.omega2 * start->x - n; // of w
-    const double rise =
-        hold->motion.contact_damping * slope + hold->motion.contact_omega2 * start->w;
     for (size_t i = 0; i < hold->count; i++) {
         const HoldLevel *level = &hold->levels[i];
-        double force_most;
-        if (level->length > length * (1 + 1e-15) ||
-            !surely_lasts(hold, &at, slice, level->length, sign, &force_most))
+        if (level->length > length * (1 + 1e-15))
+            continue;
+        const BaseBounds base = base_bounds(slice, level->length);
+        const Split at = split(hold, start, &base);
+        const Foresight seen = foresee(hold, &at, &base, level->length, sign);
+        if (!seen.lasts)
             continue;
         *end = transit(level, start, slice);
-        if (force_most <= peak)
+        if (seen.force_most <= peak)
             return level;
-        // A new peak may lie inside unless |n| only rises or only falls.
-        const double n_end = hold_force(&hold->motion, end);
-        const double slope_end =
-            hold->motion.damping * end->v + hold->motion.omega2 * end->x - n_end;
-        const double rise_end =
-            hold->motion.contact_damping * slope_end + hold->motion.contact_omega2 * end->w;
-        if (rise * rise_end >= 0)
+        // A new peak may lie inside, unless the ripple has died and what is left only rises or only
+        // falls.
+        const double n = fabs(hold_force(&hold->motion, start));
+        if (seen.ripple <= ripple_most * n &&
+            force_rate(&hold->motion, start) * force_rate(&hold->motion, end) >= 0)
             return level;
     }
     return NULL;

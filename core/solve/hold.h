@@ -24,8 +24,9 @@ typedef struct Hold {
     bool is_made, is_usable;
     Motion motion;
     double L[2][2], H[2][2];
-    double slow[2][2];  // Z' = slow Z + ...
-    double quasi[2];    // G follows -quasi a_g(t)
+    double slow[2][2]; // Z' = slow Z + ...
+    double quasi[2];   // G follows -quasi a_g(t) - quasi_rate a_g'(t)
+    double quasi_rate[2];
     double fast_omega;  // of the norm sqrt(g1^2 + (g2 / fast_omega)^2) [rad/s]
     double fast_growth; // that norm grows by no more than this [1/s]
     double slow_growth; // Omega |Z1| + |Z2| grows by no more than this [1/s]

@@ -1,0 +1,609 @@
+// Random scenes through the exact solver and through reference.h: what the solver misses may be
+// little more than what a plain double of the reference's own method misses. `test_reference COUNT
+// SEED` runs a longer campaign.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "core/excite/record.h"
+#include "core/excite/sine.h"
+#include "tests/support/paper.h"
+#include "tests/truth/reference.h"
+
+static size_t scenes = 60;
+static uint64_t seed = 1;
+static bool is_verbose = false;
+
+enum { DOUBLES = 3 }; // of other sub-steps, for one may be right by luck
+static const double STEPS_MOST = 25000;
+static const double CHAOTIC = 1e-8; // a double that misses more cannot be judged by
+static const double FACTOR = 100;   // of what that double misses
+static const double FLOOR = 1e-12;
+static const double AUDIBLE = 1e-9; // of the largest approach speed: impacts below are not compared
+static const double SILENT = 1e-13; // of the free mass's largest speed: neither are those
+
+// What is compared, each as an error relative to the run's own scale.
+typedef enum Metric {
+    METRIC_DISPLACEMENT,
+    METRIC_START, // times approach speed, over the clearance or the largest displacement
+    METRIC_VELOCITY,
+    METRIC_DAMPER_DISPLACEMENT,
+    METRIC_DAMPER_VELOCITY,
+    METRIC_MEAN_ACCELERATION,
+    METRIC_FORCE,
+    METRIC_APPROACH,
+    METRIC_SEPARATION,
+    METRIC_PEAK,
+    METRIC_IMPULSE,
+    METRIC_LOST,
+    METRIC_REST_START, // [s]
+    METRIC_REST_END,   // [s]
+    METRIC_REST_PEAK,
+    METRIC_COUNT
+} Metric;
+static const char *const metric_names[METRIC_COUNT] = {
+    "displacement",        "start",           "velocity",
+    "damper_displacement", "damper_velocity", "mean_acceleration",
+    "contact_force",       "approach_speed",  "separation_speed",
+    "peak_force",          "impulse",         "energy_lost",
+    "rest start",          "rest end",        "rest peak_force"};
+
+typedef struct Misses {
+    double of[METRIC_COUNT];
+    bool is_same; // the same impacts
+    char why[200];
+} Misses;
+
+static uint64_t random_state;
+static uint64_t draw(void) {
+    uint64_t z = random_state += 0x9e3779b97f4a7c15U;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
+    return z ^ (z >> 31);
+}
+static double uniform(double a, double b) {
+    return a + (b - a) * (double)(draw() >> 11) * 0x1p-53;
+}
+static double scattered(double a, double b) {
+    return a * pow(b / a, uniform(0, 1));
+}
+static bool chance(double p) {
+    return uniform(0, 1) < p;
+}
+
+static const double TURN = 6.283185307179586;
+
+// A scene of its own for each seed; samples are the caller's to free.
+static void scene_draw(ReferenceScene *scene, uint64_t number) {
+    memset(scene, 0, sizeof *scene);
+    random_state = number * 0x2545f4914f6cdd1dU;
+    const double reach = scattered(1e-3, 0.1), omega = TURN * scattered(0.3, 15);
+    scene->mass = scattered(0.1, 100);
+    scene->stiffness = chance(0.07) ? 0 : scene->mass * omega * omega;
+    scene->damping = 2 * scene->mass * omega *
+                     (chance(scene->stiffness == 0 ? 0.5 : 0.1) ? 0
+                      : chance(0.05)                            ? uniform(1, 3)
+                                                                : scattered(1e-3, 0.2));
+    scene->damper_mass = scene->mass * scattered(1e-3, 10);
+    scene->clearance = reach * uniform(0.05, 2);
+    scene->is_impulse = chance(0.4);
+    if (!scene->is_impulse && chance(0.05))
+        scene->clearance = 0;
+    scene->offset = chance(0.2) ? reach * uniform(-1, 1) : 0;
+    scene->position = chance(0.4) ? scene->clearance * uniform(-0.5, 0.5) : 0;
+    scene->relative_velocity = chance(0.4) ? reach * omega * uniform(-1, 1) : 0;
+    const bool is_uneven = chance(0.3);
+    for (int side = 0; side < 2; side++) {
+        scene->restitution[side] = uniform(0.1, 0.97);
+        scene->contact_time[side] = scattered(3e-5, 5e-2);
+        if (!is_uneven && side == 1) {
+            scene->restitution[1] = scene->restitution[0];
+            scene->contact_time[1] = scene->contact_time[0];
+        }
+    }
+    const double rates[] = {1000, 1000, 1000, 1000, 200, 50, 20, 333, 5000, 1234.5};
+    scene->sample_rate = rates[draw() % COUNT(rates)];
+    scene->duration = 3;
+    scene->base = (ReferenceBase)(draw() % 3);
+    if (scene->base == REFERENCE_STILL || chance(0.3)) {
+        scene->displacement = reach * uniform(-1, 1);
+        scene->velocity = chance(0.5) ? reach * omega * uniform(-1, 1) : 0;
+    }
+    const double level = reach * omega * omega * scattered(0.03, 2);
+    if (scene->base == REFERENCE_SINE) {
+        scene->frequency = chance(0.1) ? scattered(20, 400) : scattered(0.2, 20);
+        scene->is_amplitude_displacement = chance(0.4);
+        scene->amplitude =
+            scene->is_amplitude_displacement ? level / pow(TURN * scene->frequency, 2) : level;
+    }
+    if (scene->base == REFERENCE_RECORD) {
+        const double intervals[] = {1e-3, 0.005, 0.01, 0.0123, 1 / 300.0, 0.0007, 0.02, 0.11};
+        scene->interval =
+            chance(0.2) ? 1 / scene->sample_rate : intervals[draw() % COUNT(intervals)];
+        const double length = chance(0.4) ? uniform(0.2, 2.8) : 3.1;
+        scene->sample_count = (size_t)(length / scene->interval) + 2;
+        double *samples = malloc(scene->sample_count * sizeof *samples);
+        if (samples == NULL)
+            abort();
+        const double memory = exp(-scene->interval * omega);
+        double value = 0;
+        for (size_t i = 0; i < scene->sample_count; i++) {
+            value = memory * value +
+                    sqrt(1 - memory * memory) * level * (uniform(-1, 1) + uniform(-1, 1));
+            samples[i] = value;
+        }
+        scene->samples = samples;
+    }
+}
+
+static void scene_print(const ReferenceScene *scene) {
+    printf(
+        "    M %.17g K %.17g C %.17g m %.17g d %.17g offset %.17g position %.17g velocity %.17g\n"
+        "    %s e %.17g %.17g T_c %.17g %.17g x0 %.17g v0 %.17g\n"
+        "    base %d frequency %.17g amplitude %.17g %d samples %zu interval %.17g rate %.17g\n",
+        scene->mass, scene->stiffness, scene->damping, scene->damper_mass, scene->clearance,
+        scene->offset, scene->position, scene->relative_velocity,
+        scene->is_impulse ? "impulse" : "spring_damper", scene->restitution[0],
+        scene->restitution[1], scene->contact_time[0], scene->contact_time[1], scene->displacement,
+        scene->velocity, (int)scene->base, scene->frequency, scene->amplitude,
+        scene->is_amplitude_displacement, scene->sample_count, scene->interval, scene->sample_rate);
+}
+
+static const char *const wanted[REFERENCE_CHANNELS] = {
+    "displacement",        "velocity",        "acceleration",  "mean_acceleration",
+    "damper_displacement", "damper_velocity", "contact_force",
+};
+
+static Outcome *solver_run(const ReferenceScene *scene) {
+    static Problem problem;
+    Simulation simulation;
+    paper_scene(&simulation, scene->restitution[0], scene->contact_time[0], scene->duration);
+    StructureSdof *structure = (StructureSdof *)(void *)simulation.scene.structure;
+    structure->mass = scene->mass;
+    structure->stiffness = scene->stiffness;
+    structure->damping = scene->damping;
+    Damper *damper = &simulation.scene.dampers.at[0];
+    damper->mass = scene->damper_mass;
+    damper->clearance = scene->clearance;
+    damper->offset = scene->offset;
+    damper->position = scene->position;
+    damper->velocity = scene->relative_velocity;
+    damper->left_buffer = damper->buffer;
+    damper->right_buffer = damper->buffer;
+    damper->right_buffer.restitution = scene->restitution[1];
+    damper->right_buffer.contact_time = scene->contact_time[1];
+    damper->buffer.restitution = damper->buffer.contact_time = NAN;
+    simulation.scene.sample_rate = scene->sample_rate;
+    if (scene->base == REFERENCE_SINE) {
+        paper_sine(&simulation, scene->amplitude, scene->frequency);
+        ((ExcitationSine *)(void *)simulation.scene.excitation)->quantity =
+            scene->is_amplitude_displacement ? SINE_DISPLACEMENT : SINE_ACCELERATION;
+    } else if (scene->base == REFERENCE_RECORD) {
+        variant_free(simulation.scene.excitation);
+        ExcitationRecord *record = (ExcitationRecord *)(void *)variant_new(&excitation_record.kind);
+        if (record == NULL ||
+            (record->samples.at = malloc(scene->sample_count * sizeof(double))) == NULL)
+            abort();
+        memcpy(record->samples.at, scene->samples, scene->sample_count * sizeof(double));
+        record->samples.count = scene->sample_count;
+        record->interval = scene->interval;
+        simulation.scene.excitation = (Variant *)(void *)record;
+    }
+    Excitation *excitation = (Excitation *)(void *)simulation.scene.excitation;
+    excitation->displacement = scene->displacement;
+    excitation->velocity = scene->velocity;
+    paper_model(&simulation, scene->is_impulse ? "impulse" : "spring_damper");
+    paper_channels(&simulation, wanted, COUNT(wanted));
+    paper_no_psd(&simulation);
+    Outcome *outcome = NULL;
+    problem_clear(&problem);
+    if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
+        simulation_run(&simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        printf("  refused: %s %s %s\n", problem.detail,
+               problem.count > 0 ? problem.faults[0].pointer : "",
+               problem.count > 0 ? problem.faults[0].detail : "");
+    simulation_clear(&simulation);
+    return outcome;
+}
+
+// The solver's outcome in the reference's form.
+static bool answer_of(const Outcome *outcome, ReferenceAnswer *answer) {
+    memset(answer, 0, sizeof *answer);
+    answer->count = outcome->response.count;
+    for (size_t i = 0; i < REFERENCE_CHANNELS; i++) {
+        const Column *column = columns_find(&outcome->response.series, wanted[i]);
+        if (column == NULL ||
+            (answer->channels[i] = malloc(answer->count * sizeof(double))) == NULL)
+            return false;
+        memcpy(answer->channels[i], column->values, answer->count * sizeof(double));
+    }
+    const Impacts *impacts = &outcome->response.impacts;
+    if ((answer->impacts = calloc(impacts->count + 1, sizeof *answer->impacts)) == NULL)
+        return false;
+    answer->impact_count = impacts->count;
+    for (size_t i = 0; i < impacts->count; i++) {
+        const Impact *from = &impacts->at[i];
+        answer->impacts[i] = (ReferenceImpact){from->kind == IMPACT_RESTING,
+                                               from->side,
+                                               from->start,
+                                               from->end,
+                                               from->approach_speed,
+                                               from->separation_speed,
+                                               from->peak_force,
+                                               from->impulse,
+                                               from->energy_lost};
+    }
+    answer->is_whole = true;
+    return true;
+}
+
+static double largest(const double *values, size_t count) {
+    double most = 0;
+    for (size_t i = 0; i < count; i++)
+        most = fmax(most, fabs(values[i]));
+    return most;
+}
+
+// Scales of a run.
+typedef struct Scale {
+    double least; // approach speed that counts
+    double speed, peak, impulse, lost, length, rest_peak;
+} Scale;
+
+static Scale scale_of(const ReferenceScene *scene, const ReferenceAnswer *answer) {
+    Scale scale = {0, 0, 0, 0, 0, scene->clearance, 0};
+    scale.length =
+        fmax(scale.length, largest(answer->channels[REFERENCE_DISPLACEMENT], answer->count));
+    for (size_t i = 0; i < answer->impact_count; i++) {
+        const ReferenceImpact *impact = &answer->impacts[i];
+        if (impact->is_resting) {
+            scale.rest_peak = fmax(scale.rest_peak, impact->peak);
+            continue;
+        }
+        scale.speed = fmax(scale.speed, impact->approach);
+        scale.peak = fmax(scale.peak, impact->peak);
+        scale.impulse = fmax(scale.impulse, impact->impulse);
+        scale.lost = fmax(scale.lost, impact->lost);
+    }
+    scale.least =
+        fmax(AUDIBLE * scale.speed,
+             SILENT * largest(answer->channels[REFERENCE_DAMPER_VELOCITY], answer->count));
+    return scale;
+}
+
+static void miss(Misses *misses, Metric metric, double value, double truth, double scale) {
+    if (isnan(truth) && isnan(value))
+        return;
+    const double error = value == truth ? 0 : fabs(value - truth) / scale;
+    if (!(error <= misses->of[metric]))
+        misses->of[metric] = isnan(error) ? INFINITY : error;
+}
+
+// Is there an event so near that right and left of it cannot be told apart?
+static bool is_near_event(const ReferenceAnswer *truth, double time) {
+    for (size_t i = 0; i < truth->impact_count; i++)
+        if (fabs(truth->impacts[i].start - time) < 1e-7 ||
+            fabs(truth->impacts[i].end - time) < 1e-7)
+            return true;
+    return false;
+}
+
+static const ReferenceImpact *next_impact(const ReferenceAnswer *answer, size_t *i, bool is_resting,
+                                          double least) {
+    for (; *i < answer->impact_count; (*i)++) {
+        const ReferenceImpact *impact = &answer->impacts[*i];
+        if (impact->is_resting != is_resting)
+            continue;
+        if (is_resting ? !(impact->end - impact->start < least) : impact->approach > least)
+            return &answer->impacts[(*i)++];
+    }
+    return NULL;
+}
+
+static void compare_impacts(const ReferenceAnswer *answer, const ReferenceAnswer *truth,
+                            const Scale *scale, Misses *misses) {
+    size_t i = 0, j = 0;
+    for (size_t number = 0;; number++) {
+        const ReferenceImpact *want = next_impact(truth, &j, false, scale->least);
+        const ReferenceImpact *have = next_impact(answer, &i, false, 0.99 * scale->least);
+        // Speeds that lie astride the threshold.
+        while (have != NULL && (want == NULL || have->start < want->start - 1e-9) &&
+               have->approach < 1.01 * scale->least)
+            have = next_impact(answer, &i, false, 0.99 * scale->least);
+        if (want == NULL && have == NULL)
+            break;
+        if (want == NULL || have == NULL || want->side != have->side ||
+            (isnan(want->end) != isnan(have->end))) {
+            snprintf(misses->why, sizeof misses->why,
+                     "impact %zu: wanted %d %.17g %.3g, got %d %.17g %.3g", number,
+                     want != NULL ? want->side : -1, want != NULL ? want->start : NAN,
+                     want != NULL ? want->approach : NAN, have != NULL ? have->side : -1,
+                     have != NULL ? have->start : NAN, have != NULL ? have->approach : NAN);
+            misses->is_same = false;
+            return;
+        }
+        miss(misses, METRIC_START, have->start * want->approach, want->start * want->approach,
+             scale->length);
+        miss(misses, METRIC_APPROACH, have->approach, want->approach, scale->speed);
+        miss(misses, METRIC_SEPARATION, have->separation, want->separation, scale->speed);
+        miss(misses, METRIC_PEAK, have->peak, want->peak, scale->peak);
+        miss(misses, METRIC_IMPULSE, have->impulse, want->impulse, scale->impulse);
+        miss(misses, METRIC_LOST, have->lost, want->lost, scale->lost);
+    }
+}
+
+static void compare_rests(const ReferenceAnswer *answer, const ReferenceAnswer *truth,
+                          const Scale *scale, Misses *misses) {
+    size_t i = 0, j = 0;
+    for (size_t number = 0;; number++) {
+        const ReferenceImpact *want = next_impact(truth, &j, true, 1e-6);
+        const ReferenceImpact *have = next_impact(answer, &i, true, 1e-6);
+        if (want == NULL && have == NULL)
+            break;
+        if (want == NULL || have == NULL || want->side != have->side ||
+            isnan(want->end) != isnan(have->end)) {
+            snprintf(misses->why, sizeof misses->why,
+                     "rest %zu: wanted %d %.17g %.17g, got %d %.17g %.17g", number,
+                     want != NULL ? want->side : -1, want != NULL ? want->start : NAN,
+                     want != NULL ? want->end : NAN, have != NULL ? have->side : -1,
+                     have != NULL ? have->start : NAN, have != NULL ? have->end : NAN);
+            misses->is_same = false;
+            return;
+        }
+        miss(misses, METRIC_REST_START, have->start, want->start, 1);
+        miss(misses, METRIC_REST_END, have->end, want->end, 1);
+        miss(misses, METRIC_REST_PEAK, have->peak, want->peak, scale->rest_peak);
+        miss(misses, METRIC_IMPULSE, have->impulse, want->impulse,
+             fmax(want->impulse, scale->impulse));
+    }
+}
+
+static void compare(const ReferenceScene *scene, const ReferenceAnswer *answer,
+                    const ReferenceAnswer *truth, Misses *misses) {
+    memset(misses, 0, sizeof *misses);
+    misses->is_same = true;
+    const Scale scale = scale_of(scene, truth);
+    const struct {
+        Metric metric;
+        int channel;
+    } of[] = {{METRIC_DISPLACEMENT, REFERENCE_DISPLACEMENT},
+              {METRIC_VELOCITY, REFERENCE_VELOCITY},
+              {METRIC_DAMPER_DISPLACEMENT, REFERENCE_DAMPER_DISPLACEMENT},
+              {METRIC_DAMPER_VELOCITY, REFERENCE_DAMPER_VELOCITY},
+              {METRIC_MEAN_ACCELERATION, REFERENCE_MEAN_ACCELERATION},
+              {METRIC_FORCE, REFERENCE_FORCE}};
+    if (answer->count != truth->count) {
+        snprintf(misses->why, sizeof misses->why, "%zu samples, not %zu", answer->count,
+                 truth->count);
+        misses->is_same = false;
+        return;
+    }
+    for (size_t i = 0; i < COUNT(of); i++) {
+        const double *a = answer->channels[of[i].channel], *b = truth->channels[of[i].channel];
+        const double most = largest(b, truth->count);
+        for (size_t n = 0; n < truth->count; n++) {
+            if (a[n] == b[n] || (i > 0 && is_near_event(truth, (double)n / scene->sample_rate)))
+                continue;
+            miss(misses, of[i].metric, a[n], b[n], most > 0 ? most : 1);
+        }
+    }
+    compare_impacts(answer, truth, &scale, misses);
+    if (misses->is_same)
+        compare_rests(answer, truth, &scale, misses);
+}
+
+typedef struct Tally {
+    size_t judged, chaotic, heavy, failed, rests, impacts;
+    double worst_ratio, quad_seconds;
+} Tally;
+
+static void fault(Tally *tally, bool *is_told, const ReferenceScene *scene, size_t number,
+                  const char *text) {
+    if (!*is_told) {
+        printf("scene %zu (seed %llu):\n", number, (unsigned long long)seed);
+        scene_print(scene);
+        tally->failed++;
+    }
+    *is_told = true;
+    printf("  %s\n", text);
+}
+
+static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
+    ReferenceAnswer quad, plain[DOUBLES], solved;
+    memset(&solved, 0, sizeof solved);
+    memset(&quad, 0, sizeof quad);
+    bool is_told = false;
+    char text[400];
+    const clock_t before = clock();
+    for (int i = 0; i < DOUBLES; i++)
+        reference_double(scene, 1 - 0.2 * i, 2 * STEPS_MOST, &plain[i]);
+    if (plain[0].is_whole)
+        reference_quad(scene, 1, STEPS_MOST, &quad);
+    tally->quad_seconds += (double)(clock() - before) / CLOCKS_PER_SEC;
+    Outcome *outcome = solver_run(scene);
+    if (outcome == NULL)
+        fault(tally, &is_told, scene, number, "the solver gave up");
+    else if (!(outcome->summary.energy_residual < 1e-9)) {
+        snprintf(text, sizeof text, "energy residual %g", outcome->summary.energy_residual);
+        fault(tally, &is_told, scene, number, text);
+    }
+    if (!quad.is_whole)
+        tally->heavy++;
+    else if (outcome != NULL && answer_of(outcome, &solved)) {
+        Misses by_double, by_solver;
+        compare(scene, &plain[0], &quad, &by_double);
+        for (int i = 1; i < DOUBLES; i++) {
+            Misses other;
+            compare(scene, &plain[i], &quad, &other);
+            for (int k = 0; k < METRIC_COUNT; k++)
+                by_double.of[k] = fmax(by_double.of[k], other.of[k]);
+            if (!other.is_same)
+                by_double = other;
+        }
+        compare(scene, &solved, &quad, &by_solver);
+        if (!by_double.is_same || by_double.of[METRIC_DISPLACEMENT] > CHAOTIC ||
+            by_double.of[METRIC_START] > CHAOTIC) {
+            tally->chaotic++;
+            if (is_verbose)
+                printf("scene %zu chaotic: %g %g, solver %g %g; %s | %s\n", number, by_double.of[0],
+                       by_double.of[1], by_solver.of[0], by_solver.of[1], by_double.why,
+                       by_solver.why);
+        } else {
+            tally->judged++;
+            tally->impacts += quad.impact_count;
+            for (size_t i = 0; i < quad.impact_count; i++)
+                tally->rests += quad.impacts[i].is_resting;
+            if (!by_solver.is_same)
+                fault(tally, &is_told, scene, number, by_solver.why);
+            for (int i = 0; i < METRIC_COUNT && by_solver.is_same; i++) {
+                const double limit =
+                    fmax(FACTOR * by_double.of[i], i <= METRIC_START ? FLOOR : 100 * FLOOR);
+                if (i <= METRIC_START)
+                    tally->worst_ratio = fmax(tally->worst_ratio, by_solver.of[i] / limit);
+                if (!(by_solver.of[i] <= limit)) {
+                    snprintf(text, sizeof text, "%s misses %g, a plain double %g", metric_names[i],
+                             by_solver.of[i], by_double.of[i]);
+                    fault(tally, &is_told, scene, number, text);
+                }
+            }
+        }
+    }
+    outcome_drop(outcome);
+    reference_clear(&quad);
+    for (int i = 0; i < DOUBLES; i++)
+        reference_clear(&plain[i]);
+    reference_clear(&solved);
+}
+
+static void random_scenes_agree_with_quad_precision(void **state) {
+    (void)state;
+    Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
+    for (size_t i = 0; i < scenes; i++) {
+        ReferenceScene scene;
+        scene_draw(&scene, seed * 1000003 + i);
+        judge(&scene, i, &tally);
+        free((void *)(uintptr_t)scene.samples);
+    }
+    printf("%zu scenes: %zu judged with %zu impacts and %zu rests, %zu too chaotic, %zu too heavy, "
+           "%zu failed; "
+           "worst at %.2g of the limit; %.1f s in the reference\n",
+           scenes, tally.judged, tally.impacts, tally.rests, tally.chaotic, tally.heavy,
+           tally.failed, tally.worst_ratio, tally.quad_seconds);
+    assert_true(tally.failed == 0);
+    assert_true(2 * tally.judged > scenes);
+}
+
+// Scenes in which something is exactly 0, or happens within one sample, one arc or one unit of the
+// clock.
+static void awkward_scenes_agree_with_quad_precision(void **state) {
+    (void)state;
+    const ReferenceScene usual = {.mass = 1,
+                                  .damper_mass = 0.1,
+                                  .clearance = 0.01,
+                                  .restitution = {0.5, 0.5},
+                                  .contact_time = {1e-3, 1e-3},
+                                  .duration = 3,
+                                  .sample_rate = 1000};
+    ReferenceScene awkward[12];
+    size_t count = 0;
+    // Nothing holds the structure: it pushes no stop, and -0 is not a push either.
+    ReferenceScene scene = usual;
+    scene.is_impulse = true;
+    scene.relative_velocity = 0.1;
+    awkward[count++] = scene;
+    scene.base = REFERENCE_SINE;
+    scene.frequency = scene.amplitude = 1;
+    awkward[count++] = scene;
+    scene.is_impulse = false;
+    awkward[count++] = scene;
+    // Chatter within one long sample interval.
+    scene = usual;
+    scene.is_impulse = true;
+    scene.stiffness = 1e4;
+    scene.damping = 10;
+    scene.position = 0.0049;
+    scene.restitution[0] = scene.restitution[1] = 0.97;
+    scene.base = REFERENCE_SINE;
+    scene.frequency = 0.1;
+    scene.amplitude = 5;
+    scene.sample_rate = 1;
+    awkward[count++] = scene;
+    // Leaving its stop after a rest, the mass is back before half a millisecond is over.
+    awkward[count++] = (ReferenceScene){.mass = 0.46701926499704804,
+                                        .stiffness = 1924.7210902027753,
+                                        .damping = 0.060269535257521302,
+                                        .damper_mass = 0.2921284657236275,
+                                        .clearance = 0.015945329076344859,
+                                        .position = -1.217937248267568e-05,
+                                        .relative_velocity = -2.3701621139095943,
+                                        .is_impulse = true,
+                                        .restitution = {0.88196233379853894, 0.81533580694737784},
+                                        .contact_time = {1e-3, 1e-3},
+                                        .base = REFERENCE_SINE,
+                                        .frequency = 0.20463130410327543,
+                                        .amplitude = 67.171029374396454,
+                                        .is_amplitude_displacement = true,
+                                        .duration = 3,
+                                        .sample_rate = 333};
+    // A structure with damping alone, a base whose samples fall between the output's.
+    static const double samples[] = {0,    0.5, -0.3, 0.8,  -0.6, 0.2, 0.4,
+                                     -0.7, 0.1, 0.9,  -0.8, 0.3,  0.6};
+    scene = usual;
+    scene.damping = 0.025;
+    scene.clearance = 1;
+    scene.base = REFERENCE_RECORD;
+    scene.samples = samples;
+    scene.sample_count = COUNT(samples);
+    scene.interval = 0.11;
+    scene.sample_rate = 20;
+    awkward[count++] = scene;
+    // No clearance; a start at a stop.
+    scene = usual;
+    scene.stiffness = 600;
+    scene.damping = 0.5;
+    scene.displacement = 0.01;
+    scene.position = 0.005;
+    awkward[count++] = scene;
+    scene.is_impulse = true;
+    awkward[count++] = scene;
+    scene.clearance = scene.position = 0;
+    awkward[count++] = scene;
+    scene.is_impulse = false;
+    awkward[count++] = scene;
+    scene.base = REFERENCE_SINE;
+    scene.displacement = 0;
+    scene.frequency = scene.amplitude = 3;
+    awkward[count++] = scene;
+    // A sine above the sample rate.
+    scene.frequency = 700;
+    scene.amplitude = 300;
+    scene.clearance = 1e-4;
+    scene.sample_rate = 100;
+    awkward[count++] = scene;
+    Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
+    for (size_t i = 0; i < count; i++)
+        judge(&awkward[i], i, &tally);
+    assert_true(tally.failed == 0);
+    assert_true(tally.judged == count);
+}
+
+int main(int argc, char **argv) {
+    if (argc > 1)
+        scenes = strtoul(argv[1], NULL, 10);
+    if (argc > 2)
+        seed = strtoull(argv[2], NULL, 10);
+    is_verbose = argc > 3;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(awkward_scenes_agree_with_quad_precision),
+        cmocka_unit_test(random_scenes_agree_with_quad_precision),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
