@@ -35,7 +35,7 @@ const Field simulation_fields[] = {
     FIELD_VARIANT(Simulation, accuracy, &solver_kinds, PRESENCE_DEFAULT, "how it is solved"),
     FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "what is wanted of it"),
     FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; changes nothing"),
-    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; change nothing"),
+    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE | FIELD_PAIRS, "for people; change nothing"),
     FIELD_END
 };
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excite/sine.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
@@ -219,14 +220,24 @@ size_t outcome_bytes(const Outcome *outcome) {
            outcome->response.impacts.count * sizeof(Impact);
 }
 
+// Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
+// shows that the stops are out of reach.
+static double flight_arcs(const Scene *scene) {
+    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene_structure(scene);
+    const Excitation *excitation = scene_excitation(scene);
+    double rate = fmax(sqrt(sdof->stiffness / sdof->mass), structure_damping(sdof) / sdof->mass);
+    if (excitation_kind(excitation) == &excitation_sine)
+        rate = fmax(rate, 6.3 * ((const ExcitationSine *)(const void *)excitation)->frequency);
+    return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
+}
+
 Cost simulation_cost(const Simulation *simulation) {
     const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
     const bool has_damper = simulation->scene.dampers.count > 0;
     // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
-    // transformed sample costs about as much as a third of a step, and overlap transforms it
-    // several times.
-    double steps = samples * (has_damper ? 1.1 : 1);
+    // transformed sample costs about a third of a step, and overlap transforms it several times.
+    double steps = samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene);
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /
                  (double)(psd->segment - psd->overlap) / 3;
