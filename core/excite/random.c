@@ -44,7 +44,7 @@ static const Field random_fields[] = {
     FIELD_REALS(ExcitationRandom, band,   "Hz",    AT_LEAST(0), 2, PRESENCE_REQUIRED,
                 "[f0, f1]: the one-sided density is rms^2 / (f1 - f0) between them and none outside"),
     FIELD_REAL(ExcitationRandom,  rms,    "m/s^2", WITHIN(0, 1e9),         REQUIRED, "rms of the base's acceleration, as a process"),
-    FIELD_COUNT(ExcitationRandom, seed,   NULL,    WITHIN(0, 0x1p53),      0,        "which of the many motions"),
+    FIELD_COUNT(ExcitationRandom, seed,   NULL,    WITHIN(0, 0x1p53 - 1),  0,        "which of the many motions"),
     FIELD_REAL(ExcitationRandom,  rate,   "Hz",    AT_LEAST(RATE_LEAST),   OPTIONAL, "samples of the base's acceleration per second, linear between them; sample_rate if absent"),
     FIELD_END
 };

@@ -61,9 +61,14 @@ static Status sine_make(const Excitation *excitation, const Span *span, const Wa
     return STATUS_OK;
 }
 
+static double sine_fastest(const Excitation *excitation) {
+    return omega_of((const ExcitationSine *)(const void *)excitation);
+}
+
 const ExcitationKind excitation_sine = {
     .kind = {"sine", "a sine of the base's acceleration or displacement", sine_fields,
              sizeof(ExcitationSine)},
     .complete = sine_complete,
+    .fastest = sine_fastest,
     .make = sine_make,
 };

@@ -3,14 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static char *text_copy(const char *text) {
-    const size_t size = strlen(text) + 1;
-    char *copy = malloc(size);
-    if (copy != NULL)
-        memcpy(copy, text, size);
-    return copy;
-}
-
 static Identified identify(const Plan *plan, const Buffer *buffer) {
     const double mass = effective_mass(plan->mass, plan->damper_mass);
     if (plan->form == CONTACT_LINEAR)
@@ -45,7 +37,7 @@ static Status derive(Plan *plan, const Damper *damper) {
                              .stiffness = identified.stiffness,
                              .damping = identified.damping,
                              .damping_ratio = identified.damping_ratio};
-        if (buffer->material != NULL && (derived->material = text_copy(buffer->material)) == NULL)
+        if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
             return STATUS_NO_MEMORY;
     }
     return STATUS_OK;
@@ -103,8 +95,8 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
         TRY(derive(plan, damper));
     }
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    plan->report.contact_model = text_copy(plan->has_damper ? law->kind.name : "none");
-    plan->report.solver = text_copy(solver);
+    plan->report.contact_model = strdup(plan->has_damper ? law->kind.name : "none");
+    plan->report.solver = strdup(solver);
     return plan->report.contact_model != NULL && plan->report.solver != NULL ? STATUS_OK
                                                                              : STATUS_NO_MEMORY;
 }

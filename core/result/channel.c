@@ -1,6 +1,8 @@
 // All channels in the order of ChannelId.
 #include "core/result/channel.h"
 
+#include <string.h>
+
 #include <stddef.h>
 
 // clang-format off
@@ -29,3 +31,10 @@ const char *const channel_names[] = {
     [CHANNEL_COUNT]               = NULL,
 };
 // clang-format on
+
+const Channel *channel_find(const char *name) {
+    for (size_t i = 0; i < CHANNEL_COUNT; i++)
+        if (strcmp(channels[i].name, name) == 0)
+            return &channels[i];
+    return NULL;
+}

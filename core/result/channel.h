@@ -26,4 +26,7 @@ typedef struct Channel {
 extern const Channel channels[CHANNEL_COUNT];
 extern const char *const channel_names[]; // NULL-terminated
 
+// The channel of that name, NULL if there is none.
+const Channel *channel_find(const char *name);
+
 #endif

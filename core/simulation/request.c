@@ -26,7 +26,7 @@ static const Field psd_fields[] = {
 static const Field output_fields[] = {
     FIELD_TEXTS(Output, channels, channel_names, usual_channels, CHANNEL_COUNT, PRESENCE_DEFAULT, 0, "channels that are sampled"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
-    FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which statistics are taken"),
+    FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
     FIELD_END
 };
 
@@ -55,13 +55,6 @@ const Field summary_fields[] = {
 
 void simulation_clear(Simulation *simulation) {
     fields_clear(simulation_fields, simulation);
-}
-
-static const Channel *channel_find(const char *name) {
-    for (size_t i = 0; i < CHANNEL_COUNT; i++)
-        if (strcmp(channels[i].name, name) == 0)
-            return &channels[i];
-    return NULL;
 }
 
 static bool is_of_damper(const char *name) {
@@ -158,16 +151,32 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     if (check_channels(&output->psd.channels, dampers, "/output/psd/channels", problem) !=
         STATUS_OK)
         status = STATUS_INVALID;
-    if (scene->duration > 0 && output->statistics_from > scene->duration &&
+    // Statistics need a sample at least.
+    const double last = count > 0 ? (double)(count - 1) / scene->sample_rate : scene->duration;
+    if (scene->duration > 0 && output->statistics_from > last &&
         isfinite(output->statistics_from)) {
-        char duration[32], is[32];
-        status = problem_add_real(
-            problem, STATUS_INVALID, "/output/statistics_from", output->statistics_from, "s",
-            "must be within the duration, [0, %s] s, is %s", text_real(duration, scene->duration),
-            text_real(is, output->statistics_from));
+        char until[32], is[32];
+        status = problem_add_real(problem, STATUS_INVALID, "/output/statistics_from",
+                                  output->statistics_from, "s",
+                                  "must not be behind the last sample, within [0, %s] s, is %s",
+                                  text_real(until, last), text_real(is, output->statistics_from));
     }
     const Status psd = complete_psd(&output->psd, count, warnings, problem);
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
+}
+
+// A scene that can be told beforehand to take too long is refused at once.
+static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
+                         Problem *problem) {
+    if (limits == NULL || !(limits->steps > 0))
+        return STATUS_OK;
+    const double steps = simulation_cost(simulation).steps;
+    if (steps <= limits->steps)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
+                            "would take about %.2g solver steps, must be at most %.2g: the "
+                            "structure or the base moves that fast",
+                            steps, limits->steps);
 }
 
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
@@ -183,6 +192,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     TRY(scene);
     if (problem_concerns(problem, ""))
         return problem->status;
+    if (status == STATUS_OK)
+        status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)
         status = plausible_warn(simulation, warnings);
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for warnings")

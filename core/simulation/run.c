@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/sine.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
@@ -33,13 +32,6 @@ Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem
     memset(&plan->report, 0, sizeof plan->report);
     plan_free(plan);
     return STATUS_OK;
-}
-
-static int channel_find(const char *name) {
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        if (strcmp(channels[i].name, name) == 0)
-            return i;
-    return -1;
 }
 
 // A part of the journey tells its own 0 to 1; the watcher sees the whole.
@@ -75,9 +67,9 @@ static Status make_columns(const Journey *journey, const Texts *wanted, Columns 
     int missing[CHANNEL_COUNT];
     size_t count = 0;
     for (size_t i = 0; i < wanted->count; i++) {
-        const int channel = channel_find(wanted->at[i]);
-        if (channel >= 0 && run->columns[channel] == NULL)
-            missing[count++] = channel;
+        const Channel *channel = channel_find(wanted->at[i]);
+        if (channel != NULL && run->columns[channel - channels] == NULL)
+            missing[count++] = (int)(channel - channels);
     }
     if (count == 0)
         return STATUS_OK;
@@ -101,10 +93,10 @@ static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) 
     columns->count = request->channels.count;
     columns->rows = journey->plan->count;
     for (size_t i = 0; i < columns->count; i++) {
-        const int channel = channel_find(request->channels.at[i]);
-        columns_name(columns, i, channels[channel].name, channels[channel].unit);
-        columns->at[i].values = run->columns[channel];
-        units[i] = channels[channel].psd_unit;
+        const Channel *channel = channel_find(request->channels.at[i]);
+        columns_name(columns, i, channel->name, channel->unit);
+        columns->at[i].values = run->columns[channel - channels];
+        units[i] = channel->psd_unit;
     }
     Stage stage = {journey->watch, 0.9, 0.1};
     const Watch watch = stage_watch(&stage);
@@ -167,7 +159,6 @@ static Status travel(Journey *journey, Problem *problem) {
                      problem));
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, &run, problem));
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
-    outcome->cost = run.steps;
     summarize(outcome);
     TRY(check_finite(outcome, problem));
     TRY(make_spectrum(journey, &run, problem));
@@ -226,8 +217,8 @@ static double flight_arcs(const Scene *scene) {
     const StructureSdof *sdof = (const StructureSdof *)(const void *)scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
     double rate = fmax(sqrt(sdof->stiffness / sdof->mass), structure_damping(sdof) / sdof->mass);
-    if (excitation_kind(excitation) == &excitation_sine)
-        rate = fmax(rate, 6.3 * ((const ExcitationSine *)(const void *)excitation)->frequency);
+    if (excitation_kind(excitation)->fastest != NULL)
+        rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
     return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
 }
 

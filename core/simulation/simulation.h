@@ -75,7 +75,6 @@ struct Outcome {
     Response response; // response.series holds output.channels in that order
     Spectrum spectrum; // of output.psd; empty where none was asked for
     Summary summary;
-    double cost; // work counted, in solver steps
 };
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT

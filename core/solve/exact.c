@@ -76,10 +76,11 @@ static Status keep_going(Exact *exact) {
 // A long step of a contact that has lasted for many arcs. False: it must go by arcs.
 static bool hold(Exact *exact, const Slice *slice, double length) {
     Hold *held = exact->holds[exact->side];
-    if (held == NULL && (held = exact->holds[exact->side] = calloc(1, sizeof *held)) == NULL)
-        return false;
-    if (!held->is_made)
+    if (held == NULL) {
+        if ((held = exact->holds[exact->side] = calloc(1, sizeof *held)) == NULL)
+            return false;
         hold_make(held, &exact->touching[exact->side], slice->omega, exact->interval);
+    }
     const double mass = exact_effective_mass(exact);
     State end;
     const HoldLevel *level = hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
@@ -263,6 +264,8 @@ static Status solve(Exact *exact) {
         exact->sample++;
         exact->offset = 0;
         at = exact_moment(exact);
+        if (exact->sample == exact->recorder.statistics_start)
+            ledger_forget_peaks(&exact->ledger, &at);
         recorder_take(&exact->recorder, exact->sample, &at,
                       base_cursor_at(&exact->base, exact->sample));
         ledger_peaks(&exact->ledger, &at);

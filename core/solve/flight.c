@@ -63,5 +63,4 @@ void flight_make(Flight *flight, const Motion *motion, double base_omega, double
     flight->length = length;
     flight->omega = sqrt(motion->omega2);
     flight->curvature = motion->damping + flight->omega;
-    flight->rate = motion->rate;
 }

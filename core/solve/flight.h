@@ -15,7 +15,6 @@ typedef struct Flight {
         av[10];       // quadratic forms of the integrals of v^2 and a_g v, upper triangle by rows
     double curvature; // |r''| is at most curvature * (|v| + omega |x| + length max|a_g|)
     double omega;     // sqrt(K / M) [rad/s]
-    double rate;      // Motion's
 } Flight;
 
 // `omega` is the base's (0: linear).

@@ -141,7 +141,6 @@ static void make_levels(Hold *hold, const long double *system, double interval) 
 }
 
 void hold_make(Hold *hold, const Motion *motion, double base_omega, double interval) {
-    hold->is_made = true;
     hold->motion = *motion;
     hold->count = 0;
     const double slow = sqrt(motion->omega2) + motion->damping + base_omega;

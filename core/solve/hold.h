@@ -21,7 +21,7 @@ typedef struct HoldLevel {
 // decoupled by
 //   G = F - L S,  Z = S - H G.
 typedef struct Hold {
-    bool is_made, is_usable;
+    bool is_usable;
     Motion motion;
     double L[2][2], H[2][2];
     double slow[2][2]; // Z' = slow Z + ...

@@ -111,6 +111,10 @@ void ledger_peaks(Ledger *ledger, const Moment *at) {
     peaks->damper_displacement = larger(peaks->damper_displacement, fabs(at->damper_x));
 }
 
+void ledger_forget_peaks(Ledger *ledger, const Moment *at) {
+    ledger->response->peaks = (Peaks){.contact_force = fabs(at->force)};
+}
+
 void ledger_acceleration(Ledger *ledger, double acceleration) {
     Peaks *peaks = &ledger->response->peaks;
     peaks->acceleration = larger(peaks->acceleration, fabs(acceleration));

@@ -42,6 +42,8 @@ void ledger_bounce(Ledger *ledger, double time, Side side, double approach, doub
 void ledger_work(Ledger *ledger, double input, double structural_damping);
 void ledger_balance(Ledger *ledger, const EnergyState *energy);
 void ledger_peaks(Ledger *ledger, const Moment *at);
+// Statistics begin here: what came before is left out of the peaks.
+void ledger_forget_peaks(Ledger *ledger, const Moment *at);
 void ledger_acceleration(Ledger *ledger, double acceleration);
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept.

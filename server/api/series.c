@@ -44,10 +44,18 @@ static Status choose_encoder(const Request *request, size_t parameter, Reply *re
     return STATUS_OK;
 }
 
-// *outcome is a hold, or NULL when the request has been put to sleep.
-static Status get_outcome(App *app, const Request *request, Reply *reply, Outcome **outcome,
-                          Problem *problem) {
+// The outcome of a part of a result. *outcome is a hold, or NULL when the reply is made already:
+// the client has the part, or the request has been put to sleep.
+static Status get_outcome(App *app, const Request *request, Reply *reply, const char *what,
+                          const char *extension, Outcome **outcome, Problem *problem) {
     const char *id = request->parameters[0];
+    char tag[104];
+    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
+    // Nothing is computed anew for a client who has it.
+    if (request->if_none_match != NULL && !store_result_exists(app->store, id))
+        return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
+    if (reply_immutable(reply, request, tag))
+        return STATUS_OK;
     const Status status = intake_outcome(app->intake, id, request->waker, outcome, problem);
     if (status == STATUS_GONE)
         snprintf(reply->link, sizeof reply->link,
@@ -67,12 +75,8 @@ static Status get_outcome(App *app, const Request *request, Reply *reply, Outcom
     return STATUS_OK;
 }
 
-static Status reply_table(App *app, const Request *request, Reply *reply, const Encoder *encoder,
-                          const char *what, const Table *table, Problem *problem) {
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%s.%s", request->parameters[0], what, encoder->extension);
-    if (reply_immutable(reply, request, tag))
-        return STATUS_OK;
+static Status reply_table(App *app, Reply *reply, const Encoder *encoder, const Table *table,
+                          Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     encoder->write(table, &bytes);
     reply->accepts_ranges = encoder->is_binary;
@@ -153,7 +157,7 @@ static Status series_of(App *app, const Request *request, Reply *reply, const En
         status = choose_rows(request, response, &table, problem);
     table.columns = chosen;
     if (status == STATUS_OK)
-        status = reply_table(app, request, reply, encoder, "series", &table, problem);
+        status = reply_table(app, reply, encoder, &table, problem);
     free(chosen);
     return status;
 }
@@ -162,7 +166,7 @@ Status results_series(App *app, const Request *request, Reply *reply, Problem *p
     const Encoder *encoder = NULL;
     Outcome *outcome = NULL;
     TRY(choose_encoder(request, 1, reply, &encoder, problem));
-    TRY(get_outcome(app, request, reply, &outcome, problem));
+    TRY(get_outcome(app, request, reply, "series", encoder->extension, &outcome, problem));
     if (outcome == NULL)
         return STATUS_OK;
     const Status status = series_of(app, request, reply, encoder, &outcome->response, problem);
@@ -170,7 +174,7 @@ Status results_series(App *app, const Request *request, Reply *reply, Problem *p
     return status;
 }
 
-static Status psd_of(App *app, const Request *request, Reply *reply, const Encoder *encoder,
+static Status psd_of(App *app, Reply *reply, const Encoder *encoder,
                      const Spectrum *spectrum, Problem *problem) {
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0)
@@ -186,7 +190,7 @@ static Status psd_of(App *app, const Request *request, Reply *reply, const Encod
                          .axis = spectrum->frequency,
                          .columns = all,
                          .column_count = densities->count};
-    const Status status = reply_table(app, request, reply, encoder, "psd", &table, problem);
+    const Status status = reply_table(app, reply, encoder, &table, problem);
     free(all);
     return status;
 }
@@ -197,10 +201,10 @@ Status results_psd(App *app, const Request *request, Reply *reply, Problem *prob
     TRY(choose_encoder(request, 1, reply, &encoder, problem));
     if (strcmp(encoder->extension, "json") == 0)
         return results_document(app, request, reply, DOCUMENT_PSD, problem);
-    TRY(get_outcome(app, request, reply, &outcome, problem));
+    TRY(get_outcome(app, request, reply, "psd", encoder->extension, &outcome, problem));
     if (outcome == NULL)
         return STATUS_OK;
-    const Status status = psd_of(app, request, reply, encoder, &outcome->spectrum, problem);
+    const Status status = psd_of(app, reply, encoder, &outcome->spectrum, problem);
     outcome_drop(outcome);
     return status;
 }
@@ -218,12 +222,7 @@ static void write_cell(Bytes *bytes, const Field *field, const Impact *impact) {
         bytes_text(bytes, field->choices[*(const int *)(const void *)at]);
 }
 
-static Status impacts_csv(App *app, const Request *request, Reply *reply, const Impacts *impacts,
-                          Problem *problem) {
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-impacts.csv", request->parameters[0]);
-    if (reply_immutable(reply, request, tag))
-        return STATUS_OK;
+static Status impacts_csv(App *app, Reply *reply, const Impacts *impacts, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     for (const Field *field = impact_fields; field->kind != FIELD_KIND_END; field++) {
         bytes_format(&bytes, "%s%s", field == impact_fields ? "" : ",", field->name);
@@ -259,10 +258,10 @@ Status results_impacts(App *app, const Request *request, Reply *reply, Problem *
     if (choice == 0)
         return results_document(app, request, reply, DOCUMENT_IMPACTS, problem);
     Outcome *outcome = NULL;
-    TRY(get_outcome(app, request, reply, &outcome, problem));
+    TRY(get_outcome(app, request, reply, "impacts", "csv", &outcome, problem));
     if (outcome == NULL)
         return STATUS_OK;
-    const Status status = impacts_csv(app, request, reply, &outcome->response.impacts, problem);
+    const Status status = impacts_csv(app, reply, &outcome->response.impacts, problem);
     outcome_drop(outcome);
     return status;
 }

@@ -161,6 +161,21 @@ static void put_fault(Bytes *bytes, const Fault *fault) {
     bytes_text(bytes, "}");
 }
 
+int write_problem_code(Status status) {
+    // clang-format off
+    static const int codes[STATUS_COUNT] = {
+        [STATUS_OK] = 200,             [STATUS_UNREADABLE] = 400,     [STATUS_INVALID] = 422,
+        [STATUS_USAGE] = 400,          [STATUS_TOO_LARGE] = 413,      [STATUS_UNSUPPORTED_TYPE] = 415,
+        [STATUS_NOT_ACCEPTABLE] = 406, [STATUS_UNAUTHORIZED] = 401,   [STATUS_FORBIDDEN] = 403,
+        [STATUS_NOT_FOUND] = 404,      [STATUS_METHOD] = 405,         [STATUS_CONFLICT] = 409,
+        [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
+        [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 422,
+        [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
+    };
+    // clang-format on
+    return (size_t)status < COUNT(codes) && codes[status] != 0 ? codes[status] : 500;
+}
+
 void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance) {
     size_t count = 0;
     bytes_text(bytes, "{");

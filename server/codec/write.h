@@ -19,6 +19,9 @@ size_t write_members(Bytes *bytes, const Field *fields, const void *item, WriteS
 void write_list(Bytes *bytes, const Field *fields, const void *at, size_t count, size_t size,
                 WriteStyle style);
 
+// The HTTP status that stands for a Status; the one table of them.
+int write_problem_code(Status status);
+
 // problem+json (RFC 9457). `status_code` is HTTP's; `instance` may be NULL.
 void write_problem(Bytes *bytes, const Problem *problem, int status_code, const char *instance);
 

@@ -78,10 +78,11 @@ static void plan_print(const char *path, const DryRun *run) {
 }
 
 static Status plan_show(const char *path, const Bytes *text, bool is_json, Problem *problem) {
-    const IntakeSettings settings = {
-        .workers = 1,
-        .queue_most = 1,
-        .limits = {.samples = SCENE_FILE_SAMPLES, .impacts = SCENE_FILE_IMPACTS}};
+    const IntakeSettings settings = {.workers = 1,
+                                     .queue_most = 1,
+                                     .limits = {.samples = SCENE_FILE_SAMPLES,
+                                                .impacts = SCENE_FILE_IMPACTS,
+                                                .steps = SCENE_FILE_STEPS}};
     Store *store = NULL;
     Intake *intake = NULL;
     DryRun run = {0};

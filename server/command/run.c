@@ -27,8 +27,8 @@ static const Field run_fields[] = {
     FIELD_END,
 };
 
-static const SimulationLimits limits = {.samples = SCENE_FILE_SAMPLES,
-                                        .impacts = SCENE_FILE_IMPACTS};
+static const SimulationLimits limits = {
+    .samples = SCENE_FILE_SAMPLES, .impacts = SCENE_FILE_IMPACTS, .steps = SCENE_FILE_STEPS};
 
 // The series as the encoders take it. The caller frees *chosen.
 static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes) {

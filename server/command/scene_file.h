@@ -6,7 +6,12 @@
 #include "core/plan/plan.h"
 #include "server/base/bytes.h"
 
-enum { SCENE_FILE_BYTES = 16 << 20, SCENE_FILE_SAMPLES = 1 << 25, SCENE_FILE_IMPACTS = 10000000 };
+enum {
+    SCENE_FILE_BYTES = 16 << 20,
+    SCENE_FILE_SAMPLES = 1 << 25,
+    SCENE_FILE_IMPACTS = 10000000,
+    SCENE_FILE_STEPS = 1000000000
+};
 
 // Reads the file, or standard input for "-". Cleared by bytes_clear in any case.
 Status scene_file_read(const char *path, Bytes *text, Problem *problem);

@@ -10,21 +10,6 @@ static const char type_problem[] = "application/problem+json";
 static const char no_memory[] =
     "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 500}\n";
 
-int body_code(Status status) {
-    // clang-format off
-    static const int codes[STATUS_COUNT] = {
-        [STATUS_OK] = 200,             [STATUS_UNREADABLE] = 400,     [STATUS_INVALID] = 422,
-        [STATUS_USAGE] = 400,          [STATUS_TOO_LARGE] = 413,      [STATUS_UNSUPPORTED_TYPE] = 415,
-        [STATUS_NOT_ACCEPTABLE] = 406, [STATUS_UNAUTHORIZED] = 401,   [STATUS_FORBIDDEN] = 403,
-        [STATUS_NOT_FOUND] = 404,      [STATUS_METHOD] = 405,         [STATUS_CONFLICT] = 409,
-        [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
-        [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 500,
-        [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
-    };
-    // clang-format on
-    return (size_t)status < COUNT(codes) && codes[status] != 0 ? codes[status] : 500;
-}
-
 Status body_require_json(const Request *request, Problem *problem) {
     if (!header_type_is(request->content_type, type_json))
         return problem_set(
@@ -42,7 +27,7 @@ Status body_require_json(const Request *request, Problem *problem) {
 
 void body_problem(Reply *reply, const Problem *problem, int code, const char *instance) {
     if (code == 0)
-        code = body_code(problem->status);
+        code = write_problem_code(problem->status);
     if (reply->release != NULL)
         reply->release(reply->context);
     reply->release = NULL;

@@ -22,6 +22,7 @@
 #include <unistd.h>
 
 #include "server/base/clock.h"
+#include "server/codec/write.h"
 #include "server/http/body.h"
 #include "server/http/gate.h"
 #include "server/http/reply.h"
@@ -62,8 +63,6 @@ typedef struct Exchange {
 } Exchange;
 
 // --- the reply goes out
-// -------------------------------------------------------------------------------------
-
 static void add_header(struct MHD_Response *response, const char *name, const char *value) {
     if (value != NULL && value[0] != '\0')
         MHD_add_response_header(response, name, value);
@@ -118,8 +117,6 @@ static enum MHD_Result send_problem(Exchange *exchange, struct MHD_Connection *c
 }
 
 // --- the request comes in
-// -----------------------------------------------------------------------------------
-
 static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const char *name,
                                    size_t name_size, const char *value, size_t value_size) {
     (void)kind;
@@ -153,7 +150,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     problem_clear(&problem);
     int code = gate_judge(&exchange->gate, method, exchange->target, version, &problem);
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
-        code = body_code(problem.status);
+        code = write_problem_code(problem.status);
     const char *length = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Content-Length");
     const unsigned long long body_size = length != NULL ? strtoull(length, NULL, 10) : 0;
     const size_t most = request->body_most;
@@ -248,8 +245,6 @@ static enum MHD_Result answer(Exchange *exchange, struct MHD_Connection *connect
 }
 
 // --- what libmicrohttpd calls
-// -------------------------------------------------------------------------------
-
 static Seat *seat_of(struct MHD_Connection *connection) {
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -335,8 +330,6 @@ static void resume(void *connection) {
 }
 
 // --- opening and closing
-// ------------------------------------------------------------------------------------
-
 Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem) {
     *listener = NULL;
     Listener *made = calloc(1, sizeof *made);
@@ -360,9 +353,9 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
             0, MHD_OPTION_URI_LOG_CALLBACK, on_target, made, MHD_OPTION_NOTIFY_CONNECTION,
             on_connection, made, MHD_OPTION_NOTIFY_COMPLETED, on_completed, made, MHD_OPTION_END);
         if (made->daemon == NULL) {
-            close(descriptor);
             status = problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start: %s",
                                  strerror(errno));
+            close(descriptor);
         }
     }
     if (status != STATUS_OK) {

@@ -11,8 +11,6 @@
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
 
-// --- computations ------------------------------------------------------------------------------
-
 Computation *computation_new(const char *result) {
     Computation *computation = calloc(1, sizeof *computation);
     if (computation == NULL)
@@ -49,11 +47,18 @@ void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent) {
     pthread_cond_signal(&intake->work);
 }
 
+void intake_release(Job *job) {
+    if (!job->is_counted)
+        return;
+    job->is_counted = false;
+    job->intake->live--;
+    job->intake->scene_bytes -= job->scene_size;
+}
+
 void intake_retire(Job *job) {
     Intake *intake = job->intake;
+    intake_release(job);
     index_remove(intake->jobs, &job->indexed);
-    intake->live--;
-    intake->scene_bytes -= job->scene_size;
     job_drop(job);
 }
 
@@ -115,11 +120,10 @@ void intake_attach(Job *job, Computation *computation) {
 void intake_admit(Intake *intake, Job *job) {
     job->scene_size = strlen(job->row.scene);
     index_add(intake->jobs, &job_hold(job)->indexed);
+    job->is_counted = true;
     intake->live++;
     intake->scene_bytes += job->scene_size;
 }
-
-// --- opening and closing -----------------------------------------------------------------------
 
 static Status take_up_all(Intake *intake, Problem *problem) {
     JobRows rows = {NULL, 0};
@@ -211,8 +215,6 @@ void intake_close(Intake *intake) {
     intake_drop(intake);
 }
 
-// --- finding and dismissing --------------------------------------------------------------------
-
 static Job *find_live(Intake *intake, const char *id) {
     pthread_mutex_lock(&intake->lock);
     Job *job = index_find(intake->jobs, id);
@@ -261,9 +263,12 @@ static Status dismiss(Intake *intake, Job *job, Problem *problem) {
         return refuse_finished(job->row.id, state, problem);
     }
     job->row.state = JOB_DISMISSED;
+    if (job->started_ns > 0)
+        job->row.run = 1e-9 * (double)(clock_monotonic_ns() - job->started_ns);
     job->row.finished_unix_ms = clock_unix_ms();
     job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
     intake_detach(job);
+    intake_release(job);
     wakers_call(&job->wakers);
     pthread_mutex_unlock(&intake->lock);
     // The row is final. Until the store has it, the job is found here.

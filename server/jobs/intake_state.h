@@ -40,6 +40,7 @@ struct Job {
     JobRow closing; // as it will be once the store has it; borrows row's texts, owns `problem`
     bool is_closing;
     size_t scene_size; // in bytes, counted while it is live
+    bool is_counted;   // takes a place in the queue
     char *plan, *summary;
     Computation *computation; // NULL: not yet or no more
     Job *next_shared;
@@ -92,6 +93,8 @@ void computation_free(Computation *computation);
 void intake_drop(Intake *intake); // frees what is left with the last hold
 
 // With the lock held.
+// Gives back its place in the queue; it can still be found.
+void intake_release(Job *job);
 void intake_retire(Job *job); // it is live no more; drops the index's hold
 void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent);
 void intake_admit(Intake *intake, Job *job); // it is live, held by the index

@@ -13,8 +13,6 @@ bool job_state_is_final(int state) {
     return state != JOB_ACCEPTED && state != JOB_RUNNING;
 }
 
-// --- wakers ------------------------------------------------------------------------------------
-
 bool wakers_add(Wakers *wakers, const Waker *waker) {
     for (size_t i = 0; i < wakers->count; i++)
         if (wakers->at[i].context == waker->context)
@@ -41,8 +39,6 @@ void wakers_call(Wakers *wakers) {
     free(wakers->at);
     *wakers = (Wakers){NULL, 0};
 }
-
-// --- jobs --------------------------------------------------------------------------------------
 
 Job *job_new(Intake *intake) {
     Job *job = calloc(1, sizeof *job);

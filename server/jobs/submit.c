@@ -25,8 +25,8 @@ static Status make_id(char id[40]) {
     return STATUS_OK;
 }
 
-// The plan and summary of a result that is there already; false if it is not.
-static bool find_known(Intake *intake, Job *job) {
+// The plan and summary of a result that is there already. STATUS_NOT_FOUND if it is not.
+static Status find_known(Intake *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     Outcome *outcome = cache_find(intake->cache, job->row.result);
     pthread_mutex_unlock(&intake->lock);
@@ -37,18 +37,19 @@ static bool find_known(Intake *intake, Job *job) {
         job->plan = bytes_take(&plan, NULL);
         job->summary = bytes_take(&summary, NULL);
         outcome_drop(outcome);
-        return true;
+        return STATUS_OK;
     }
     ResultRow row = {0};
-    if (store_result_head(intake->store, job->row.result, &row, NULL) != STATUS_OK) {
-        result_row_clear(&row);
-        return false;
+    const Status status = store_result_head(intake->store, job->row.result, &row, NULL);
+    if (status == STATUS_OK) {
+        job->plan = row.plan;
+        job->summary = row.summary;
+        row.plan = row.summary = NULL;
     }
-    job->plan = row.plan;
-    job->summary = row.summary;
-    row.plan = row.summary = NULL;
     result_row_clear(&row);
-    return true;
+    if (status == STATUS_OK || status == STATUS_NOT_FOUND)
+        return status;
+    return problem_set(problem, status, "the results could not be searched");
 }
 
 static Status finish_known(Intake *intake, Job *job, Problem *problem) {
@@ -147,13 +148,27 @@ static Status fill_job(Job *job, const Simulation *simulation, const Warnings *w
     return STATUS_OK;
 }
 
+static void fail_row(JobRow *row, const Problem *problem) {
+    Bytes bytes = {.most = 1 << 20};
+    write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
+    row->state = JOB_FAILED;
+    row->problem = bytes_take(&bytes, NULL);
+    row->finished_unix_ms = clock_unix_ms();
+}
+
 static Status submit(Intake *intake, Job *job, Simulation *simulation, Problem *problem) {
-    if (find_known(intake, job))
+    const Status known = find_known(intake, job, problem);
+    if (known == STATUS_OK)
         return finish_known(intake, job, problem);
+    if (known != STATUS_NOT_FOUND)
+        return known;
     TRY(enter(intake, job, problem));
     Status status = store_job_add(intake->store, &job->row, problem);
-    if (status == STATUS_OK)
-        status = start(intake, job, simulation, problem);
+    if (status == STATUS_OK && (status = start(intake, job, simulation, problem)) != STATUS_OK) {
+        // The client is told that it was refused: the next start must not run it all the same.
+        fail_row(&job->row, problem);
+        (void)store_job_update(intake->store, &job->row, NULL);
+    }
     if (status != STATUS_OK)
         leave(intake, job);
     return status;
@@ -182,16 +197,6 @@ Status intake_submit(Intake *intake, const char *text, size_t size, Job **accept
     }
     *accepted = job;
     return STATUS_OK;
-}
-
-// --- from an earlier life ----------------------------------------------------------------------
-
-static void fail_row(JobRow *row, const Problem *problem) {
-    Bytes bytes = {.most = 1 << 20};
-    write_problem(&bytes, problem, 422, NULL);
-    row->state = JOB_FAILED;
-    row->problem = bytes_take(&bytes, NULL);
-    row->finished_unix_ms = clock_unix_ms();
 }
 
 // Takes the row and the simulation.
@@ -244,8 +249,6 @@ Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     free(fault);
     return status;
 }
-
-// --- dry runs ----------------------------------------------------------------------------------
 
 void dry_run_clear(DryRun *dry_run) {
     simulation_clear(&dry_run->simulation);

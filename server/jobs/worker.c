@@ -77,9 +77,7 @@ static void fail(Findings *findings, Status status, const Problem *problem) {
     findings->status = status;
     text_fit(findings->detail, sizeof findings->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
-    const bool is_scene =
-        status == STATUS_LIMIT || status == STATUS_UNSTABLE || status == STATUS_INVALID;
-    write_problem(&bytes, problem, is_scene ? 422 : 500, NULL);
+    write_problem(&bytes, problem, write_problem_code(status), NULL);
     free(findings->problem);
     findings->problem = bytes_take(&bytes, NULL);
 }
@@ -102,8 +100,6 @@ static void run(Intake *intake, Computation *computation, Findings *findings, Pr
         fail(findings, status, problem);
     findings->status = status;
 }
-
-// --- finishing ---------------------------------------------------------------------------------
 
 // With the lock held: the rows as they go to the store, of jobs that have none yet. Returns how
 // many.
@@ -141,7 +137,7 @@ static Status save(Intake *intake, const Findings *findings, Job *const *jobs,
         return status;
     for (size_t i = 0; i < count; i++) {
         Bytes bytes = {.most = 1 << 20};
-        write_problem(&bytes, problem, 422, NULL);
+        write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
         free(jobs[i]->closing.problem);
         jobs[i]->closing.problem = bytes_take(&bytes, NULL);
         jobs[i]->closing.state = JOB_FAILED;
@@ -164,10 +160,11 @@ static void publish(const Findings *findings, Job **jobs, size_t count, Status s
         }
         if (saved != STATUS_OK) {
             Bytes bytes = {.most = 1 << 20};
-            write_problem(&bytes, problem, 507, NULL);
+            write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
             free(job->row.problem);
             job->row.problem = bytes_take(&bytes, NULL);
             job->row.state = JOB_FAILED;
+            intake_release(job);
         } else {
             intake_retire(job);
         }
