@@ -35,7 +35,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
-    FIELD_COUNT(ServeSettings, max_steps, NULL, WITHIN(1, 1e15), 1e8, "solver steps after which a run is stopped"),
+    FIELD_COUNT(ServeSettings, max_steps, NULL, WITHIN(1, 1e15), 2e8, "solver steps after which a run is stopped"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),

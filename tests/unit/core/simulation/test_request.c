@@ -308,7 +308,20 @@ static void statistics_begin_within_the_run(void **state) {
     simulation.output.statistics_from = 12;
     assert_int_equal(complete(&simulation), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/output/statistics_from"),
-                        "must be within the duration, [0, 10] s, is 12");
+                        "must not be behind the last sample, within [0, 10] s, is 12");
+    simulation_clear(&simulation);
+}
+
+static void a_scene_that_would_take_too_long_is_refused_beforehand(void **state) {
+    (void)state;
+    const SimulationLimits few = {.samples = 1 << 25, .steps = 1e6};
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    problem_clear(&problem);
+    assert_int_equal(simulation_complete(&simulation, &few, NULL, &problem), STATUS_OK);
+    ((StructureSdof *)(void *)simulation.scene.structure)->damping = 1e12;
+    assert_int_equal(simulation_complete(&simulation, &few, NULL, &problem), STATUS_INVALID);
+    assert_true(problem_concerns(&problem, "/duration"));
     simulation_clear(&simulation);
 }
 
@@ -419,6 +432,7 @@ int main(void) {
         cmocka_unit_test(a_segment_is_no_longer_than_the_series),
         cmocka_unit_test(segments_overlap_by_less_than_themselves),
         cmocka_unit_test(statistics_begin_within_the_run),
+        cmocka_unit_test(a_scene_that_would_take_too_long_is_refused_beforehand),
         cmocka_unit_test(titles_and_labels_have_their_limits),
         cmocka_unit_test(two_dampers_are_one_too_many_for_now),
         cmocka_unit_test(implausible_values_get_a_warning_each),
