@@ -80,8 +80,6 @@ typedef struct Range {
     { (x), (double)INFINITY, false, false }
 #define WITHIN(a, b)                                                                               \
     { (a), (b), false, false }
-#define WITHIN_ABOVE(a, b)                                                                         \
-    { (a), (b), true, false } // a < x <= b
 #define ANY                                                                                        \
     { (double)-INFINITY, (double)INFINITY, false, false }
 

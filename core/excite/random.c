@@ -73,9 +73,6 @@ static double sample_count(const ExcitationRandom *random, const Span *span) {
     return floor(span->duration * random->rate * (1 + 1e-12)) + 2;
 }
 
-// --- judging
-// -------------------------------------------------------------------------------------------------
-
 // Whether the rate is one to judge the band by; says so where the base would have too many samples.
 static bool check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
                        Problem *problem) {
@@ -133,9 +130,6 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
                                   text_real(limit, narrowest), text_real(number, f1 - f0));
     return status;
 }
-
-// --- making
-// --------------------------------------------------------------------------------------------------
 
 // Leaves y_m in the transform's real buffer.
 static void make_block(const ExcitationRandom *random, const RandomBlocks *blocks, uint64_t m,

@@ -40,9 +40,6 @@ static Status show_file(const Request *request, Reply *reply, const EmbeddedFile
     return STATUS_OK;
 }
 
-// --- examples
-// -----------------------------------------------------------------------------------------------
-
 static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
     Simulation simulation;
     const bool is_read =
@@ -86,9 +83,6 @@ Status examples_show(App *app, const Request *request, Reply *reply, Problem *pr
                        request->parameters[0]);
 }
 
-// --- the contract
-// -------------------------------------------------------------------------------------------
-
 Status schemas_list(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)request;
     Bytes bytes = {.most = app->reply_most};
@@ -128,9 +122,6 @@ Status openapi_show(App *app, const Request *request, Reply *reply, Problem *pro
                            "this program was built without its API description");
     return show_file(request, reply, file, type_json);
 }
-
-// --- operations
-// ---------------------------------------------------------------------------------------------
 
 Status health_live(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;

@@ -39,9 +39,6 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
-// --- waiting
-// ------------------------------------------------------------------------------------------------
-
 // What a sleeping request holds on to.
 typedef struct Pause {
     Job *job;
@@ -76,9 +73,6 @@ static bool pause_begin(const Request *request, Reply *reply, Job *job, double w
     reply_wait(reply, (int)(1000 * left) + 1, pause, pause_forget);
     return true;
 }
-
-// --- handlers
-// -----------------------------------------------------------------------------------------------
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
     DryRun run = {0};

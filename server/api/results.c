@@ -12,9 +12,6 @@
 #include "server/codec/write.h"
 #include "server/http/reply.h"
 
-// --- one result
-// ---------------------------------------------------------------------------------------------
-
 // The scene as it was run, read back from its canonical JSON. Cleared by simulation_clear in any
 // case.
 static Status read_scene(const ResultRow *row, Simulation *simulation, Problem *problem) {
@@ -126,9 +123,6 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
     return status;
 }
 
-// --- the manifest
-// -------------------------------------------------------------------------------------------
-
 static void write_used(App *app, Bytes *bytes, const char *name, bool is_first) {
     char slug[64];
     unsigned long long revision = 0;
@@ -205,9 +199,6 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
     result_row_clear(&row);
     return status;
 }
-
-// --- documents
-// ----------------------------------------------------------------------------------------------
 
 Status results_document(App *app, const Request *request, Reply *reply, Document document,
                         Problem *problem) {

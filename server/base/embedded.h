@@ -1,6 +1,6 @@
-// Files that stand inside the binary: SQL, schemas, examples, web pages. Written by
-// server/embed.cmake while building. Not a file system: the rows are constant and nothing is read
-// from disk. Used by store/ (sql) and by whoever serves the others.
+// Files that stand inside the binary, written by server/embed.cmake: SQL, schemas, examples.
+// Not a file system: the rows are constant and nothing is read from disk.
+// Used by store/ (sql) and by whoever serves the others.
 #ifndef SERVER_BASE_EMBEDDED_H
 #define SERVER_BASE_EMBEDDED_H
 
@@ -16,7 +16,6 @@ typedef struct EmbeddedFile {
 extern const EmbeddedFile embedded_sql[];      // schema/sql/*.sql
 extern const EmbeddedFile embedded_schemas[];  // schema/*.json
 extern const EmbeddedFile embedded_examples[]; // schema/examples/*.json
-extern const EmbeddedFile embedded_web[];      // web/**
 
 // The row of that path, NULL if there is none.
 const EmbeddedFile *embedded_find(const EmbeddedFile *table, const char *path);

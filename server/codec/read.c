@@ -54,8 +54,7 @@ static Status refuse_parse(Problem *problem, const char *text, size_t size,
     return unreadable(problem, text, size, position, sentence);
 }
 
-Status read_json_beside(const char *text, size_t size, const Field *fields, void *item,
-                        const char *const *extra, Problem *problem) {
+Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem) {
     if (fields_default(fields, item) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
     if (size == 0)
@@ -70,7 +69,7 @@ Status read_json_beside(const char *text, size_t size, const Field *fields, void
         return refuse_parse(problem, text, size, &error);
     Reader reader = {.problem = problem};
     if (json_is_object(root))
-        walk_object(&reader, root, fields, item, "", NULL, extra);
+        walk_object(&reader, root, fields, item, "", NULL);
     else
         unreadable(problem, text, size, 0, "the document must be an object, is an array");
     const bool is_object = json_is_object(root);
@@ -78,8 +77,4 @@ Status read_json_beside(const char *text, size_t size, const Field *fields, void
     if (reader.is_out_of_memory)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
     return !is_object ? STATUS_UNREADABLE : reader.is_faulty ? STATUS_INVALID : STATUS_OK;
-}
-
-Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem) {
-    return read_json_beside(text, size, fields, item, NULL, problem);
 }

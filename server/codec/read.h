@@ -15,9 +15,4 @@ enum { READ_DEPTH = 32 };
 // problem.
 Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
-// The same, passing over the top-level keys in `extra` (NULL-terminated; may be NULL), which are
-// another's to read.
-Status read_json_beside(const char *text, size_t size, const Field *fields, void *item,
-                        const char *const *extra, Problem *problem);
-
 #endif

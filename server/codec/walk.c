@@ -14,8 +14,6 @@ static void out_of_memory(Reader *reader) {
     reader->is_out_of_memory = true;
 }
 
-// --- one value ---
-
 static double number_of(const json_t *value) {
     return json_number_value(value) + 0.0; // -0 becomes 0
 }
@@ -82,8 +80,6 @@ static void read_choice(Reader *reader, const json_t *value, const Field *field,
     }
     refuse_name(reader, pointer, value, field->choices);
 }
-
-// --- many values ---
 
 static bool allows_length(Reader *reader, const json_t *value, const Field *field, size_t has,
                           const char *what, const char *pointer) {
@@ -224,7 +220,7 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
         pointer_index(place, sizeof place, pointer, i);
         const json_t *object = json_array_get(value, i);
         if (json_is_object(object))
-            walk_object(reader, object, field->fields, element, place, NULL, NULL);
+            walk_object(reader, object, field->fields, element, place, NULL);
         else
             refuse_type(reader, place, object, NULL, "an object");
     }
@@ -232,8 +228,6 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
     // to free.
     memcpy(target, &list, sizeof list);
 }
-
-// --- objects ---
 
 // A string under a shorthand is short for an object of that one member.
 static void read_item(Reader *reader, const json_t *value, const Field *field, void *target,
@@ -260,7 +254,7 @@ static void read_item(Reader *reader, const json_t *value, const Field *field, v
         read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
                   pointer);
     } else {
-        walk_object(reader, value, field->fields, target, pointer, NULL, NULL);
+        walk_object(reader, value, field->fields, target, pointer, NULL);
     }
 }
 
@@ -308,7 +302,7 @@ static void read_variant(Reader *reader, const json_t *value, const Field *field
     *target = variant;
     Reader silent = {0};
     walk_object(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
-                field->kinds->tag, NULL);
+                field->kinds->tag);
     if (silent.is_out_of_memory)
         out_of_memory(reader);
 }
@@ -358,13 +352,6 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
     }
 }
 
-static bool texts_hold(const char *const *texts, const char *text) {
-    for (; texts != NULL && *texts != NULL; texts++)
-        if (strcmp(*texts, text) == 0)
-            return true;
-    return false;
-}
-
 // The nearest row's name, else the tag if that is near.
 static const char *nearest_key(const Field *fields, const char *tag, const char *key) {
     const char *meant = fields_nearest(fields, key);
@@ -373,11 +360,11 @@ static const char *nearest_key(const Field *fields, const char *tag, const char 
 }
 
 void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer, const char *tag, const char *const *extra) {
+                 const char *pointer, const char *tag) {
     const char *key;
     json_t *value;
     json_object_foreach((json_t *)object, key, value) {
-        if ((tag != NULL && strcmp(tag, key) == 0) || texts_hold(extra, key))
+        if (tag != NULL && strcmp(tag, key) == 0)
             continue;
         size_t offset = 0;
         const Field *field = fields_find(fields, key, &offset);

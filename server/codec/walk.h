@@ -1,14 +1,14 @@
-// From jansson's tree to plain structs, by their rows. Not the text's syntax (read.c) and not
-// ranges (core/base/field.h). Used by read.c alone.
+// From jansson's tree to plain structs, by their rows.
+// Not the text's syntax (read.c) and not ranges (core/base/field.h).
+// Used by read.c alone.
 #ifndef SERVER_CODEC_WALK_H
 #define SERVER_CODEC_WALK_H
 
 #include "server/codec/refuse.h"
 
 // Reads the members of `object` into `item`, which has its defaults, adding what is wrong below
-// `pointer`. Keys equal to `tag` and those in `extra` (NULL-terminated) are passed over; both may
-// be NULL.
+// `pointer`. Keys equal to `tag` are passed over; it may be NULL.
 void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer, const char *tag, const char *const *extra);
+                 const char *pointer, const char *tag);
 
 #endif

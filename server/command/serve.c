@@ -43,9 +43,6 @@ static const Field serve_fields[] = {
 };
 // clang-format on
 
-// --- settings
-// -----------------------------------------------------------------------------------------------
-
 static Status set_text(char **target, const char *text) {
     if (*target != NULL)
         return STATUS_OK;
@@ -76,9 +73,6 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     }
     return STATUS_OK;
 }
-
-// --- running
-// ------------------------------------------------------------------------------------------------
 
 static void greet(const Listener *listener, const ServeSettings *settings) {
     const char *url = listener_url(listener);

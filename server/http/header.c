@@ -128,11 +128,6 @@ int header_accept(const char *accept, const char *const *types) {
     return best;
 }
 
-bool header_accept_names(const char *accept, const char *type) {
-    int fit;
-    return accept != NULL && quality_of(accept, type, &fit) > 0 && fit == 3;
-}
-
 Prefer header_prefer(const char *prefer) {
     Prefer result = {0};
     if (prefer == NULL)

@@ -11,8 +11,6 @@
 // likes best; -1 for none. NULL or "" accepts all. Parameters of the types themselves (charset)
 // play no part.
 int header_accept(const char *accept, const char *const *types);
-// Whether the client names `type` itself, not by a wildcard, and does not refuse it.
-bool header_accept_names(const char *accept, const char *type);
 
 // RFC 7240.
 typedef struct Prefer {

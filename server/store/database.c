@@ -56,8 +56,6 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
                        has_path ? ", in " : "", has_path ? path : "");
 }
 
-// --- statements --------------------------------------------------------------------------------
-
 Status database_execute(Database *database, const char *sql, Problem *problem) {
     if (sqlite3_exec(database->connection, sql, NULL, NULL, NULL) == SQLITE_OK)
         return STATUS_OK;
@@ -129,8 +127,6 @@ Status database_change(Database *database, const char *sql, const RowColumn *col
     statement_end(statement);
     return status;
 }
-
-// --- opening -----------------------------------------------------------------------------------
 
 // Page size and vacuum take effect in an empty file only, and before the journal's mode is set.
 static const char writer_settings[] = "PRAGMA page_size = 16384;"
@@ -219,8 +215,6 @@ void database_close(Database *database) {
     sqlite3_close(database->connection);
     free(database);
 }
-
-// --- migration ---------------------------------------------------------------------------------
 
 static Status migrate_step(Database *database, const EmbeddedFile *file, int64_t version,
                            Problem *problem) {

@@ -19,7 +19,6 @@ typedef struct Store Store;
 Status store_open(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
 
-// --- materials ---------------------------------------------------------------------------------
 typedef struct MaterialRevision {
     char *slug, *name, *status, *source;
     uint64_t revision;
@@ -38,7 +37,6 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
 Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
-// --- jobs --------------------------------------------------------------------------------------
 typedef struct JobRow {
     char id[40];
     int state; // JobState
@@ -67,7 +65,6 @@ Status store_job_list(Store *store, const char *before, size_t most, JobRows *ro
 Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
-// --- results -----------------------------------------------------------------------------------
 // Everything of a result but its series, which is computed anew when asked for.
 typedef struct ResultRow {
     char id[72];

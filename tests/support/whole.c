@@ -15,7 +15,7 @@ static const Field part_fields[] = {
 
 static const Field round_fields[] = {
     FIELD_BASE(Round, common, common_fields),
-    FIELD_REAL(Round, radius, "m", WITHIN_ABOVE(0, 2), REQUIRED, "of the circle"),
+    FIELD_REAL(Round, radius, "m", WITHIN(0, 2), REQUIRED, "of the circle"),
     FIELD_END
 };
 

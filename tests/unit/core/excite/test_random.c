@@ -35,9 +35,6 @@ static Base base_of(const ExcitationRandom *random, double duration) {
     return base;
 }
 
-// --- the samples
-// -----------------------------------------------------------------------------------
-
 // y_m[i] of the definition, bin by bin.
 static long double slow_block(const ExcitationRandom *random, uint64_t m, size_t i) {
     const RandomBlocks blocks = random_blocks(random);
@@ -118,9 +115,6 @@ static void an_rms_of_nought_gives_noughts(void **state) {
         assert_true(base.values[i] == 0);
     base_clear(&base);
 }
-
-// --- the statistics
-// --------------------------------------------------------------------------------
 
 static void moments_are_those_of_a_gaussian_process_of_this_rms(void **state) {
     (void)state;
@@ -231,9 +225,6 @@ static void the_bins_lie_inside_the_band_and_leave_out_the_mean(void **state) {
     assert_int_equal(blocks.length, 1 << 22);
     assert_in_range(blocks.bins, 8, 9);
 }
-
-// --- what is refused
-// -------------------------------------------------------------------------------
 
 typedef struct Refusal {
     double bounds[3];

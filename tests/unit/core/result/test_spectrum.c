@@ -39,9 +39,6 @@ static Spectrum welch(const Columns *columns, SpectrumSettings settings, double 
     return spectrum;
 }
 
-// --- the definition, slowly
-// ------------------------------------------------------------------------
-
 static long double slow_window(int window, size_t n, size_t length) {
     const long double angle = 2 * acosl(-1) * (long double)n / (long double)length;
     if (length == 1)

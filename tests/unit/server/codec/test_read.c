@@ -258,16 +258,6 @@ static void all_faults_are_told_at_once(void **state) {
     assert_int_equal(problem.count, 7);
 }
 
-static void extra_keys_are_passed_over_at_the_top_alone(void **state) {
-    (void)state;
-    static const char *const extra[] = {"study", NULL};
-    const char *text = "{\"study\": {\"any\": 1}, \"left\": {\"study\": 1}}";
-    assert_int_equal(read_json_beside(text, strlen(text), whole_fields, &whole, extra, &problem),
-                     STATUS_INVALID);
-    fault_at("/left/study");
-    assert_int_equal(problem.count, 1);
-}
-
 static void what_is_not_json_has_line_column_and_pointer(void **state) {
     (void)state;
     check_unreadable("", "", "line 1, column 1: ");
@@ -317,7 +307,6 @@ int main(void) {
         TEST(members_of_a_misspelt_kind_are_not_said_to_be_missing),
         TEST(too_long_is_a_fault),
         TEST(all_faults_are_told_at_once),
-        TEST(extra_keys_are_passed_over_at_the_top_alone),
         TEST(what_is_not_json_has_line_column_and_pointer),
         TEST(the_problem_may_be_null),
     };
