@@ -74,28 +74,28 @@ typedef struct Range {
 } Range;
 
 // Braces alone, no compound literals: those are no constants in ISO C.
-#define ABOVE(x)                                                                                   \
-    { (x), (double)INFINITY, true, false }
-#define AT_LEAST(x)                                                                                \
-    { (x), (double)INFINITY, false, false }
-#define WITHIN(a, b)                                                                               \
-    { (a), (b), false, false }
-#define ANY                                                                                        \
-    { (double)-INFINITY, (double)INFINITY, false, false }
+// clang-format off
+#define ABOVE(x) {(x), (double)INFINITY, true, false}
+#define AT_LEAST(x) {(x), (double)INFINITY, false, false}
+#define WITHIN(a, b) {(a), (b), false, false}
+#define ANY {(double)-INFINITY, (double)INFINITY, false, false}
+// clang-format on
 
 // How a row behaves when the member is not given.
 typedef enum Presence {
-    PRESENCE_DEFAULT, // takes `initial`, or for text, lists and items the empty value or the item's
-                      // defaults
+    // Takes `initial`, or for text, lists and items the empty value or the item's defaults.
+    PRESENCE_DEFAULT,
     PRESENCE_REQUIRED, // a fault
     PRESENCE_OPTIONAL, // stays absent
 } Presence;
 
 enum {
-    FIELD_NOTE = 1, // changes nothing: left out of the canonical form (title, labels)
-    FIELD_NULL_IS_EMPTY =
-        2,           // ITEM: JSON null is allowed and makes every member absent (fields_clear)
-    FIELD_PAIRS = 4, // TEXTS: a JSON object of strings is allowed too and kept as "key=value"
+    // Changes nothing: left out of the canonical form (title, labels).
+    FIELD_NOTE = 1,
+    // ITEM: JSON null is allowed and makes every member absent (fields_clear).
+    FIELD_NULL_IS_EMPTY = 2,
+    // TEXTS: a JSON object of strings is allowed too and kept as "key=value".
+    FIELD_PAIRS = 4,
 };
 
 struct Field {

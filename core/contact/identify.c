@@ -1,7 +1,8 @@
 // One isolated contact, y'' + 2 Z w y' + w^2 y = 0 with w = sqrt(k_b / m_e), ends when y is back at
 // 0: w T_c sqrt(1 - Z^2) = pi and e = exp(-pi Z / sqrt(1 - Z^2)). Solved for k_b and c_b these are
-// eqs (8) and (9) of Li and Darby 2009, the latter with its sign mended. With L = -ln(e): w =
-// hypot(pi, L) / T_c, Z = L / hypot(pi, L).
+// eqs (8) and (9) of Li and Darby 2009, the latter with its sign mended. With L = -ln(e):
+//
+//   w = hypot(pi, L) / T_c,  Z = L / hypot(pi, L)
 #include "core/contact/identify.h"
 
 #include <math.h>

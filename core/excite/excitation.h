@@ -28,7 +28,8 @@ typedef struct ExcitationKind {
     // May be NULL.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
                        Problem *problem);
-    // The fastest the base moves, beyond what its samples show [rad/s]. NULL: it has nothing faster.
+    // The fastest the base moves, beyond what its samples show [rad/s]. NULL: it has nothing
+    // faster.
     double (*fastest)(const Excitation *excitation);
     // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
     // `watch` says so.

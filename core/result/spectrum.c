@@ -1,8 +1,8 @@
-// Welch's method (1967), with the definitions of scipy.signal.welch: for the segments s = 0 ... S -
-// 1 of L samples, beginning every L - overlap samples (an incomplete last one is dropped),
+// Welch's method (1967), with the definitions of scipy.signal.welch. Of S segments of L samples,
+// one beginning every L - overlap samples (an incomplete last one is dropped),
 //
-//   P[k] = c_k / (f_s sum_n w[n]^2) * 1/S sum_s |sum_n w[n] (x_s[n] - trend_s[n]) e^(-2 pi i k n /
-//   L)|^2
+//   X_s[k] = sum over n of w[n] (x_s[n] - trend_s[n]) e^(-2 pi i k n / L)
+//   P[k] = c_k / (f_s sum over n of w[n]^2) * mean over s of |X_s[k]|^2
 //
 // with c_k = 2, but 1 at k = 0 and, for even L, k = L / 2: those have no mirror.
 #include "core/result/spectrum.h"

@@ -174,8 +174,8 @@ Status results_series(App *app, const Request *request, Reply *reply, Problem *p
     return status;
 }
 
-static Status psd_of(App *app, Reply *reply, const Encoder *encoder,
-                     const Spectrum *spectrum, Problem *problem) {
+static Status psd_of(App *app, Reply *reply, const Encoder *encoder, const Spectrum *spectrum,
+                     Problem *problem) {
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0)
         return problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no psd");

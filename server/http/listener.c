@@ -62,7 +62,6 @@ typedef struct Exchange {
     bool is_begun, is_counted, sleeps, is_busy;
 } Exchange;
 
-// --- the reply goes out
 static void add_header(struct MHD_Response *response, const char *name, const char *value) {
     if (value != NULL && value[0] != '\0')
         MHD_add_response_header(response, name, value);
@@ -116,7 +115,6 @@ static enum MHD_Result send_problem(Exchange *exchange, struct MHD_Connection *c
     return send_reply(exchange, connection, &reply, closes);
 }
 
-// --- the request comes in
 static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const char *name,
                                    size_t name_size, const char *value, size_t value_size) {
     (void)kind;
@@ -244,7 +242,6 @@ static enum MHD_Result answer(Exchange *exchange, struct MHD_Connection *connect
     }
 }
 
-// --- what libmicrohttpd calls
 static Seat *seat_of(struct MHD_Connection *connection) {
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -329,7 +326,6 @@ static void resume(void *connection) {
     MHD_resume_connection(connection);
 }
 
-// --- opening and closing
 Status listener_open(const ListenerSettings *settings, Listener **listener, Problem *problem) {
     *listener = NULL;
     Listener *made = calloc(1, sizeof *made);

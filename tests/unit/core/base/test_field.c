@@ -39,9 +39,9 @@ typedef struct Square {
     Reals sides;
 } Square;
 
-static const Field round_fields[] = {
-    FIELD_BASE(Round, common, common_fields),
-    FIELD_REAL(Round, radius, "m", ABOVE(0), 1, "of the circle"), FIELD_END};
+static const Field round_fields[] = {FIELD_BASE(Round, common, common_fields),
+                                     FIELD_REAL(Round, radius, "m", ABOVE(0), 1, "of the circle"),
+                                     FIELD_END};
 static const Field square_fields[] = {
     FIELD_BASE(Square, common, common_fields),
     FIELD_REALS(Square, sides, "m", AT_LEAST(0), 4, PRESENCE_REQUIRED, "of the square"), FIELD_END};
