@@ -70,15 +70,15 @@ typedef struct KindTable {
 // Bounds of a number; for REALS of each number.
 typedef struct Range {
     double least, most;
-    bool is_open_below, is_open_above; // the bound itself is refused
+    bool is_open_below; // `least` itself is refused
 } Range;
 
 // Braces alone, no compound literals: those are no constants in ISO C.
 // clang-format off
-#define ABOVE(x) {(x), (double)INFINITY, true, false}
-#define AT_LEAST(x) {(x), (double)INFINITY, false, false}
-#define WITHIN(a, b) {(a), (b), false, false}
-#define ANY {(double)-INFINITY, (double)INFINITY, false, false}
+#define ABOVE(x) {(x), (double)INFINITY, true}
+#define AT_LEAST(x) {(x), (double)INFINITY, false}
+#define WITHIN(a, b) {(a), (b), false}
+#define ANY {(double)-INFINITY, (double)INFINITY, false}
 // clang-format on
 
 // How a row behaves when the member is not given.

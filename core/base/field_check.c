@@ -9,7 +9,7 @@ enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 static bool range_holds(const Range *range, double value) {
     return (range->is_open_below ? value > range->least : value >= range->least) &&
-           (range->is_open_above ? value < range->most : value <= range->most);
+           value <= range->most;
 }
 
 static Status check_number(const Field *field, double value, const char *pointer,
@@ -27,19 +27,11 @@ static Status check_number(const Field *field, double value, const char *pointer
     const char *space = field->unit != NULL ? " " : "";
     const char *unit = field->unit != NULL ? field->unit : "";
     const char *below = range->is_open_below ? "above" : "at least";
-    const char *above = range->is_open_above ? "below" : "at most";
     if (isinf(range->most))
         return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
                                 "must be %s %s%s%s, is %s", below, least, space, unit, is);
-    if (isinf(range->least))
-        return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                                "must be %s %s%s%s, is %s", above, most, space, unit, is);
-    if (!range->is_open_below && !range->is_open_above)
-        return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                                "must be within [%s, %s]%s%s, is %s", least, most, space, unit, is);
     return problem_add_real(problem, STATUS_INVALID, pointer, value, field->unit,
-                            "must be %s %s and %s %s%s%s, is %s", below, least, above, most, space,
-                            unit, is);
+                            "must be within [%s, %s]%s%s, is %s", least, most, space, unit, is);
 }
 
 static Status check_length(size_t most, size_t has, const char *what, const char *pointer,

@@ -25,7 +25,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
         job_show_clear(&show);
         return problem_set(problem, status, "the job cannot be shown");
     }
-    const bool is_finished = show.state != JOB_ACCEPTED && show.state != JOB_RUNNING;
+    const bool is_finished = job_state_is_final((int)show.state);
     if (code == 0)
         code = is_finished ? 200 : 202;
     if (code == 202)
@@ -149,7 +149,7 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
 static void list_row(App *app, Bytes *bytes, const JobRow *row) {
     JobShow show = {0};
     Job *job = NULL;
-    const bool is_unfinished = row->state == JOB_ACCEPTED || row->state == JOB_RUNNING;
+    const bool is_unfinished = !job_state_is_final(row->state);
     if (is_unfinished && intake_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
         const Status status = job_show(job, &show);
         job_drop(job);

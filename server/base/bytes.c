@@ -11,7 +11,7 @@
 
 #include "server/base/shortest.h"
 
-enum { FIRST_ROOM = 256 };
+enum { FIRST_ROOM = 256, CHUNK = 4096 }; // bytes; numbers that room is made for at once
 
 static bool fail(Bytes *bytes) {
     free(bytes->at);
@@ -86,6 +86,27 @@ void bytes_real(Bytes *bytes, double value) {
         bytes_put(bytes, digits, shortest_write(digits, value));
     else
         bytes_put(bytes, "null", 4);
+}
+
+void bytes_reals(Bytes *bytes, const double *values, size_t count) {
+    for (size_t i = 0; i < count; i += CHUNK) {
+        const size_t end = count - i < CHUNK ? count : i + CHUNK;
+        if (!bytes_reserve(bytes, (end - i) * (SHORTEST_SIZE + 1)))
+            return;
+        char *at = bytes->at + bytes->count;
+        for (size_t j = i; j < end; j++) {
+            if (j > 0)
+                *at++ = ',';
+            if (isfinite(values[j])) {
+                at += shortest_write(at, values[j]);
+            } else {
+                memcpy(at, "null", 4);
+                at += 4;
+            }
+        }
+        *at = '\0';
+        bytes->count = (size_t)(at - bytes->at);
+    }
 }
 
 // The length of the UTF-8 character at `text`, 0 where there is none: cut short, overlong, a

@@ -20,10 +20,12 @@ void bytes_put(Bytes *bytes, const void *data, size_t size);
 void bytes_text(Bytes *bytes, const char *text);
 void bytes_format(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool bytes_reserve(Bytes *bytes, size_t more); // room for `more` beyond count; false once failed
-void bytes_real(Bytes *bytes,
-                double value); // shortest digits that read back; "null" where not finite
-void bytes_json_string(Bytes *bytes,
-                       const char *text); // quoted and escaped; NULL is null, bad UTF-8 U+FFFD
+// The shortest digits that read back to the same double; "null" where it is not finite.
+void bytes_real(Bytes *bytes, double value);
+// Many of them, with commas between; room is made for thousands at once.
+void bytes_reals(Bytes *bytes, const double *values, size_t count);
+// Quoted and escaped; NULL is null, bad UTF-8 becomes U+FFFD.
+void bytes_json_string(Bytes *bytes, const char *text);
 // Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with
 // free(). NULL if failed.
 char *bytes_take(Bytes *bytes, size_t *size);

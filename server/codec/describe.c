@@ -91,7 +91,7 @@ static void print_range(Printer *printer, const Range *range) {
     if (!isinf(range->least))
         real_member(printer, range->is_open_below ? "exclusiveMinimum" : "minimum", range->least);
     if (!isinf(range->most))
-        real_member(printer, range->is_open_above ? "exclusiveMaximum" : "maximum", range->most);
+        real_member(printer, "maximum", range->most);
 }
 
 static void print_length(Printer *printer, const Field *field) {
@@ -105,7 +105,7 @@ static void print_length(Printer *printer, const Field *field) {
 static Range count_range(const Field *field) {
     Range range = field->range;
     if (range.least < 0)
-        range = (Range){0, range.most, false, range.is_open_above};
+        range = (Range){0, range.most, false};
     return range;
 }
 

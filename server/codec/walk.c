@@ -96,7 +96,7 @@ static double allowed_number(const Range *range) {
     if (!isinf(range->least))
         return range->is_open_below ? nextafter(range->least, (double)INFINITY) : range->least;
     if (!isinf(range->most))
-        return range->is_open_above ? nextafter(range->most, -(double)INFINITY) : range->most;
+        return range->most;
     return 0;
 }
 

@@ -2,43 +2,13 @@
 // stands in place of rate and start, as one more member of the form that channels have.
 #include "server/encode/json.h"
 
-#include <math.h>
-#include <string.h>
-
-#include "server/base/shortest.h"
-
-enum { CHUNK = 4096 }; // numbers that room is made for at once
-
-static char *put_real(char *at, double value) {
-    if (isfinite(value))
-        return at + shortest_write(at, value);
-    memcpy(at, "null", 4);
-    return at + 4;
-}
-
-static void put_numbers(Bytes *bytes, const double *values, size_t count) {
-    for (size_t i = 0; i < count; i += CHUNK) {
-        const size_t end = count - i < CHUNK ? count : i + CHUNK;
-        if (!bytes_reserve(bytes, (end - i) * (SHORTEST_SIZE + 1)))
-            return;
-        char *at = bytes->at + bytes->count;
-        for (size_t j = i; j < end; j++) {
-            if (j > 0)
-                *at++ = ',';
-            at = put_real(at, values[j]);
-        }
-        *at = '\0';
-        bytes->count = (size_t)(at - bytes->at);
-    }
-}
-
 void json_put_values(Bytes *bytes, const char *name, const char *unit, const double *values,
                      size_t count) {
     bytes_json_string(bytes, name);
     bytes_text(bytes, ": {\"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_text(bytes, ", \"values\": [");
-    put_numbers(bytes, values, count);
+    bytes_reals(bytes, values, count);
     bytes_text(bytes, "]}");
 }
 

@@ -36,11 +36,7 @@ static void put_values(Bytes *bytes, const char *unit, const double *values, siz
     bytes_text(bytes, "{\"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_text(bytes, ", \"values\": [");
-    for (size_t i = 0; i < count; i++) {
-        if (i > 0)
-            bytes_text(bytes, ",");
-        bytes_real(bytes, values[i]);
-    }
+    bytes_reals(bytes, values, count);
     bytes_text(bytes, "]}");
 }
 

@@ -85,7 +85,6 @@ void wakers_remove(Wakers *wakers, const Waker *waker);
 void wakers_call(Wakers *wakers); // calls and forgets all
 
 Job *job_new(Intake *intake); // one hold; NULL without memory
-bool job_state_is_final(int state);
 
 Computation *computation_new(const char *result);
 void computation_free(Computation *computation);

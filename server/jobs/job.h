@@ -17,6 +17,7 @@ typedef enum JobState {
     JOB_DISMISSED,
 } JobState;
 extern const char *const job_state_names[];
+bool job_state_is_final(int state); // nothing changes it any more
 
 // Called once, from any thread, when something a waiter waits for has happened. Must be quick.
 typedef struct Waker {
