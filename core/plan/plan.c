@@ -3,8 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Identified identify(const Plan *plan, const Buffer *buffer) {
-    const double mass = effective_mass(plan->mass, plan->damper_mass);
+static Identified identify(const Plan *plan, double mass, const Buffer *buffer) {
     if (plan->form == CONTACT_LINEAR)
         return isnan(buffer->stiffness)
                    ? identify_measured(mass, buffer->restitution, buffer->contact_time)
@@ -18,18 +17,17 @@ static Identified identify(const Plan *plan, const Buffer *buffer) {
                         .damping_ratio = NAN};
 }
 
-static Status derive(Plan *plan, const Damper *damper) {
+// The stops' parameters of one damper, into the plan and its report.
+static Status derive(Plan *plan, size_t index, const Damper *damper) {
     DerivedList *list = &plan->report.derived;
-    list->at = calloc(2, sizeof *list->at);
-    if (list->at == NULL)
-        return STATUS_NO_MEMORY;
+    PlanDamper *planned = &plan->dampers[index];
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
-        const Identified identified = identify(plan, buffer);
-        plan->stops[side] =
+        const Identified identified = identify(plan, planned->effective_mass, buffer);
+        planned->stops[side] =
             (PlanStop){identified.restitution, identified.stiffness, identified.damping};
         Derived *derived = &list->at[list->count++];
-        *derived = (Derived){.damper = 1,
+        *derived = (Derived){.damper = index + 1,
                              .side = side,
                              .restitution = identified.restitution,
                              .contact_time = identified.contact_time,
@@ -46,9 +44,8 @@ static Status derive(Plan *plan, const Damper *damper) {
 static Status decide_contact(const Scene *scene, Plan *plan) {
     Decisions *decisions = &plan->report.decisions;
     const Contact *contact = scene_contact(scene);
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, contact);
-    plan->form = law->form;
-    if (!plan->has_damper)
+    const ContactLaw *law = plan->law;
+    if (plan->damper_count == 0)
         return decisions_add(decisions, "contact_model", "none", NAN, NULL,
                              "the scene has no damper");
     if (contact_law(contact)->form != CONTACT_CHOSEN)
@@ -68,34 +65,61 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
                          "a contact stiffness is known");
 }
 
+// Room for matrices, vectors and dampers; one block each, so that plan_free need not know sizes.
+static Status plan_room(Plan *plan, size_t storeys, size_t dampers) {
+    plan->storeys = storeys;
+    plan->mass = calloc(storeys, (3 * storeys + 3) * sizeof *plan->mass);
+    plan->dampers = calloc(dampers > 0 ? dampers : 1, sizeof *plan->dampers);
+    plan->report.derived.at =
+        calloc(dampers > 0 ? 2 * dampers : 1, sizeof *plan->report.derived.at);
+    if (plan->mass == NULL || plan->dampers == NULL || plan->report.derived.at == NULL)
+        return STATUS_NO_MEMORY;
+    plan->stiffness = plan->mass + storeys * storeys;
+    plan->damping = plan->stiffness + storeys * storeys;
+    plan->influence = plan->damping + storeys * storeys;
+    plan->displacement = plan->influence + storeys;
+    plan->velocity = plan->displacement + storeys;
+    return STATUS_OK;
+}
+
+static Status plan_damper(Plan *plan, size_t index, const Damper *damper) {
+    const size_t storey = (size_t)damper->storey - 1;
+    plan->dampers[index] = (PlanDamper){
+        .storey = storey,
+        .mass = damper->mass,
+        .effective_mass = effective_mass(plan->mass[storey * plan->storeys + storey], damper->mass),
+        .clearance = damper->clearance,
+        .offset = damper->offset,
+        .position = damper->position,
+        .velocity = damper->velocity,
+    };
+    plan->damper_count = index + 1;
+    return derive(plan, index, damper);
+}
+
 static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan) {
     const StructureSdof *structure = (const StructureSdof *)(const void *)scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
-    plan->mass = structure->mass;
-    plan->stiffness = structure->stiffness;
-    plan->damping = structure_damping(structure);
-    plan->displacement = excitation->displacement;
-    plan->velocity = excitation->velocity;
+    TRY(plan_room(plan, 1, scene->dampers.count));
+    plan->mass[0] = structure->mass;
+    plan->stiffness[0] = structure->stiffness;
+    plan->damping[0] = structure_damping(structure);
+    plan->influence[0] = 1;
+    plan->displacement[0] = excitation->displacement;
+    plan->velocity[0] = excitation->velocity;
     plan->duration = scene->duration;
     plan->sample_rate = scene->sample_rate;
     plan->count = scene_sample_count(scene);
-    plan->has_damper = scene->dampers.count > 0;
+    plan->law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    plan->form = plan->law->form;
+    for (size_t i = 0; i < scene->dampers.count; i++)
+        TRY(plan_damper(plan, i, &scene->dampers.at[i]));
     TRY(decide_contact(scene, plan));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL, "%s",
                       strcmp(asked, solver) == 0
                           ? "the scene asks for it"
                           : "every contact state is linear, so its motion is known exactly"));
-    if (plan->has_damper) {
-        const Damper *damper = &scene->dampers.at[0];
-        plan->damper_mass = damper->mass;
-        plan->clearance = damper->clearance;
-        plan->offset = damper->offset;
-        plan->position = damper->position;
-        plan->relative_velocity = damper->velocity;
-        TRY(derive(plan, damper));
-    }
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    plan->report.contact_model = strdup(plan->has_damper ? law->kind.name : "none");
+    plan->report.contact_model = strdup(plan->damper_count > 0 ? plan->law->kind.name : "none");
     plan->report.solver = strdup(solver);
     return plan->report.contact_model != NULL && plan->report.solver != NULL ? STATUS_OK
                                                                              : STATUS_NO_MEMORY;
@@ -116,5 +140,7 @@ void plan_free(Plan *plan) {
     if (plan == NULL)
         return;
     fields_clear(plan_report_fields, &plan->report);
+    free(plan->mass);
+    free(plan->dampers);
     free(plan);
 }

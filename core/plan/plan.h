@@ -55,16 +55,26 @@ typedef struct PlanStop {
     double damping;     // c_b [N s/m]
 } PlanStop;
 
-// Plain values, written once by plan_new.
+// One free mass.
+typedef struct PlanDamper {
+    size_t storey;             // from 0
+    double mass;               // m [kg]
+    double effective_mass;     // m_e of the free mass and its storey, 1 / (1/m + (M^-1)_jj) [kg]
+    double clearance, offset;  // d, middle of the stops [m]
+    double position, velocity; // at t = 0, relative to the stops' middle and to the storey
+    PlanStop stops[2];         // by Side
+} PlanDamper;
+
+// Plain values, written once by plan_new. Matrices are storeys x storeys, row after row.
 typedef struct Plan {
-    double mass, stiffness, damping; // M, K, C of the structure
-    bool has_damper;
-    double damper_mass, clearance, offset; // m, d, middle of the stops
-    ContactForm form;                      // CONTACT_IMPULSIVE or CONTACT_LINEAR
-    PlanStop stops[2];                     // by Side
-    double displacement, velocity;         // of the structure at t = 0
-    double position, relative_velocity; // of the free mass at t = 0, relative to the stops' middle
-                                        // and the structure
+    size_t storeys;
+    double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
+    double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
+    double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
+    PlanDamper *dampers;
+    size_t damper_count;
+    const ContactLaw *law;
+    ContactForm form; // the law's: never CONTACT_CHOSEN
     double duration, sample_rate;
     size_t count; // samples
     PlanReport report;

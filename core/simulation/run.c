@@ -58,30 +58,41 @@ typedef struct Journey {
     Base base;
     Columns hidden;      // channels that only a spectrum wants
     Columns transformed; // borrowed values of the spectrum's channels
+    RunColumn wanted[CHANNEL_COUNT];
+    size_t wanted_count;
     Outcome *outcome;
 } Journey;
 
-// Columns for `wanted` that no earlier request has, entered into the run.
-static Status make_columns(const Journey *journey, const Texts *wanted, Columns *columns, Run *run,
+static RunColumn *find_column(Journey *journey, const Channel *channel) {
+    for (size_t i = 0; i < journey->wanted_count; i++)
+        if (&channels[journey->wanted[i].channel] == channel)
+            return &journey->wanted[i];
+    return NULL;
+}
+
+// Columns for `names` that no earlier request has, entered into the journey's list.
+static Status make_columns(Journey *journey, const Texts *names, Columns *columns,
                            Problem *problem) {
-    int missing[CHANNEL_COUNT];
-    size_t count = 0;
-    for (size_t i = 0; i < wanted->count; i++) {
-        const Channel *channel = channel_find(wanted->at[i]);
-        if (channel != NULL && run->columns[channel - channels] == NULL)
-            missing[count++] = (int)(channel - channels);
+    const size_t first = journey->wanted_count;
+    for (size_t i = 0; i < names->count; i++) {
+        const Channel *channel = channel_find(names->at[i]);
+        if (channel != NULL && find_column(journey, channel) == NULL)
+            journey->wanted[journey->wanted_count++] =
+                (RunColumn){.channel = (ChannelId)(channel - channels)};
     }
+    const size_t count = journey->wanted_count - first;
     if (count == 0)
         return STATUS_OK;
     TRY(columns_make(columns, count, journey->plan->count, 0, problem));
     for (size_t i = 0; i < count; i++) {
-        columns_name(columns, i, channels[missing[i]].name, channels[missing[i]].unit);
-        run->columns[missing[i]] = columns->at[i].values;
+        RunColumn *wanted = &journey->wanted[first + i];
+        columns_name(columns, i, channels[wanted->channel].name, channels[wanted->channel].unit);
+        wanted->values = columns->at[i].values;
     }
     return STATUS_OK;
 }
 
-static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) {
+static Status make_spectrum(Journey *journey, Problem *problem) {
     const SpectrumRequest *request = &journey->simulation->output.psd;
     const char *units[CHANNEL_COUNT];
     if (request->channels.count == 0)
@@ -95,7 +106,7 @@ static Status make_spectrum(Journey *journey, const Run *run, Problem *problem) 
     for (size_t i = 0; i < columns->count; i++) {
         const Channel *channel = channel_find(request->channels.at[i]);
         columns_name(columns, i, channel->name, channel->unit);
-        columns->at[i].values = run->columns[channel - channels];
+        columns->at[i].values = find_column(journey, channel)->values;
         units[i] = channel->psd_unit;
     }
     Stage stage = {journey->watch, 0.9, 0.1};
@@ -155,13 +166,14 @@ static Status travel(Journey *journey, Problem *problem) {
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
-    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, &run,
-                     problem));
-    TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, &run, problem));
+    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, problem));
+    TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
+    run.columns = journey->wanted;
+    run.column_count = journey->wanted_count;
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     summarize(outcome);
     TRY(check_finite(outcome, problem));
-    TRY(make_spectrum(journey, &run, problem));
+    TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
     return STATUS_OK;

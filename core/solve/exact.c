@@ -24,8 +24,9 @@ enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
     ledger_work(&exact->ledger,
-                -plan->mass * integrals->av - plan->damper_mass * (integrals->av + integrals->aw),
-                plan->damping * integrals->vv);
+                -plan->mass[0] * integrals->av -
+                    exact->damper->mass * (integrals->av + integrals->aw),
+                plan->damping[0] * integrals->vv);
     recorder_base(&exact->recorder, integrals->a);
 }
 
@@ -33,17 +34,17 @@ static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
 static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integrals) {
     const double mass = exact_effective_mass(exact);
     double s = -1;
-    const double peak = arc_peak_force(arc, exact->ledger.open.peak_force / mass, &s);
-    ledger_force(&exact->ledger, mass * peak);
+    const double peak = arc_peak_force(arc, exact->row.impact.peak_force / mass, &s);
+    ledger_force(&exact->ledger, &exact->row, mass * peak);
     if (s >= 0) {
         const State middle = arc_at(arc, s);
         const double n = root_value(arc->force, arc->degree - 1, s) / (arc->length * arc->length);
         const double own = exact->flying.damping * middle.v + exact->flying.omega2 * middle.x;
         ledger_acceleration(&exact->ledger, exact->resting.share * n - own);
     }
-    ledger_stretch(&exact->ledger, arc->length, mass * arc_impulse(arc),
-                   exact->phase == CONTACT ? exact->plan->stops[exact->side].damping * integrals->ww
-                                           : 0);
+    ledger_stretch(
+        &exact->ledger, &exact->row, arc->length, mass * arc_impulse(arc),
+        exact->phase == CONTACT ? exact->damper->stops[exact->side].damping * integrals->ww : 0);
 }
 
 // After an arc of free flight: has the gap opened beyond rounding yet? Where the arc ends by
@@ -84,7 +85,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     const double mass = exact_effective_mass(exact);
     State end;
     const HoldLevel *level = hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
-                                       exact->ledger.open.peak_force / mass, &end);
+                                       exact->row.impact.peak_force / mass, &end);
     if (level == NULL)
         return false;
     double impulse;
@@ -92,9 +93,9 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     take_integrals(exact, &integrals);
     exact->state = end;
     exact->offset += level->length;
-    ledger_force(&exact->ledger, fabs(exact_force(exact)));
-    ledger_stretch(&exact->ledger, level->length, mass * impulse,
-                   exact->plan->stops[exact->side].damping * integrals.ww);
+    ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
+    ledger_stretch(&exact->ledger, &exact->row, level->length, mass * impulse,
+                   exact->damper->stops[exact->side].damping * integrals.ww);
     return true;
 }
 
@@ -151,7 +152,7 @@ static bool fly(Exact *exact) {
     ArcIntegrals integrals;
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
-    if (exact->plan->has_damper) {
+    if (exact->plan->damper_count > 0) {
         const double first = fabs(slice.value),
                      last = fabs(slice.value + slice.slope * exact->interval);
         const double most = slice.omega > 0 ? first + fabs(slice.slope)
@@ -194,28 +195,29 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     memset(exact, 0, sizeof *exact);
     exact->run = run;
     exact->plan = plan;
+    exact->damper = plan->dampers;
     exact->problem = problem;
     exact->interval = 1 / plan->sample_rate;
-    const double total = plan->mass + plan->damper_mass;
-    const double share = plan->damper_mass / total, mass = plan->mass * share;
-    Motion flying = {.omega2 = plan->stiffness / plan->mass,
-                     .damping = plan->damping / plan->mass,
+    const double total = plan->mass[0] + exact->damper->mass;
+    const double share = exact->damper->mass / total, mass = plan->mass[0] * share;
+    Motion flying = {.omega2 = plan->stiffness[0] / plan->mass[0],
+                     .damping = plan->damping[0] / plan->mass[0],
                      .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
     flying.rate = fmax(fmax(own, run->base->omega), 1e-300);
     exact->flying = exact->resting = flying;
     exact->resting.is_resting = true;
-    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->has_damper; side++) {
+    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->damper_count > 0; side++) {
         Motion *touching = &exact->touching[side];
         *touching = flying;
-        touching->contact_omega2 = plan->stops[side].stiffness / mass;
-        touching->contact_damping = plan->stops[side].damping / mass;
+        touching->contact_omega2 = exact->damper->stops[side].stiffness / mass;
+        touching->contact_damping = exact->damper->stops[side].damping / mass;
         touching->rate = fmax(own + fmax(sqrt(touching->contact_omega2), touching->contact_damping),
                               flying.rate);
     }
     if (!isfinite(flying.rate) ||
         !isfinite(exact->touching[SIDE_LEFT].rate + exact->touching[SIDE_RIGHT].rate) ||
-        !(share > 0 || !plan->has_damper) || !(share < 1))
+        !(share > 0 || plan->damper_count == 0) || !(share < 1))
         return problem_set(
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
@@ -224,8 +226,8 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
                 exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
-    exact->state =
-        (State){plan->displacement, plan->velocity, plan->position, plan->relative_velocity};
+    exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
+                           exact->damper->velocity};
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     recorder_start(&exact->recorder, run, response);
@@ -279,7 +281,7 @@ static Status solve(Exact *exact) {
     exact_note(exact);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
-    return ledger_finish(&exact->ledger, &energy, exact->problem);
+    return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {

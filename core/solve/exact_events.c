@@ -17,8 +17,8 @@ static void begin_contact(Exact *exact, Side side) {
     exact->origin = (Origin)side;
     exact->state.r = 0;
     const double speed = fabs(exact->state.w);
-    ledger_open(&exact->ledger, IMPACT_IMPACT, exact_time(exact), side, speed);
-    ledger_force(&exact->ledger, exact->plan->stops[side].damping * speed);
+    ledger_open(&exact->row, IMPACT_IMPACT, exact_time(exact), 0, side, speed);
+    ledger_force(&exact->ledger, &exact->row, exact->damper->stops[side].damping * speed);
 }
 
 static void begin_rest(Exact *exact, Side side) {
@@ -30,21 +30,21 @@ static void begin_rest(Exact *exact, Side side) {
     exact->origin = (Origin)side;
     exact->phase = RESTING;
     exact->side = side;
-    ledger_open(&exact->ledger, IMPACT_RESTING, exact_time(exact), side, NAN);
-    ledger_stretch(&exact->ledger, 0, exact_sign(side) * mass * speed, 0.5 * mass * speed * speed);
-    ledger_force(&exact->ledger, fabs(exact_force(exact)));
+    ledger_open(&exact->row, IMPACT_RESTING, exact_time(exact), 0, side, NAN);
+    ledger_stretch(&exact->ledger, &exact->row, 0, exact_sign(side) * mass * speed,
+                   0.5 * mass * speed * speed);
+    ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
 }
 
 static void bounce(Exact *exact, Side side) {
-    const Plan *plan = exact->plan;
-    const double sign = exact_sign(side), e = plan->stops[side].restitution;
+    const double sign = exact_sign(side), e = exact->damper->stops[side].restitution;
     const double approach = fabs(exact->state.w);
     const double mass = exact_effective_mass(exact); // m_e = m M / (M + m)
     exact->origin = (Origin)side;
     exact->state.r = 0;
     exact->state.v += sign * exact->resting.share * (1 + e) * approach;
     exact->state.w = -sign * e * approach;
-    ledger_bounce(&exact->ledger, exact_time(exact), side, approach, e * approach, mass);
+    ledger_bounce(&exact->ledger, exact_time(exact), 0, side, approach, e * approach, mass);
     // Bounces towards a pushing stop follow each other in a geometric series. When all that are
     // left take less time than the clock resolves, they are one: the mass rests.
     const double pull = sign * exact_push(exact);
@@ -61,7 +61,7 @@ void exact_touch(Exact *exact, Side side) {
     exact_note(exact);
     if (exact->plan->form == CONTACT_LINEAR)
         begin_contact(exact, side);
-    else if (exact->plan->clearance == 0)
+    else if (exact->damper->clearance == 0)
         begin_rest(exact, side);
     else
         bounce(exact, side);
@@ -75,9 +75,9 @@ void exact_release(Exact *exact) {
     exact->is_leaving = exact->phase == RESTING;
     exact->state.r = 0;
     exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
-    ledger_close(&exact->ledger, exact_time(exact),
+    ledger_close(&exact->ledger, &exact->row, exact_time(exact),
                  exact->phase == RESTING ? NAN : fabs(exact->state.w));
-    const bool is_held = exact->phase == RESTING && exact->plan->clearance == 0;
+    const bool is_held = exact->phase == RESTING && exact->damper->clearance == 0;
     exact->phase = FLIGHT;
     if (is_held) // between stops without clearance the other one takes over
         begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
@@ -104,7 +104,7 @@ bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side)
         return root_first_crossing(gap, arc->degree, s);
     }
     bool is_found = false;
-    if (!exact->plan->has_damper)
+    if (exact->plan->damper_count == 0)
         return false;
     for (int i = 0; i < 2; i++) {
         const double sign = exact_sign((Side)i);

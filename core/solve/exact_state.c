@@ -5,16 +5,16 @@
 // Room between the free mass and a stop at r = 0 of the present origin [m].
 double exact_room(const Exact *exact, Side side) {
     if (exact->origin == ORIGIN_MIDDLE)
-        return exact->plan->clearance / 2;
-    return exact->origin == (Origin)side ? 0 : exact->plan->clearance;
+        return exact->damper->clearance / 2;
+    return exact->origin == (Origin)side ? 0 : exact->damper->clearance;
 }
 
 // u = x-relative displacement of the free mass [m].
 static double relative(const Exact *exact) {
-    const double stop = exact->plan->clearance / 2;
+    const double stop = exact->damper->clearance / 2;
     const double origin =
         exact->origin == ORIGIN_MIDDLE ? 0 : exact_sign((Side)exact->origin) * stop;
-    return exact->plan->offset + origin + exact->state.r;
+    return exact->damper->offset + origin + exact->state.r;
 }
 
 double exact_time(const Exact *exact) {
@@ -22,7 +22,7 @@ double exact_time(const Exact *exact) {
 }
 
 double exact_effective_mass(const Exact *exact) {
-    return exact->plan->mass *
+    return exact->plan->mass[0] *
            exact->resting.share; // 1 - share would lose digits where m is the larger
 }
 
@@ -33,10 +33,9 @@ double exact_push(const Exact *exact) {
 
 // Contact force on the structure, positive to the right [N].
 double exact_force(const Exact *exact) {
-    const Plan *plan = exact->plan;
     if (exact->phase == CONTACT)
-        return plan->stops[exact->side].stiffness * exact->state.r +
-               plan->stops[exact->side].damping * exact->state.w;
+        return exact->damper->stops[exact->side].stiffness * exact->state.r +
+               exact->damper->stops[exact->side].damping * exact->state.w;
     if (exact->phase == RESTING)
         return exact_effective_mass(exact) * exact_push(exact);
     return 0;
@@ -46,9 +45,9 @@ Moment exact_moment(const Exact *exact) {
     const double n = exact_force(exact);
     Moment moment = {.x = exact->state.x,
                      .v = exact->state.v,
-                     .acceleration = n / exact->plan->mass - exact_push(exact),
+                     .acceleration = n / exact->plan->mass[0] - exact_push(exact),
                      .force = n};
-    if (exact->plan->has_damper) {
+    if (exact->plan->damper_count > 0) {
         moment.damper_x = exact->state.x + relative(exact);
         moment.damper_v = exact->state.v + exact->state.w;
         moment.penetration =
@@ -61,10 +60,10 @@ EnergyState exact_energy(const Exact *exact) {
     const Plan *plan = exact->plan;
     const State *state = &exact->state;
     const double z = state->v + state->w;
-    const double k = exact->phase == CONTACT ? plan->stops[exact->side].stiffness : 0;
-    return (EnergyState){0.5 * plan->mass * state->v * state->v + 0.5 * plan->damper_mass * z * z,
-                         0.5 * plan->stiffness * state->x * state->x +
-                             0.5 * k * state->r * state->r};
+    const double k = exact->phase == CONTACT ? exact->damper->stops[exact->side].stiffness : 0;
+    return (EnergyState){
+        0.5 * plan->mass[0] * state->v * state->v + 0.5 * exact->damper->mass * z * z,
+        0.5 * plan->stiffness[0] * state->x * state->x + 0.5 * k * state->r * state->r};
 }
 
 const Motion *exact_motion(const Exact *exact) {

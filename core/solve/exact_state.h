@@ -17,6 +17,7 @@ typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN
 typedef struct Exact {
     Run *run;
     const Plan *plan;
+    const PlanDamper *damper; // all zero where there is none
     Problem *problem;
     Motion flying, touching[2], resting;
     Flight flight;
@@ -31,6 +32,7 @@ typedef struct Exact {
     double interval;
     BaseCursor base;
     Ledger ledger;
+    LedgerRow row; // of the present contact or rest
     Recorder recorder;
     Hold *holds[2];      // by Side; made when a contact first lasts long
     size_t contact_arcs; // since it began

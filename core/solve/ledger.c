@@ -35,48 +35,49 @@ static void add(Ledger *ledger, const Impact *impact) {
     impacts->at[impacts->count++] = *impact;
 }
 
-void ledger_open(Ledger *ledger, ImpactKind kind, double time, Side side, double approach) {
-    ledger->is_open = true;
-    ledger->open = (Impact){.kind = (int)kind,
-                            .start = time,
-                            .end = NAN,
-                            .damper = 1,
-                            .side = (int)side,
-                            .approach_speed = approach,
-                            .separation_speed = NAN,
-                            .restitution = NAN};
+void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Side side,
+                 double approach) {
+    row->is_open = true;
+    row->impact = (Impact){.kind = (int)kind,
+                           .start = time,
+                           .end = NAN,
+                           .damper = damper + 1,
+                           .side = (int)side,
+                           .approach_speed = approach,
+                           .separation_speed = NAN,
+                           .restitution = NAN};
 }
 
-void ledger_stretch(Ledger *ledger, double length, double impulse, double lost) {
-    ledger->open.duration += length;
-    ledger->open.impulse += impulse;
-    ledger->open.energy_lost += lost;
+void ledger_stretch(Ledger *ledger, LedgerRow *row, double length, double impulse, double lost) {
+    row->impact.duration += length;
+    row->impact.impulse += impulse;
+    row->impact.energy_lost += lost;
     ledger->energy.contact += lost;
 }
 
-void ledger_force(Ledger *ledger, double magnitude) {
+void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude) {
     Peaks *peaks = &ledger->response->peaks;
-    ledger->open.peak_force = larger(ledger->open.peak_force, magnitude);
+    row->impact.peak_force = larger(row->impact.peak_force, magnitude);
     peaks->contact_force = larger(peaks->contact_force, magnitude);
 }
 
-void ledger_close(Ledger *ledger, double time, double separation) {
-    Impact *open = &ledger->open;
+void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation) {
+    Impact *open = &row->impact;
     open->end = time;
     open->separation_speed = separation;
     if (open->approach_speed > 0)
         open->restitution = separation / open->approach_speed;
     open->impulse = fabs(open->impulse);
     add(ledger, open);
-    ledger->is_open = false;
+    row->is_open = false;
 }
 
-void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
-                   double mass) {
+void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double approach,
+                   double separation, double mass) {
     const Impact impact = {.kind = IMPACT_IMPACT,
                            .start = time,
                            .end = time,
-                           .damper = 1,
+                           .damper = damper + 1,
                            .side = (int)side,
                            .approach_speed = approach,
                            .separation_speed = separation,
@@ -131,12 +132,28 @@ Status ledger_status(const Ledger *ledger, Problem *problem) {
     return STATUS_OK;
 }
 
-Status ledger_finish(Ledger *ledger, const EnergyState *state, Problem *problem) {
-    if (ledger->is_open) {
-        ledger->open.duration = NAN;
-        ledger->open.impulse = fabs(ledger->open.impulse);
-        add(ledger, &ledger->open);
+static int by_start(const void *a, const void *b) {
+    const Impact *first = a, *second = b;
+    if (first->start != second->start)
+        return first->start < second->start ? -1 : 1;
+    if (first->damper != second->damper)
+        return first->damper < second->damper ? -1 : 1;
+    return (first->side > second->side) - (first->side < second->side);
+}
+
+Status ledger_finish(Ledger *ledger, LedgerRow *rows, size_t count, const EnergyState *state,
+                     Problem *problem) {
+    for (size_t i = 0; i < count; i++) {
+        if (!rows[i].is_open)
+            continue;
+        rows[i].impact.duration = NAN;
+        rows[i].impact.impulse = fabs(rows[i].impact.impulse);
+        add(ledger, &rows[i].impact);
     }
+    // One damper's rows are in order: each ends before the next begins.
+    Impacts *impacts = &ledger->response->impacts;
+    if (count > 1 && impacts->count > 1)
+        qsort(impacts->at, impacts->count, sizeof *impacts->at, by_start);
     ledger_balance(ledger, state);
     Energy *energy = &ledger->energy;
     energy->kinetic = state->kinetic;

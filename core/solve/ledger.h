@@ -17,27 +17,32 @@ typedef struct EnergyState {
     double kinetic, strain; // [J]
 } EnergyState;
 
+// A contact or rest that goes on: one per damper.
+typedef struct LedgerRow {
+    bool is_open;
+    Impact impact;
+} LedgerRow;
+
 typedef struct Ledger {
     Response *response;
     size_t room, most;
     Status status;
-    bool is_open;
-    Impact open;
     Energy energy;
     double largest_energy, largest_balance;
 } Ledger;
 
 void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy);
 
-// A contact or rest begins; approach NAN for a rest.
-void ledger_open(Ledger *ledger, ImpactKind kind, double time, Side side, double approach);
+// A contact or rest of a damper (from 0) begins; approach NAN for a rest.
+void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Side side,
+                 double approach);
 // A stretch of it: its length [s], the integral of N [N s] and the work lost [J].
-void ledger_stretch(Ledger *ledger, double length, double impulse, double lost);
-void ledger_force(Ledger *ledger, double magnitude); // a candidate for the peak [N]
-void ledger_close(Ledger *ledger, double time, double separation);
+void ledger_stretch(Ledger *ledger, LedgerRow *row, double length, double impulse, double lost);
+void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude); // a candidate for the peak [N]
+void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation);
 // An instantaneous impact of two bodies with effective mass `mass`.
-void ledger_bounce(Ledger *ledger, double time, Side side, double approach, double separation,
-                   double mass);
+void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double approach,
+                   double separation, double mass);
 
 void ledger_work(Ledger *ledger, double input, double structural_damping);
 void ledger_balance(Ledger *ledger, const EnergyState *energy);
@@ -48,7 +53,9 @@ void ledger_acceleration(Ledger *ledger, double acceleration);
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept.
 Status ledger_status(const Ledger *ledger, Problem *problem);
-// Lists an open contact, writes the energies into the response.
-Status ledger_finish(Ledger *ledger, const EnergyState *energy, Problem *problem);
+// Lists the open ones of `rows`, puts all into order (by start, then damper, then left before
+// right) and writes the energies into the response.
+Status ledger_finish(Ledger *ledger, LedgerRow *rows, size_t count, const EnergyState *energy,
+                     Problem *problem);
 
 #endif

@@ -4,7 +4,8 @@
 
 void recorder_start(Recorder *recorder, const Run *run, Response *response) {
     memset(recorder, 0, sizeof *recorder);
-    memcpy(recorder->columns, run->columns, sizeof recorder->columns);
+    for (size_t i = 0; i < run->column_count; i++)
+        recorder->columns[run->columns[i].channel] = run->columns[i].values;
     recorder->sample_rate = run->plan->sample_rate;
     recorder->statistics_start =
         (size_t)ceil(run->statistics_from * run->plan->sample_rate * (1 - 1e-12));

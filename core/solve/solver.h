@@ -15,16 +15,24 @@ typedef struct Accuracy {
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
 
+// Where the samples of one channel go.
+typedef struct RunColumn {
+    ChannelId channel;
+    size_t number;  // of the storey or damper, from 0
+    double *values; // plan->count of them
+} RunColumn;
+
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Watch *watch;
-    double *columns[CHANNEL_COUNT]; // plan->count values each; NULL: not wanted
-    double statistics_from;         // [s]
-    size_t impacts_most;            // ledger rows; 0: no limit
-    double steps_most;              // solver steps; 0: no limit
-    double steps;                   // out: work counted, in solver steps
+    const RunColumn *columns; // what is wanted, each once
+    size_t column_count;
+    double statistics_from; // [s]
+    size_t impacts_most;    // ledger rows; 0: no limit
+    double steps_most;      // solver steps; 0: no limit
+    double steps;           // out: work counted, in solver steps
 } Run;
 
 typedef struct Solver {

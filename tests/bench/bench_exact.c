@@ -87,9 +87,10 @@ int main(void) {
                 STATUS_OK)
                 return 1;
             const int64_t based = clock_thread_cpu_ns();
-            Run run = {.plan = plan, .base = &base};
+            RunColumn columns[CHANNELS];
             for (size_t i2 = 0; i2 < CHANNELS; i2++)
-                run.columns[wanted[i2]] = block + i2 * count;
+                columns[i2] = (RunColumn){wanted[i2], 0, block + i2 * count};
+            Run run = {.plan = plan, .base = &base, .columns = columns, .column_count = CHANNELS};
             const int64_t ready = clock_thread_cpu_ns();
             if (solver_exact.run(&run, &response, &problem) != STATUS_OK)
                 return printf("%s\n", problem.detail), 1;
