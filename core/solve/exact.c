@@ -17,6 +17,7 @@
 
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_state.h"
+#include "core/solve/exact_stride.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
@@ -146,7 +147,7 @@ static Status advance(Exact *exact, double length) {
 // The whole interval in one step, where no stop can be reached. False: it must go by arcs.
 static bool fly(Exact *exact) {
     Slice slice;
-    if (exact->phase != FLIGHT || exact->is_leaving ||
+    if (exact->phase != FLIGHT || exact->is_leaving || exact->lanes.run != NULL ||
         !base_cursor_interval(&exact->base, exact->sample, &slice))
         return false;
     ArcIntegrals integrals;
@@ -222,8 +223,6 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
-    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
-                exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
@@ -231,6 +230,10 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     recorder_start(&exact->recorder, run, response);
+    exact_stride_start(exact);
+    if (exact->lanes.run == NULL)
+        flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
+                    exact->interval);
     return STATUS_OK;
 }
 
@@ -258,6 +261,13 @@ static Status solve(Exact *exact) {
     recorder_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
     ledger_peaks(&exact->ledger, &at);
     while (exact->sample + 1 < plan->count) {
+        const size_t most = plan->count - 1 - exact->sample;
+        const size_t strode = exact_stride(exact, most < WATCH_ARCS ? most : WATCH_ARCS);
+        if ((exact->arcs += strode) >= WATCH_ARCS)
+            TRY(keep_going(exact));
+        if (strode == most)
+            break;
+        exact_stride_enter(exact);
         if (!fly(exact)) {
             TRY(cross(exact, exact->interval));
         } else if (++exact->arcs >= WATCH_ARCS) {
@@ -276,6 +286,7 @@ static Status solve(Exact *exact) {
             ledger_balance(&exact->ledger, &energy);
         }
     }
+    exact_stride_enter(exact);
     // The duration may end between samples.
     TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
     exact_note(exact);

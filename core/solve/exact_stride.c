@@ -1,0 +1,120 @@
+#include "core/solve/exact_stride.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
+
+static double largest(const double *values, size_t count) {
+    double most[4] = {0, 0, 0, 0};
+    for (size_t i = 0; i < count; i++) {
+        const double value = fabs(values[i]);
+        most[i % 4] = value > most[i % 4] ? value : most[i % 4];
+    }
+    return fmax(fmax(most[0], most[1]), fmax(most[2], most[3]));
+}
+
+void exact_stride_start(Exact *exact) {
+    const Base *base = exact->run->base;
+    const size_t bytes = exact->plan->count * sizeof(double);
+    Stretch *stretch = &exact->stretch;
+    double *const *columns = exact->recorder.columns;
+    if (base->form == BASE_SINE || (base->form == BASE_SAMPLED && exact->base.ratio != 1))
+        return;
+    lanes_make(&exact->lanes, &exact->flying, exact->interval);
+    if (base->form == BASE_SAMPLED)
+        stretch->base_most = largest(base->values, base->count);
+    memcpy(stretch->columns, columns, sizeof stretch->columns);
+    stretch->peaks = &exact->ledger.response->peaks;
+    stretch->left = stretch->right = INFINITY;
+    // What flight leaves alone: contacts write over it.
+    const bool has_damper = exact->plan->damper_count > 0;
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        const bool is_damper = i == CHANNEL_DAMPER_DISPLACEMENT || i == CHANNEL_DAMPER_VELOCITY;
+        if (columns[i] == NULL)
+            continue;
+        if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
+            i == CHANNEL_BASE_ACCELERATION || (is_damper && !has_damper)) {
+            memset(columns[i], 0, bytes);
+            stretch->columns[i] = NULL;
+        }
+    }
+    double *const column = columns[CHANNEL_BASE_ACCELERATION];
+    if (column != NULL && base->form == BASE_SAMPLED)
+        memcpy(column, base->values,
+               (base->count < exact->plan->count ? base->count : exact->plan->count) *
+                   sizeof *column);
+}
+
+// The base from the present sample on: how many intervals it goes on in one way, and its samples or
+// NULL where it is still.
+static size_t base_ahead(const Exact *exact, const double **values) {
+    const Base *base = exact->run->base;
+    *values = NULL;
+    if (base->form == BASE_STILL || exact->sample + 1 >= base->count)
+        return SIZE_MAX;
+    *values = base->values + exact->sample;
+    return base->count - 1 - exact->sample;
+}
+
+static size_t smaller(size_t a, size_t b) {
+    return a < b ? a : b;
+}
+
+size_t exact_stride(Exact *exact, size_t most) {
+    Stretch *s = &exact->stretch;
+    if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
+        return 0;
+    const double *base;
+    most = smaller(most, base_ahead(exact, &base));
+    // The sample where statistics begin is not for strides: much begins anew there.
+    if (exact->sample < exact->recorder.statistics_start)
+        most = smaller(most, exact->recorder.statistics_start - 1 - exact->sample);
+    if (exact->plan->damper_count > 0) {
+        s->left = exact_room(exact, SIDE_LEFT);
+        s->right = exact_room(exact, SIDE_RIGHT);
+        s->middle = exact_relative(exact) - exact->state.r;
+    }
+    const double z = exact->state.v + exact->state.w;
+    s->x = exact->state.x;
+    s->v = exact->state.v;
+    s->r = exact->state.r;
+    s->z = z;
+    const size_t count = lanes_fly(&exact->lanes, s, exact->sample, most, base);
+    if (count == 0)
+        return 0;
+    exact->state = (State){s->x, s->v, s->r, s->z - s->v};
+    const double gain = z - s->z;
+    exact->free_work += gain * (z - gain / 2);
+    exact->pending += count;
+    exact->sample += count;
+    exact->run->steps += (double)count;
+    exact->recorder.last_velocity = s->v;
+    if (exact->pending >= PENDING_MOST)
+        exact_stride_enter(exact);
+    return count;
+}
+
+void exact_stride_enter(Exact *exact) {
+    if (exact->pending == 0)
+        return;
+    const Plan *plan = exact->plan;
+    const Lanes *lanes = &exact->lanes;
+    double sums[LANE_SUMS], vv = 0, av = 0;
+    lanes_take_sums(&exact->stretch, sums);
+    for (int i = 0; i < LANE_SUMS; i++) {
+        vv += lanes->vv[i] * sums[i];
+        av += lanes->av[i] * sums[i];
+    }
+    ledger_work(&exact->ledger, -plan->mass[0] * av - exact->damper->mass * exact->free_work,
+                plan->damping[0] * vv);
+    if (exact->sample >= exact->recorder.statistics_start)
+        recorder_sums(&exact->recorder, exact->pending, sums[XX],
+                      lanes->damping * lanes->damping * sums[VV] +
+                          2 * lanes->damping * lanes->omega2 * sums[XV] +
+                          lanes->omega2 * lanes->omega2 * sums[XX]);
+    const EnergyState energy = exact_energy(exact);
+    ledger_balance(&exact->ledger, &energy);
+    exact->free_work = 0;
+    exact->pending = 0;
+}
