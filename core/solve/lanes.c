@@ -24,7 +24,7 @@ typedef struct Impulse {
 static Impulse impulse_at(long double omega2, long double damping, long double t) {
     Impulse out = {0, 0, 0};
     long double before = 0, term = t; // c_k t^k
-    for (int k = 1; k < SERIES && fabsl(term) > 1e-24L * t; k++) {
+    for (int k = 1; k < SERIES && fabsl(term) + fabsl(before * t) > 1e-23L * t; k++) {
         out.S += term;
         out.I1 += term * t / (k + 1);
         out.I2 += term * t * t / ((k + 1) * (k + 2));
