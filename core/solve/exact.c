@@ -263,24 +263,18 @@ static Status solve(Exact *exact) {
     while (exact->sample + 1 < plan->count) {
         const size_t most = plan->count - 1 - exact->sample;
         const size_t strode = exact_stride(exact, most < WATCH_ARCS ? most : WATCH_ARCS);
+        TRY(ledger_status(&exact->ledger, exact->problem));
         if ((exact->arcs += strode) >= WATCH_ARCS)
             TRY(keep_going(exact));
-        if (strode == most)
-            break;
+        if (strode > 0 && exact->offset == 0)
+            continue;
         exact_stride_enter(exact);
         if (!fly(exact)) {
             TRY(cross(exact, exact->interval));
         } else if (++exact->arcs >= WATCH_ARCS) {
             TRY(keep_going(exact));
         }
-        exact->sample++;
-        exact->offset = 0;
-        at = exact_moment(exact);
-        if (exact->sample == exact->recorder.statistics_start)
-            ledger_forget_peaks(&exact->ledger, &at);
-        recorder_take(&exact->recorder, exact->sample, &at,
-                      base_cursor_at(&exact->base, exact->sample));
-        ledger_peaks(&exact->ledger, &at);
+        exact_pass_sample(exact);
         if (exact->sample % 64 == 0) {
             const EnergyState energy = exact_energy(exact);
             ledger_balance(&exact->ledger, &energy);

@@ -9,6 +9,7 @@
 #include "core/solve/hold.h"
 #include "core/solve/lanes.h"
 #include "core/solve/ledger.h"
+#include "core/solve/pulse.h"
 #include "core/solve/record.h"
 #include "core/solve/solver.h"
 
@@ -24,6 +25,8 @@ typedef struct Exact {
     Flight flight;
     Lanes lanes;
     Stretch stretch;
+    Pulse pulses[2]; // by Side
+    bool has_hops;    // intervals are short enough for hop.h
     size_t pending;   // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
     Phase phase;

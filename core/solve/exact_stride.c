@@ -1,7 +1,13 @@
+// A stride: blocks of flight, a stop, its contact and the way back to a sample. Each step proves that
+// it misses nothing, or leaves state and ledger at its beginning for the arcs.
 #include "core/solve/exact_stride.h"
 
 #include <math.h>
 #include <string.h>
+
+#include "core/solve/exact_events.h"
+#include "core/solve/exact_press.h"
+#include "core/solve/hop.h"
 
 enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
 
@@ -22,6 +28,10 @@ void exact_stride_start(Exact *exact) {
     if (base->form == BASE_SINE || (base->form == BASE_SAMPLED && exact->base.ratio != 1))
         return;
     lanes_make(&exact->lanes, &exact->flying, exact->interval);
+    exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
+    for (int side = 0; side < 2 && exact->has_hops; side++)
+        if (exact->touching[side].contact_omega2 > 0)
+            pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
     memcpy(stretch->columns, columns, sizeof stretch->columns);
@@ -61,13 +71,12 @@ static size_t smaller(size_t a, size_t b) {
     return a < b ? a : b;
 }
 
-size_t exact_stride(Exact *exact, size_t most) {
+// Whole intervals of flight.
+static size_t fly(Exact *exact, size_t most) {
     Stretch *s = &exact->stretch;
-    if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
-        return 0;
     const double *base;
     most = smaller(most, base_ahead(exact, &base));
-    // The sample where statistics begin is not for strides: much begins anew there.
+    // The sample where statistics begin is not for blocks: much begins anew there.
     if (exact->sample < exact->recorder.statistics_start)
         most = smaller(most, exact->recorder.statistics_start - 1 - exact->sample);
     if (exact->plan->damper_count > 0) {
@@ -95,6 +104,95 @@ size_t exact_stride(Exact *exact, size_t most) {
     return count;
 }
 
+static void take_hop(Exact *exact, const Hop *hop, double s) {
+    const ArcIntegrals integrals = hop_integrals(hop, &exact->state, s);
+    const Plan *plan = exact->plan;
+    ledger_work(&exact->ledger,
+                -plan->mass[0] * integrals.av -
+                    exact->damper->mass * (integrals.av + integrals.aw),
+                plan->damping[0] * integrals.vv);
+    recorder_base(&exact->recorder, integrals.a);
+    exact->state = hop_at(hop, s);
+    exact->run->steps++;
+}
+
+// |r''| in flight over the rest of an interval is not larger.
+static double push_most(const Exact *exact) {
+    return (exact->lanes.damping + exact->lanes.omega) *
+           (fabs(exact->state.v) + exact->lanes.omega * fabs(exact->state.x) +
+            exact->interval * exact->stretch.base_most);
+}
+
+// From a sample to the stop that is reached before the next; false where that is not clear.
+static bool reach(Exact *exact) {
+    enum { STEPS = 8 };
+    Slice slice;
+    Hop hop;
+    if (!base_cursor_interval(&exact->base, exact->sample, &slice))
+        return false;
+    hop_make(&hop, &exact->flying, &exact->state, &slice, exact->interval);
+    double slope;
+    const double end = hop_gap(&hop, 1, &slope);
+    const Side side = end > exact->state.r ? SIDE_RIGHT : SIDE_LEFT;
+    const double sign = exact_sign(side), room = exact_room(exact, side);
+    const double from = room - sign * exact->state.r, to = room - sign * end;
+    if (!(from > 0) || !(to < 0))
+        return false;
+    double s = from / (from - to), step = 1;
+    for (int i = 0; i < STEPS && fabs(step) > 1e-8; i++) {
+        const double gap = room - sign * hop_gap(&hop, s, &slope);
+        step = sign * gap / slope;
+        s += step;
+    }
+    // All the way r goes towards this stop, so that it is met once and the other not at all.
+    const double most = push_most(exact) * exact->interval * exact->interval;
+    if (!(fabs(step) <= 1e-8) || !(sign * slope > most) || !(s > 0) || !(s <= 1))
+        return false;
+    take_hop(exact, &hop, s);
+    exact->offset = s * exact->interval;
+    exact->events++;
+    exact->still_events = 0;
+    exact_touch(exact, side);
+    return true;
+}
+
+// In flight from a stop to the next sample.
+static bool depart(Exact *exact) {
+    const double length = exact->interval - exact->offset, sign = exact_sign((Side)exact->origin);
+    const double most = push_most(exact) * length, w = -sign * exact->state.w;
+    if (!(w > most) || !((w + most) * length < exact->damper->clearance) || length <= 0)
+        return false;
+    Slice slice;
+    Hop hop;
+    (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
+    hop_make(&hop, &exact->flying, &exact->state, &slice, length);
+    take_hop(exact, &hop, 1);
+    return true;
+}
+
+size_t exact_stride(Exact *exact, size_t most) {
+    if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
+        return 0;
+    size_t count = 0;
+    while (count < most) {
+        const size_t flown = fly(exact, most - count);
+        count += flown;
+        if (count == most || exact->plan->damper_count == 0)
+            break;
+        if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops ||
+            !reach(exact))
+            break;
+        if (exact->phase == CONTACT)
+            count += exact_press(exact, most - count);
+        if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||
+            !depart(exact))
+            break;
+        exact_stride_pass(exact);
+        count++;
+    }
+    return count;
+}
+
 void exact_stride_enter(Exact *exact) {
     if (exact->pending == 0)
         return;
@@ -113,8 +211,16 @@ void exact_stride_enter(Exact *exact) {
                       lanes->damping * lanes->damping * sums[VV] +
                           2 * lanes->damping * lanes->omega2 * sums[XV] +
                           lanes->omega2 * lanes->omega2 * sums[XX]);
-    const EnergyState energy = exact_energy(exact);
-    ledger_balance(&exact->ledger, &energy);
     exact->free_work = 0;
     exact->pending = 0;
+    if (exact->phase != FLIGHT) // a contact's work is entered at its end
+        return;
+    const EnergyState energy = exact_energy(exact);
+    ledger_balance(&exact->ledger, &energy);
+}
+
+void exact_stride_pass(Exact *exact) {
+    if (exact->sample + 1 == exact->recorder.statistics_start)
+        exact_stride_enter(exact);
+    exact_pass_sample(exact);
 }

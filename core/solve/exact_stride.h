@@ -10,6 +10,10 @@ void exact_stride_start(Exact *exact);
 // From the present sample over as many as go by strides, at most `most`; returns how many.
 size_t exact_stride(Exact *exact, size_t most);
 
+// Records the sample at the end of the present interval; what waits is entered where statistics
+// begin.
+void exact_stride_pass(Exact *exact);
+
 // Enters what strides have summed up into ledger and recorder. Before anything else writes there.
 void exact_stride_enter(Exact *exact);
 

@@ -14,7 +14,7 @@
 typedef double Vector __attribute__((vector_size(64)));
 typedef double Loose __attribute__((vector_size(64), aligned(8), may_alias)); // anywhere in memory
 
-enum { SERIES = 24 };
+enum { SERIES = 24, GROUP = 4 };
 
 typedef struct Impulse {
     long double S, I1, I2;
@@ -110,17 +110,10 @@ INLINE double size(double a) {
     return __builtin_fabs(a);
 }
 
-// What can be said of a block beforehand.
-typedef struct Bounds {
-    double push, bend; // |r''| and |x''| are not larger [m/s^2]
-} Bounds;
-
-// |v| + Omega |x| grows by the base alone.
-INLINE Bounds bounds_of(const Lanes *t, double x, double v, double base_most) {
-    const double reach =
-        size(v) + t->omega * size(x) + LANES * t->interval * base_most;
-    const double push = (t->damping + t->omega) * reach;
-    return (Bounds){push, push + base_most};
+// |r''| over a block or more is not larger [m/s^2]: |v| + Omega |x| grows by the base alone.
+INLINE double push_bound(const Lanes *t, double x, double v, size_t count, double base_most) {
+    const double reach = size(v) + t->omega * size(x) + (double)count * t->interval * base_most;
+    return (t->damping + t->omega) * reach;
 }
 
 INLINE bool is_inside(const Stretch *s, double r, double sag) {
@@ -171,8 +164,8 @@ static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size
         r[j] = s->r + (dz - dx);
         z[j] = s->z + speed;
     }
-    const Bounds bounds = bounds_of(t, s->x, s->v, s->base_most);
-    const double sag = t->interval * t->interval / 8 * bounds.push;
+    const double push = push_bound(t, s->x, s->v, LANES, s->base_most);
+    const double sag = t->interval * t->interval / 8 * push;
     size_t count = 0;
     if (is_inside(s, s->r, sag))
         while (count < most && is_inside(s, r[count], sag))
@@ -211,97 +204,76 @@ static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size
     return count;
 }
 
-#define AT(column) (*(Loose *)(column))
-#define LOAD(values) (*(const Vector *)(values))
+#define LOOSE(values) (*(Loose *)(void *)(values))
+#define LOAD(values) (*(Vector *)(void *)(values))
 
-// As many whole blocks as surely stay clear.
-INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count, const double *a,
-                         bool is_still) {
-    const double h = t->interval, W = t->omega2, D = t->damping;
-    const double sagging = LANES * LANES * h * h / 8;
+// The states between the blocks of a group, and all its samples.
+typedef struct Group {
+    struct {
+        double x, v, r, z;
+    } state[GROUP + 1];
+    _Alignas(64) double x[GROUP * LANES], v[GROUP * LANES], r[GROUP * LANES];
+} Group;
+
+// `count` blocks one after the other, from state 0; `sums` gets what they add to s->sums.
+INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sample, size_t count,
+                      const double *a, bool is_still, Vector *sums) {
+    const double h = t->interval, W = t->omega2, D = -t->damping, middle = s->middle;
     double *const cx = s->columns[CHANNEL_DISPLACEMENT], *const cv = s->columns[CHANNEL_VELOCITY];
     double *const ca = s->columns[CHANNEL_ACCELERATION];
     double *const cd = s->columns[CHANNEL_DAMPER_DISPLACEMENT];
     double *const cz = s->columns[CHANNEL_DAMPER_VELOCITY];
-    double *const cm = s->columns[CHANNEL_MEAN_ACCELERATION];
-    const bool has_damper = s->right < INFINITY;
-    const double middle = s->middle;
-    double x = s->x, v = s->v, r = s->r, z = s->z;
-    size_t done = 0;
-    Vector sums[LANE_SUMS];
+    double x = group->state[0].x, v = group->state[0].v;
+    double r = group->state[0].r, z = group->state[0].z;
     for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
         sums[i] = LOAD(s->sums[i]);
-    for (; done + LANES <= count; done += LANES) {
-        Vector fx = {0}, fv = {0}, fz = {0};
-        double z8 = z;
+    for (size_t b = 0; b < count; b++) {
+        const size_t at = sample + LANES * b + 1;
+        double dx8 = t->x_x[7] * x + t->x_v[7] * v, dv8 = t->v_x[7] * x + t->v_v[7] * v;
+        double dz8 = t->time[7] * z, z8 = z;
+        Vector dx = LOAD(t->x_x) * x + LOAD(t->x_v) * v;
+        Vector dv = LOAD(t->v_x) * x + LOAD(t->v_v) * v;
+        Vector dz = LOAD(t->time) * z;
         if (!is_still) {
-            fx = LOAD(t->x_a[0]) * a[0];
-            fv = LOAD(t->v_a[0]) * a[0];
-            fz = LOAD(t->z_a[0]) * a[0];
+            Vector fx = LOAD(t->x_a[0]) * a[0], fv = LOAD(t->v_a[0]) * a[0];
+            Vector fz = LOAD(t->z_a[0]) * a[0];
             for (int i = 1; i <= LANES; i++) {
                 fx += LOAD(t->x_a[i]) * a[i];
                 fv += LOAD(t->v_a[i]) * a[i];
                 fz += LOAD(t->z_a[i]) * a[i];
             }
-            z8 = z - h * (((a[0] + a[8]) * 0.5 + (a[1] + a[2])) + ((a[3] + a[4]) + (a[5] + a[6])) +
+            dx8 += fx[7];
+            dv8 += fv[7];
+            dz8 += fz[7];
+            dx += fx;
+            dv += fv;
+            dz += fz;
+            z8 = z - h * ((((a[0] + a[8]) * 0.5 + (a[1] + a[2])) + ((a[3] + a[4]) + (a[5] + a[6]))) +
                           a[7]);
         }
-        double dx8 = t->x_x[7] * x + t->x_v[7] * v, dv8 = t->v_x[7] * x + t->v_v[7] * v;
-        double dz8 = t->time[7] * z;
-        Vector dx = LOAD(t->x_x) * x + LOAD(t->x_v) * v;
-        Vector dv = LOAD(t->v_x) * x + LOAD(t->v_v) * v;
-        Vector dz = LOAD(t->time) * z;
-        if (!is_still) {
-            dx8 = fx[7] + dx8;
-            dv8 = fv[7] + dv8;
-            dz8 = fz[7] + dz8;
-            dx = fx + dx;
-            dv = fv + dv;
-            dz = fz + dz;
-        }
-        const double x8 = x + dx8, v8 = v + dv8, r8 = r + (dz8 - dx8);
-        const Bounds bounds = bounds_of(t, x, v, s->base_most);
-        const double sag = sagging * bounds.push;
-        if (has_damper && !(is_inside(s, r, sag) && is_inside(s, r8, sag)))
-            break;
         const Vector X = x + dx, V = v + dv, R = r + (dz - dx);
+        LOAD(group->x + LANES * b) = X;
+        LOAD(group->v + LANES * b) = V;
+        LOAD(group->r + LANES * b) = R;
         if (cx != NULL)
-            AT(cx + sample + done + 1) = X;
+            LOOSE(cx + at) = X;
         if (cv != NULL)
-            AT(cv + sample + done + 1) = V;
+            LOOSE(cv + at) = V;
         if (ca != NULL)
-            AT(ca + sample + done + 1) = -(D * V + W * X);
+            LOOSE(ca + at) = D * V - W * X;
         if (cd != NULL)
-            AT(cd + sample + done + 1) = X + (middle + R);
+            LOOSE(cd + at) = X + (middle + R);
         if (cz != NULL) {
             Vector speed = {0};
             for (int i = 0; i <= LANES && !is_still; i++)
                 speed += LOAD(t->speed_a[i]) * a[i];
-            AT(cz + sample + done + 1) = z + speed;
-        }
-        // Peaks by a bound; only a block that may hold one is looked through.
-        const double most_x = larger(size(x), size(x8)) + sagging * bounds.bend;
-        const double most_v = larger(size(v), size(v8)) + LANES / 2 * h * bounds.bend;
-        const double most_d = larger(size(x + (middle + r)), size(x8 + (middle + r8))) +
-                              (is_still ? 0 : sagging * s->base_most);
-        const bool has_peak = (most_x > s->peaks->displacement) | (most_v > s->peaks->velocity) |
-                              (D * most_v + W * most_x > s->peaks->acceleration) |
-                              (has_damper & (most_d > s->peaks->damper_displacement));
-        if (has_peak || cm != NULL) {
-            _Alignas(64) double xs[LANES], vs[LANES], rs[LANES];
-            *(Vector *)xs = X;
-            *(Vector *)vs = V;
-            *(Vector *)rs = R;
-            if (has_peak)
-                look_for_peaks(t, s, LANES, xs, vs, rs);
-            if (cm != NULL)
-                store_means(t, cm + sample + done + 1, LANES, v, vs, is_still ? NULL : a);
+            LOOSE(cz + at) = z + speed;
         }
         sums[XX] += X * X;
         sums[XV] += X * V;
         sums[VV] += V * V;
         if (!is_still) {
-            const Vector A = AT((double *)a), B = AT((double *)a + 1);
+            const Vector A = LOOSE(a), B = LOOSE(a + 1);
             sums[XB] += X * B;
             sums[XA] += X * A;
             sums[VB] += V * B;
@@ -311,17 +283,75 @@ INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count
             sums[AA] += A * A;
             a += LANES;
         }
-        x = x8;
-        v = v8;
-        r = r8;
+        x += dx8;
+        v += dv8;
+        r += dz8 - dx8;
         z = z8;
+        group->state[b + 1].x = x;
+        group->state[b + 1].v = v;
+        group->state[b + 1].r = r;
+        group->state[b + 1].z = z;
     }
-    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
-        *(Vector *)s->sums[i] = sums[i];
-    s->x = x;
-    s->v = v;
-    s->r = r;
-    s->z = z;
+}
+
+// Between the ends of a block nothing is further from them than this lets it be.
+static bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, size_t count,
+                          double sagging, double bend) {
+    double x = 0, v = 0, d = 0;
+    for (size_t b = 0; b <= count; b++) {
+        x = larger(x, size(group->state[b].x));
+        v = larger(v, size(group->state[b].v));
+        d = larger(d, size(group->state[b].x + (s->middle + group->state[b].r)));
+    }
+    x += sagging * bend;
+    v += LANES / 2 * t->interval * bend;
+    d += sagging * s->base_most;
+    return x > s->peaks->displacement || v > s->peaks->velocity ||
+           t->damping * v + t->omega2 * x > s->peaks->acceleration ||
+           (s->right < INFINITY && d > s->peaks->damper_displacement);
+}
+
+// As many whole blocks as surely stay clear.
+INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count, const double *a,
+                         bool is_still) {
+    const double sagging = LANES * LANES * t->interval * t->interval / 8;
+    Group group;
+    size_t done = 0;
+    for (bool is_clear = true; is_clear && done + LANES <= count;) {
+        size_t blocks = (count - done) / LANES < GROUP ? (count - done) / LANES : GROUP;
+        Vector sums[LANE_SUMS];
+        group.state[0].x = s->x;
+        group.state[0].v = s->v;
+        group.state[0].r = s->r;
+        group.state[0].z = s->z;
+        fly_group(t, s, &group, sample + done, blocks, a, is_still, sums);
+        const double push = push_bound(t, s->x, s->v, GROUP * LANES, s->base_most);
+        const double sag = sagging * push;
+        size_t clear = 0;
+        while (clear <= blocks && is_inside(s, group.state[clear].r, sag))
+            clear++;
+        is_clear = clear > blocks;
+        if (!is_clear) { // the blocks before, once more
+            if (clear < 2)
+                return done;
+            blocks = clear - 1;
+            fly_group(t, s, &group, sample + done, blocks, a, is_still, sums);
+        }
+        if (may_hold_peak(t, s, &group, blocks, sagging, push + s->base_most))
+            look_for_peaks(t, s, blocks * LANES, group.x, group.v, group.r);
+        if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
+            store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + done + 1,
+                        blocks * LANES, s->v, group.v, a);
+        for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
+            LOAD(s->sums[i]) = sums[i];
+        s->x = group.state[blocks].x;
+        s->v = group.state[blocks].v;
+        s->r = group.state[blocks].r;
+        s->z = group.state[blocks].z;
+        done += blocks * LANES;
+        if (!is_still)
+            a += blocks * LANES;
+    }
     return done;
 }
 
