@@ -168,6 +168,9 @@ static void take_stretch(Press *press, const double end[4], double length, const
     const double total = exact->plan->mass[0] + exact->damper->mass, mass = exact->damper->mass;
     const double s = press->slope;
     const double v = p->v.s * s, w = p->w.s * s;
+    const double slow = pulse_slow(p, press->d, length);
+    press->vv += p->vv.slow * slow;
+    press->ww += p->ww.slow * slow;
     press->vv += v * (2 * (state->x - before->x) - v * length);
     press->ww += w * (2 * (state->r - before->r) - w * length);
     if (exact->stretch.base_most > 0) {

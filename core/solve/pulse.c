@@ -55,12 +55,13 @@ static void make_form(PulseForm *form, const Complex g[2], const Complex l[2],
     double *of = form->of;
     static const int own[2][3] = {{0, 1, 4}, {7, 8, 9}};
     for (int i = 0; i < 2; i++) {
-        const long double mean = square(g[i]) / (4 * creall(l[i]));
+        const long double mean = i == 0 ? 0 : square(g[i]) / (4 * creall(l[i]));
         const Complex turning = g[i] * g[i] / (4 * l[i]);
         of[own[i][0]] = (double)(mean + creall(turning));
         of[own[i][1]] = (double)(-2 * cimagl(turning));
         of[own[i][2]] = (double)(mean - creall(turning));
     }
+    form->slow = (double)square(g[0]);
     const Complex e = g[0] * g[1] / (l[0] + l[1]), f = g[0] * conjl(g[1]) / (l[0] + conjl(l[1]));
     of[2] = (double)(creall(e) + creall(f));
     of[3] = (double)(cimagl(f) - cimagl(e));
@@ -182,7 +183,8 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
     make_form(&pulse->vv, g, l, pulse->jump);
     make_form(&pulse->ww, l, l, pulse->jump);
     make_tables(pulse, l, interval);
-    pulse->is_usable = true;
+    const double longest = 2 * pulse->time > interval ? 2 * pulse->time : interval;
+    pulse->is_usable = -pulse->sigma[0] * longest < 0.01;
 }
 
 void pulse_turn(const Pulse *pulse, double time, double turn[4]) {

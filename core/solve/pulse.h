@@ -16,6 +16,8 @@ typedef struct PulseRow {
 typedef struct PulseForm {
     double of[10]; // of d d', upper triangle by rows
     double jump[4], jump2; // what it gains as the base's slope does: slope (jump . d) + slope^2 jump2
+    double slow; // times pulse_slow(...): the slow oscillation's mean square, kept apart from a
+                 // difference that would lose it where that hardly decays
 } PulseForm;
 
 typedef struct Pulse {
@@ -57,6 +59,13 @@ static inline double pulse_dot(const double row[4], const double d[4]) {
 
 static inline double pulse_see(const PulseRow *row, const double d[4], double a, double s) {
     return pulse_dot(row->d, d) + (row->a * a + row->s * s);
+}
+
+// Integral of |d|^2 / 2 of the slow oscillation over a time.
+static inline double pulse_slow(const Pulse *pulse, const double d[4], double time) {
+    const double s = pulse->sigma[0] * time;
+    return time / 2 * (d[0] * d[0] + d[1] * d[1]) *
+           (1 + s * (1 + s * (2.0 / 3 + s * (1.0 / 3 + s * (2.0 / 15 + s * (2.0 / 45))))));
 }
 
 static inline double pulse_form(const PulseForm *form, const double d[4]) {
