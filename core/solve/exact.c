@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "core/solve/exact_events.h"
+#include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
 #include "core/solve/solver.h"
@@ -181,6 +182,11 @@ static Status cross(Exact *exact, double length) {
         const double before = exact->offset;
         const size_t events = exact->events;
         TRY(advance(exact, length - exact->offset));
+        // A contact that arcs have found may go on by its closed form, even over samples, but not
+        // to the last: the interval before that is the caller's.
+        if (exact->lanes.run != NULL && exact->phase == CONTACT && exact->contact_arcs == 0 &&
+            exact->sample + 2 < exact->plan->count)
+            (void)exact_press(exact, exact->plan->count - 2 - exact->sample);
         if (exact->offset == before && exact->events == events)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "the contact is too stiff to be followed: at t = %.6g s a step of "

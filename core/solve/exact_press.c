@@ -11,8 +11,15 @@
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_stride.h"
 
-// Buffers slower than this times the sample rate are looked at from sample to sample.
-static const double SLOW = 0.6;
+// How far the fast oscillation turns in one step of a walk, and steps to an interval: stiffer
+// buffers are not for this.
+static const double STEP = 0.6;
+static const double LONG_STEP = 2;
+static const double STEPS_MOST = 1024;
+
+static double larger(double a, double b) {
+    return a > b ? a : b;
+}
 
 typedef struct Press {
     Exact *exact;
@@ -154,9 +161,14 @@ static bool take_peak(Press *press, const double end[4], double length, bool is_
         return find_peak(press,
                          is_slow ? length * from / (from - to) : p->peak_time - press->elapsed,
                          length);
-    // A force that falls and rises again may have pulled hardest in between, and over half a turn
-    // it may rise, fall and rise.
-    return to < 0 || (from > 0 && p->omega[1] * length < 2);
+    // Over half a turn a force may rise, fall and rise.
+    if (to < 0 || (from > 0 && p->omega[1] * length < 2))
+        return true;
+    // One that falls and rises again may have pulled hardest in between, but hardly more than ever.
+    const double n = fabs(pulse_see(&p->n, press->d, press->a, press->slope));
+    const double most = n + p->omega[1] * length * (n + larger(-from, to) / p->omega[1]);
+    return is_slow &&
+           exact_effective_mass(press->exact) * most <= press->exact->row.impact.peak_force;
 }
 
 // The stretch to `end` is done: its work, and the state there.
@@ -241,7 +253,7 @@ static bool falls(const Press *press, const State *end, double before, bool is_s
     if (is_slow) {
         const double bend = p->size2[0] * (fabs(press->d[0]) + fabs(press->d[1])) +
                             p->size2[1] * (fabs(press->d[2]) + fabs(press->d[3]));
-        return w > bend * before;
+        return w > bend * before / 2; // backwards from there p rises
     }
     if (before <= 0)
         return true;
@@ -252,87 +264,164 @@ static bool falls(const Press *press, const State *end, double before, bool is_s
     return angle * (1.5 * bend + 2 * angle) < 0.66;
 }
 
+// Surely inside over a long stretch, because the slow part outweighs the fast.
+static bool is_pressed(const Press *press, const double end[4], double length) {
+    const Pulse *p = press->pulse;
+    const double *d = press->d, last = press->a + press->slope * length;
+    const double fast = fabs(d[2]) + fabs(d[3]), slow = fabs(d[0]) + fabs(d[1]);
+    const double from = press->sign * (d[0] + p->r.a * press->a + p->r.s * press->slope);
+    const double to = press->sign * (end[0] + p->r.a * last + p->r.s * press->slope);
+    return (from < to ? from : to) > fast + p->size2[0] * slow * length * length / 8;
+}
+
+// Whether the force has no peak within a long stretch that has not been seen: it stays below the
+// last one, or the fast part has died and what is left only rises or only falls.
+static bool is_known(const Press *press, const double end[4], double length) {
+    const Pulse *p = press->pulse;
+    const double *d = press->d, last = press->a + press->slope * length;
+    const double slow = (fabs(p->n.d[0]) + fabs(p->n.d[1])) * (fabs(d[0]) + fabs(d[1]));
+    const double fast = (fabs(p->n.d[2]) + fabs(p->n.d[3])) * (fabs(d[2]) + fabs(d[3]));
+    const double from = pulse_see(&p->n, d, press->a, press->slope);
+    const double to = pulse_see(&p->n, end, last, press->slope);
+    const double most = larger(fabs(from), fabs(to)) + 2 * fast +
+                        p->size2[0] * slow * length * length / 8;
+    if (exact_effective_mass(press->exact) * most <= press->exact->row.impact.peak_force)
+        return true;
+    const double rises = pulse_see(&p->n_rate, d, 0, press->slope);
+    return fast <= 1e-13 * fabs(from) &&
+           rises * pulse_see(&p->n_rate, end, 0, press->slope) > 0;
+}
+
+typedef enum Outcome { GOES_ON, ENDS, UNCLEAR } Outcome;
+
+// By comparison with the isolated contact: the rest of the interval, or to the release.
+static Outcome compare(Press *press, double *length, double end[4], State *state) {
+    const Pulse *p = press->pulse;
+    double time = *length, turn[4];
+    Outcome outcome = GOES_ON;
+    if (press->elapsed + time > press->lasts) {
+        const double guess = p->time - press->elapsed;
+        if (!find_release(press, guess > 0 ? guess : 0, 2 * p->time, &time, end))
+            return UNCLEAR;
+        *state = see(press, end, press->a + press->slope * time);
+        if (!falls(press, state, press->elapsed + time - press->lasts, false))
+            return UNCLEAR;
+        if (time <= *length)
+            outcome = ENDS;
+    }
+    if (outcome == GOES_ON) {
+        time = *length;
+        pulse_turn(p, time, turn);
+        pulse_multiply(turn, press->d, end);
+        *state = see(press, end, press->a + press->slope * time);
+    }
+    *length = time;
+    return take_peak(press, end, time, false) ? outcome : UNCLEAR;
+}
+
+static void go(const Press *press, double length, double end[4], State *state) {
+    const Exact *exact = press->exact;
+    const Pulse *p = press->pulse;
+    double turn[4];
+    const bool is_whole = exact->offset == 0 && length == exact->interval;
+    if (!is_whole)
+        pulse_turn(p, length, turn);
+    pulse_multiply(is_whole ? p->interval : turn, press->d, end);
+    *state = see(press, end, press->a + press->slope * length);
+}
+
+// By bounds of size and curvature: at most `step`, or where the contact surely lasts further, up to
+// the end of the interval, or to the release.
+static Outcome walk(Press *press, double step, double *length, double end[4], State *state) {
+    const Pulse *p = press->pulse;
+    double time = *length;
+    const double stride = LONG_STEP / p->omega[1];
+    if (time > step) {
+        go(press, time, end, state);
+        if (is_pressed(press, end, time) && is_known(press, end, time))
+            return GOES_ON;
+        *length = time = time < stride ? time : stride;
+        go(press, time, end, state);
+        if (is_pressed(press, end, time) && take_peak(press, end, time, true))
+            return GOES_ON;
+        *length = time = time < step ? time : step;
+    }
+    go(press, time, end, state);
+    const double from = press->sign * press->exact->state.r, to = press->sign * state->r;
+    Outcome outcome = GOES_ON;
+    if (to > 0) {
+        if (!stays_inside(press, from, press->sign * press->exact->state.w, to,
+                          press->sign * state->w, time))
+            return UNCLEAR;
+    } else {
+        if (!(from > 0) || !find_release(press, time * from / (from - to), time, length, end))
+            return UNCLEAR;
+        *state = see(press, end, press->a + press->slope * *length);
+        if (!falls(press, state, *length, true))
+            return UNCLEAR;
+        outcome = ENDS;
+    }
+    return take_peak(press, end, *length, true) ? outcome : UNCLEAR;
+}
+
+// The next sample is reached. False: the base's end is.
+static bool pass(Press *press) {
+    Exact *exact = press->exact;
+    const Base *base = exact->run->base;
+    exact_stride_pass(exact);
+    ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
+    if (exact->stretch.base_most == 0)
+        return true;
+    if (exact->sample + 1 >= base->count)
+        return false;
+    const double *a = base->values + exact->sample;
+    turn_base(press, (a[1] - a[0]) / base->interval);
+    press->a = a[0];
+    return true;
+}
+
 size_t exact_press(Exact *exact, size_t most) {
     const Pulse *pulse = &exact->pulses[exact->side];
-    if (!pulse->is_usable || !(fabs(exact->state.w) > 0))
+    double step = STEP / pulse->omega[1];
+    if (!pulse->is_usable || !(fabs(exact->state.w) > 0) || step * STEPS_MOST < exact->interval ||
+        (exact->stretch.base_most > 0 && exact->sample + 1 >= exact->run->base->count))
         return 0;
-    const double interval = exact->interval;
-    const bool is_slow = pulse->omega[1] * interval < SLOW;
-    const Base *base = exact->run->base;
-    const bool is_still = base->form == BASE_STILL || exact->sample + 1 >= base->count;
     size_t count = 0;
     Press press;
     start(&press, exact);
-    press.lasts = is_slow ? 0 : surely_lasts(&press);
-    double end[4], turn[4];
-    bool is_released = false;
+    bool is_walking = step > exact->interval;
+    if (!is_walking)
+        press.lasts = surely_lasts(&press);
+    Outcome outcome = GOES_ON;
     while (count < most) {
-        const double length = interval - exact->offset;
+        const double left = exact->interval - exact->offset;
+        double length = left, end[4];
         State state;
-        bool is_inside = true;
-        if (is_slow || press.elapsed + length <= press.lasts) {
-            if (exact->offset > 0)
-                pulse_turn(pulse, length, turn);
-            pulse_multiply(exact->offset > 0 ? turn : pulse->interval, press.d, end);
-            state = see(&press, end, press.a + press.slope * length);
-            if (is_slow) {
-                const double from = press.sign * exact->state.r, to = press.sign * state.r;
-                is_inside = to > 0;
-                if (is_inside &&
-                    !stays_inside(&press, from, press.sign * exact->state.w, to,
-                                  press.sign * state.w, length))
-                    break;
-            }
-        } else {
-            is_inside = false;
-        }
-        double time = length;
-        if (!is_inside) {
-            const double start_r = press.sign * exact->state.r;
-            double guess = pulse->time - press.elapsed;
-            if (is_slow && !(start_r > 0))
+        outcome = is_walking ? walk(&press, step, &length, end, &state)
+                             : compare(&press, &length, end, &state);
+        if (outcome == UNCLEAR) {
+            // First by other means, then in ever smaller steps.
+            if (is_walking)
+                step /= 4;
+            is_walking = true;
+            if (step * STEPS_MOST < exact->interval)
                 break;
-            if (is_slow)
-                guess = length * start_r / (start_r - press.sign * state.r);
-            if (!find_release(&press, guess > 0 ? guess : 0, is_slow ? length : 2 * pulse->time,
-                              &time, end))
-                break;
-            state = see(&press, end, press.a + press.slope * time);
-            const double before = is_slow ? time : press.elapsed + time - press.lasts;
-            if (!falls(&press, &state, before, is_slow))
-                break;
-            is_released = time <= length;
-            if (!is_released) {
-                time = length;
-                pulse_turn(pulse, length, turn);
-                pulse_multiply(turn, press.d, end);
-                state = see(&press, end, press.a + press.slope * length);
-            }
+            continue;
         }
-        if (!take_peak(&press, end, time, is_slow)) {
-            is_released = false;
-            break;
-        }
-        if (is_released)
+        if (outcome == ENDS)
             state.r = 0;
-        take_stretch(&press, end, time, &state);
-        if (is_released) {
-            exact->offset += time;
+        take_stretch(&press, end, length, &state);
+        exact->offset += length;
+        if (outcome == ENDS)
             break;
-        }
-        exact_stride_pass(exact);
+        if (length < left)
+            continue;
         count++;
-        ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
-        if (!is_still) {
-            if (exact->sample + 1 >= base->count)
-                break;
-            turn_base(&press, (base->values[exact->sample + 1] - base->values[exact->sample]) /
-                                  base->interval);
-            press.a = base->values[exact->sample];
-        }
+        if (!pass(&press))
+            break;
     }
     enter(&press);
-    if (is_released) {
+    if (outcome == ENDS) {
         exact->events++;
         exact_release(exact);
     }

@@ -183,12 +183,17 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
     make_form(&pulse->vv, g, l, pulse->jump);
     make_form(&pulse->ww, l, l, pulse->jump);
     make_tables(pulse, l, interval);
-    const double longest = 2 * pulse->time > interval ? 2 * pulse->time : interval;
+    const double longest = 2 * pulse->time < interval ? 2 * pulse->time : interval;
     pulse->is_usable = -pulse->sigma[0] * longest < 0.01;
 }
 
 void pulse_turn(const Pulse *pulse, double time, double turn[4]) {
-    const double unit = pulse->time / PULSE_TABLE_UNIT;
+    const double unit = pulse->time / PULSE_TABLE_UNIT, span = PULSE_TABLE * unit;
+    if (time > span) { // seldom: a long way at once
+        pulse_turn(pulse, time - span, turn);
+        pulse_multiply(pulse->table[PULSE_TABLE], turn, turn);
+        return;
+    }
     const int place = (int)(time / unit + 0.5);
     const double rest = time - place * unit;
     double small[4];

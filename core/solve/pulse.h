@@ -41,7 +41,8 @@ typedef struct Pulse {
 
 void pulse_make(Pulse *pulse, const Motion *touching, double interval);
 
-// What the oscillations are multiplied by over a time up to PULSE_TABLE / PULSE_TABLE_UNIT of T_c.
+// What the oscillations are multiplied by over a time; quick up to PULSE_TABLE / PULSE_TABLE_UNIT of
+// T_c.
 void pulse_turn(const Pulse *pulse, double time, double turn[4]);
 
 static inline void pulse_multiply(const double turn[4], const double d[4], double out[4]) {
