@@ -9,6 +9,7 @@
 #include <math.h>
 
 #include "core/solve/exact_events.h"
+#include "core/solve/exact_ride.h"
 #include "core/solve/exact_stride.h"
 
 // How far the fast oscillation turns in one step of a walk, and steps to an interval: stiffer
@@ -20,17 +21,6 @@ static const double STEPS_MOST = 1024;
 static double larger(double a, double b) {
     return a > b ? a : b;
 }
-
-typedef struct Press {
-    Exact *exact;
-    const Pulse *pulse;
-    double sign;
-    double d[4], a, slope; // at the beginning of the present stretch
-    double elapsed;        // since the touch [s]
-    double lasts;          // surely until then [s]
-    double speed, absolute; // at the touch: |w|, and the free mass's velocity
-    double vv, ww, work, gained, length; // since then
-} Press;
 
 static void start(Press *press, Exact *exact) {
     const Pulse *pulse = &exact->pulses[exact->side];
@@ -119,7 +109,7 @@ static bool find_release(const Press *press, double guess, double most, double *
 }
 
 // The largest force within a stretch in which its slope turns from rising to falling.
-static bool find_peak(Press *press, double guess, double length) {
+bool press_find_peak(Press *press, double guess, double length) {
     Exact *exact = press->exact;
     const Pulse *p = press->pulse;
     double low = 0, high = length, t = guess, turn[4], d[4];
@@ -158,7 +148,7 @@ static bool take_peak(Press *press, const double end[4], double length, bool is_
     const double from = press->sign * pulse_see(&p->n_rate, press->d, 0, press->slope);
     const double to = press->sign * pulse_see(&p->n_rate, end, 0, press->slope);
     if (from > 0 && to < 0)
-        return find_peak(press,
+        return press_find_peak(press,
                          is_slow ? length * from / (from - to) : p->peak_time - press->elapsed,
                          length);
     // Over half a turn a force may rise, fall and rise.
@@ -394,6 +384,10 @@ size_t exact_press(Exact *exact, size_t most) {
         press.lasts = surely_lasts(&press);
     Outcome outcome = GOES_ON;
     while (count < most) {
+        if (is_walking && exact->offset == 0 && step > exact->interval)
+            count += press_ride(&press, most - count);
+        if (count >= most)
+            break;
         const double left = exact->interval - exact->offset;
         double length = left, end[4];
         State state;
