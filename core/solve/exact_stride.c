@@ -12,12 +12,19 @@
 enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
 
 static double largest(const double *values, size_t count) {
-    double most[4] = {0, 0, 0, 0};
-    for (size_t i = 0; i < count; i++) {
-        const double value = fabs(values[i]);
-        most[i % 4] = value > most[i % 4] ? value : most[i % 4];
-    }
-    return fmax(fmax(most[0], most[1]), fmax(most[2], most[3]));
+    enum { SIDE_BY_SIDE = 16 };
+    double most[SIDE_BY_SIDE] = {0}, all = 0;
+    size_t i = 0;
+    for (; i + SIDE_BY_SIDE <= count; i += SIDE_BY_SIDE)
+        for (size_t j = 0; j < SIDE_BY_SIDE; j++) {
+            const double value = fabs(values[i + j]);
+            most[j] = value > most[j] ? value : most[j];
+        }
+    for (; i < count; i++)
+        all = fmax(all, fabs(values[i]));
+    for (size_t j = 0; j < SIDE_BY_SIDE; j++)
+        all = fmax(all, most[j]);
+    return all;
 }
 
 void exact_stride_start(Exact *exact) {
@@ -29,9 +36,12 @@ void exact_stride_start(Exact *exact) {
         return;
     lanes_make(&exact->lanes, &exact->flying, exact->interval);
     exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
-    for (int side = 0; side < 2 && exact->has_hops; side++)
-        if (exact->touching[side].contact_omega2 > 0)
+    for (int side = 0; side < 2 && exact->has_hops; side++) {
+        if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)
+            exact->pulses[1] = exact->pulses[0];
+        else if (exact->touching[side].contact_omega2 > 0)
             pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+    }
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
     memcpy(stretch->columns, columns, sizeof stretch->columns);
