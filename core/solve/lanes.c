@@ -120,18 +120,31 @@ INLINE bool is_inside(const Stretch *s, double r, double sag) {
     return r < s->right - sag && r > sag - s->left;
 }
 
-static void look_for_peaks(const Lanes *t, Stretch *s, size_t count, const double *x,
+// Eight side by side; what is behind `count` is filled up with the first.
+INLINE void look_for_peaks(const Lanes *t, Stretch *s, size_t count, const double *x,
                            const double *v, const double *r) {
-    Peaks peaks = *s->peaks;
-    for (size_t j = 0; j < count; j++) {
-        peaks.displacement = larger(peaks.displacement, size(x[j]));
-        peaks.velocity = larger(peaks.velocity, size(v[j]));
-        peaks.acceleration = larger(peaks.acceleration, size(t->damping * v[j] + t->omega2 * x[j]));
-        if (s->right < INFINITY)
-            peaks.damper_displacement =
-                larger(peaks.damper_displacement, size(x[j] + (s->middle + r[j])));
+    double most[4][LANES] = {{0}};
+    for (size_t from = 0; from < count; from += LANES) {
+        double here[3][LANES];
+        for (size_t j = 0; j < LANES; j++) {
+            const size_t k = from + j < count ? from + j : from;
+            here[0][j] = x[k];
+            here[1][j] = v[k];
+            here[2][j] = r[k];
+        }
+        for (size_t j = 0; j < LANES; j++) {
+            const double X = here[0][j], V = here[1][j];
+            most[0][j] = larger(size(X), most[0][j]);
+            most[1][j] = larger(size(V), most[1][j]);
+            most[2][j] = larger(size(t->damping * V + t->omega2 * X), most[2][j]);
+            most[3][j] = larger(size(X + (s->middle + here[2][j])), most[3][j]);
+        }
     }
-    *s->peaks = peaks;
+    double *const peaks[4] = {&s->peaks->displacement, &s->peaks->velocity,
+                              &s->peaks->acceleration, &s->peaks->damper_displacement};
+    for (int i = 0; i < (s->right < INFINITY ? 4 : 3); i++)
+        for (int j = 0; j < LANES; j++)
+            *peaks[i] = larger(most[i][j], *peaks[i]);
 }
 
 static void store_means(const Lanes *t, double *column, size_t count, double before,
@@ -140,68 +153,6 @@ static void store_means(const Lanes *t, double *column, size_t count, double bef
         const double base = a == NULL ? 0 : t->interval * (a[j] + a[j + 1]) / 2;
         column[j] = (v[j] - (j == 0 ? before : v[j - 1]) + base) / t->interval;
     }
-}
-
-// The last intervals before a stop or the end, one after the other.
-static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size_t sample,
-                                                size_t most, const double *base) {
-    double a[LANES + 1] = {0}, x[LANES], v[LANES], r[LANES], z[LANES];
-    if (base != NULL)
-        memcpy(a, base, (most + 1) * sizeof *a);
-    for (int j = 0; j < LANES; j++) {
-        double dx = 0, dv = 0, dz = 0, speed = 0;
-        for (int i = 0; i <= LANES && base != NULL; i++) {
-            dx += t->x_a[i][j] * a[i];
-            dv += t->v_a[i][j] * a[i];
-            dz += t->z_a[i][j] * a[i];
-            speed += t->speed_a[i][j] * a[i];
-        }
-        dx += t->x_x[j] * s->x + t->x_v[j] * s->v;
-        dv += t->v_x[j] * s->x + t->v_v[j] * s->v;
-        dz += t->time[j] * s->z;
-        x[j] = s->x + dx;
-        v[j] = s->v + dv;
-        r[j] = s->r + (dz - dx);
-        z[j] = s->z + speed;
-    }
-    const double push = push_bound(t, s->x, s->v, LANES, s->base_most);
-    const double sag = t->interval * t->interval / 8 * push;
-    size_t count = 0;
-    if (is_inside(s, s->r, sag))
-        while (count < most && is_inside(s, r[count], sag))
-            count++;
-    if (count == 0)
-        return 0;
-    for (size_t j = 0; j < count; j++) {
-        double *const *columns = s->columns;
-        const size_t at = sample + 1 + j;
-        if (columns[CHANNEL_DISPLACEMENT] != NULL)
-            columns[CHANNEL_DISPLACEMENT][at] = x[j];
-        if (columns[CHANNEL_VELOCITY] != NULL)
-            columns[CHANNEL_VELOCITY][at] = v[j];
-        if (columns[CHANNEL_ACCELERATION] != NULL)
-            columns[CHANNEL_ACCELERATION][at] = -(t->damping * v[j] + t->omega2 * x[j]);
-        if (columns[CHANNEL_DAMPER_DISPLACEMENT] != NULL)
-            columns[CHANNEL_DAMPER_DISPLACEMENT][at] = x[j] + (s->middle + r[j]);
-        if (columns[CHANNEL_DAMPER_VELOCITY] != NULL)
-            columns[CHANNEL_DAMPER_VELOCITY][at] = z[j];
-        const double of[4] = {x[j], v[j], a[j + 1], a[j]};
-        for (int p = 0, n = 0; p < 4; p++) {
-            static const LaneSum sums[4][4] = {
-                {XX, XV, XB, XA}, {XV, VV, VB, VA}, {XB, VB, BB, AB}, {XA, VA, AB, AA}};
-            for (int q = p; q < 4; q++, n++)
-                s->sums[sums[p][q]][j] += of[p] * of[q];
-        }
-    }
-    if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
-        store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + 1, count, s->v, v,
-                    base == NULL ? NULL : a);
-    look_for_peaks(t, s, count, x, v, r);
-    s->x = x[count - 1];
-    s->v = v[count - 1];
-    s->r = r[count - 1];
-    s->z = z[count - 1];
-    return count;
 }
 
 #define LOOSE(values) (*(Loose *)(void *)(values))
@@ -215,9 +166,9 @@ typedef struct Group {
     _Alignas(64) double x[GROUP * LANES], v[GROUP * LANES], r[GROUP * LANES];
 } Group;
 
-// `count` blocks one after the other, from state 0; `sums` gets what they add to s->sums.
+// `count` blocks one after the other, from state 0.
 INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sample, size_t count,
-                      const double *a, bool is_still, Vector *sums) {
+                      const double *a, bool is_still) {
     const double h = t->interval, W = t->omega2, D = -t->damping, middle = s->middle;
     double *const cx = s->columns[CHANNEL_DISPLACEMENT], *const cv = s->columns[CHANNEL_VELOCITY];
     double *const ca = s->columns[CHANNEL_ACCELERATION];
@@ -225,8 +176,6 @@ INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sam
     double *const cz = s->columns[CHANNEL_DAMPER_VELOCITY];
     double x = group->state[0].x, v = group->state[0].v;
     double r = group->state[0].r, z = group->state[0].z;
-    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
-        sums[i] = LOAD(s->sums[i]);
     for (size_t b = 0; b < count; b++) {
         const size_t at = sample + LANES * b + 1;
         double dx8 = t->x_x[7] * x + t->x_v[7] * v, dv8 = t->v_x[7] * x + t->v_v[7] * v;
@@ -269,20 +218,8 @@ INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sam
                 speed += LOAD(t->speed_a[i]) * a[i];
             LOOSE(cz + at) = z + speed;
         }
-        sums[XX] += X * X;
-        sums[XV] += X * V;
-        sums[VV] += V * V;
-        if (!is_still) {
-            const Vector A = LOOSE(a), B = LOOSE(a + 1);
-            sums[XB] += X * B;
-            sums[XA] += X * A;
-            sums[VB] += V * B;
-            sums[VA] += V * A;
-            sums[BB] += B * B;
-            sums[AB] += A * B;
-            sums[AA] += A * A;
+        if (!is_still)
             a += LANES;
-        }
         x += dx8;
         v += dv8;
         r += dz8 - dx8;
@@ -294,82 +231,191 @@ INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sam
     }
 }
 
+// What `count` whole blocks add to the sums.
+INLINE void add_blocks(Stretch *s, const Group *group, size_t count, const double *a,
+                       bool is_still) {
+    Vector sums[LANE_SUMS];
+    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
+        sums[i] = LOAD(s->sums[i]);
+    for (size_t b = 0; b < count; b++) {
+        const Vector X = LOAD(group->x + LANES * b), V = LOAD(group->v + LANES * b);
+        sums[XX] += X * X;
+        sums[XV] += X * V;
+        sums[VV] += V * V;
+        if (!is_still) {
+            const Vector A = LOOSE(a + LANES * b), B = LOOSE(a + LANES * b + 1);
+            sums[XB] += X * B;
+            sums[XA] += X * A;
+            sums[VB] += V * B;
+            sums[VA] += V * A;
+            sums[BB] += B * B;
+            sums[AB] += A * B;
+            sums[AA] += A * A;
+        }
+    }
+    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
+        LOAD(s->sums[i]) = sums[i];
+}
+
+// And what some more samples do; a is NULL where the base is still.
+static void add_samples(Stretch *s, size_t count, const double *x, const double *v,
+                        const double *a) {
+    for (size_t j = 0; j < count; j++) {
+        s->sums[XX][j] += x[j] * x[j];
+        s->sums[XV][j] += x[j] * v[j];
+        s->sums[VV][j] += v[j] * v[j];
+        if (a == NULL)
+            continue;
+        s->sums[XB][j] += x[j] * a[j + 1];
+        s->sums[XA][j] += x[j] * a[j];
+        s->sums[VB][j] += v[j] * a[j + 1];
+        s->sums[VA][j] += v[j] * a[j];
+        s->sums[BB][j] += a[j + 1] * a[j + 1];
+        s->sums[AB][j] += a[j] * a[j + 1];
+        s->sums[AA][j] += a[j] * a[j];
+    }
+}
+
+// The last intervals before the end, fewer than a block.
+static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size_t sample,
+                                                size_t most, const double *base) {
+    double a[LANES + 1] = {0}, x[LANES], v[LANES], r[LANES], z[LANES];
+    if (base != NULL)
+        memcpy(a, base, (most + 1) * sizeof *a);
+    for (int j = 0; j < LANES; j++) {
+        double dx = 0, dv = 0, dz = 0, speed = 0;
+        for (int i = 0; i <= LANES && base != NULL; i++) {
+            dx += t->x_a[i][j] * a[i];
+            dv += t->v_a[i][j] * a[i];
+            dz += t->z_a[i][j] * a[i];
+            speed += t->speed_a[i][j] * a[i];
+        }
+        dx += t->x_x[j] * s->x + t->x_v[j] * s->v;
+        dv += t->v_x[j] * s->x + t->v_v[j] * s->v;
+        dz += t->time[j] * s->z;
+        x[j] = s->x + dx;
+        v[j] = s->v + dv;
+        r[j] = s->r + (dz - dx);
+        z[j] = s->z + speed;
+    }
+    const double push = push_bound(t, s->x, s->v, LANES, s->base_most);
+    const double sag = t->interval * t->interval / 8 * push;
+    size_t count = 0;
+    if (is_inside(s, s->r, sag))
+        while (count < most && is_inside(s, r[count], sag))
+            count++;
+    if (count == 0)
+        return 0;
+    for (size_t j = 0; j < count; j++) {
+        double *const *columns = s->columns;
+        const size_t at = sample + 1 + j;
+        if (columns[CHANNEL_DISPLACEMENT] != NULL)
+            columns[CHANNEL_DISPLACEMENT][at] = x[j];
+        if (columns[CHANNEL_VELOCITY] != NULL)
+            columns[CHANNEL_VELOCITY][at] = v[j];
+        if (columns[CHANNEL_ACCELERATION] != NULL)
+            columns[CHANNEL_ACCELERATION][at] = -(t->damping * v[j] + t->omega2 * x[j]);
+        if (columns[CHANNEL_DAMPER_DISPLACEMENT] != NULL)
+            columns[CHANNEL_DAMPER_DISPLACEMENT][at] = x[j] + (s->middle + r[j]);
+        if (columns[CHANNEL_DAMPER_VELOCITY] != NULL)
+            columns[CHANNEL_DAMPER_VELOCITY][at] = z[j];
+    }
+    add_samples(s, count, x, v, base == NULL ? NULL : a);
+    if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
+        store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + 1, count, s->v, v,
+                    base == NULL ? NULL : a);
+    look_for_peaks(t, s, count, x, v, r);
+    s->x = x[count - 1];
+    s->v = v[count - 1];
+    s->r = r[count - 1];
+    s->z = z[count - 1];
+    return count;
+}
+
 // Between the ends of a block nothing is further from them than this lets it be.
-static bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, size_t count,
+INLINE bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, size_t count,
                           double sagging, double bend) {
     double x = 0, v = 0, d = 0;
     for (size_t b = 0; b <= count; b++) {
-        x = larger(x, size(group->state[b].x));
-        v = larger(v, size(group->state[b].v));
-        d = larger(d, size(group->state[b].x + (s->middle + group->state[b].r)));
+        x = larger(size(group->state[b].x), x);
+        v = larger(size(group->state[b].v), v);
+        d = larger(size(group->state[b].x + (s->middle + group->state[b].r)), d);
     }
     x += sagging * bend;
     v += LANES / 2 * t->interval * bend;
     d += sagging * s->base_most;
-    return x > s->peaks->displacement || v > s->peaks->velocity ||
-           t->damping * v + t->omega2 * x > s->peaks->acceleration ||
-           (s->right < INFINITY && d > s->peaks->damper_displacement);
+    return (x > s->peaks->displacement) | (v > s->peaks->velocity) |
+           (t->damping * v + t->omega2 * x > s->peaks->acceleration) |
+           ((s->right < INFINITY) & (d > s->peaks->damper_displacement));
 }
 
-// As many whole blocks as surely stay clear.
+// As far as surely no stop is reached, by whole blocks but for the last.
 INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count, const double *a,
                          bool is_still) {
-    const double sagging = LANES * LANES * t->interval * t->interval / 8;
+    const double h = t->interval, sagging = LANES * LANES * h * h / 8;
     Group group;
     size_t done = 0;
     for (bool is_clear = true; is_clear && done + LANES <= count;) {
-        size_t blocks = (count - done) / LANES < GROUP ? (count - done) / LANES : GROUP;
-        Vector sums[LANE_SUMS];
+        const size_t left = (count - done) / LANES, blocks = left < GROUP ? left : GROUP;
         group.state[0].x = s->x;
         group.state[0].v = s->v;
         group.state[0].r = s->r;
         group.state[0].z = s->z;
-        fly_group(t, s, &group, sample + done, blocks, a, is_still, sums);
+        fly_group(t, s, &group, sample + done, blocks, a, is_still);
         const double push = push_bound(t, s->x, s->v, GROUP * LANES, s->base_most);
-        const double sag = sagging * push;
-        size_t clear = 0;
-        while (clear <= blocks && is_inside(s, group.state[clear].r, sag))
+        size_t clear = 0, more = 0;
+        while (clear <= blocks && is_inside(s, group.state[clear].r, sagging * push))
             clear++;
         is_clear = clear > blocks;
-        if (!is_clear) { // the blocks before, once more
-            if (clear < 2)
-                return done;
-            blocks = clear - 1;
-            fly_group(t, s, &group, sample + done, blocks, a, is_still, sums);
+        clear -= clear > 0;
+        double z = group.state[clear].z;
+        const double *x = group.x + LANES * clear, *v = group.v + LANES * clear;
+        const double *r = group.r + LANES * clear, *b = is_still ? NULL : a + LANES * clear;
+        if (!is_clear) { // somewhere in this block: its intervals one by one
+            const double sag = h * h / 8 * push;
+            if (is_inside(s, group.state[clear].r, sag))
+                while (more < LANES && is_inside(s, r[more], sag))
+                    more++;
+            for (size_t j = 0; j < more && !is_still; j++)
+                z -= h * ((b[j] + b[j + 1]) / 2);
+            is_clear = more == LANES;
         }
-        if (may_hold_peak(t, s, &group, blocks, sagging, push + s->base_most))
-            look_for_peaks(t, s, blocks * LANES, group.x, group.v, group.r);
+        const size_t flown = clear * LANES + more;
+        if (flown == 0)
+            break;
+        if (may_hold_peak(t, s, &group, clear + (more > 0), sagging, push + s->base_most))
+            look_for_peaks(t, s, flown, group.x, group.v, group.r);
         if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
-            store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + done + 1,
-                        blocks * LANES, s->v, group.v, a);
-        for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
-            LOAD(s->sums[i]) = sums[i];
-        s->x = group.state[blocks].x;
-        s->v = group.state[blocks].v;
-        s->r = group.state[blocks].r;
-        s->z = group.state[blocks].z;
-        done += blocks * LANES;
+            store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + done + 1, flown, s->v,
+                        group.v, a);
+        add_blocks(s, &group, clear, a, is_still);
+        if (more > 0) {
+            add_samples(s, more, x, v, b);
+            s->x = x[more - 1];
+            s->v = v[more - 1];
+            s->r = r[more - 1];
+            s->z = z;
+        } else {
+            s->x = group.state[clear].x;
+            s->v = group.state[clear].v;
+            s->r = group.state[clear].r;
+            s->z = group.state[clear].z;
+        }
+        done += flown;
         if (!is_still)
-            a += blocks * LANES;
+            a += flown;
     }
     return done;
 }
 
 INLINE size_t run(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
                   const double *base) {
-    size_t done = 0;
-    for (;;) {
-        done += base == NULL
-                    ? fly_blocks(lanes, stretch, sample + done, count - done, NULL, true)
-                    : fly_blocks(lanes, stretch, sample + done, count - done, base + done, false);
-        const size_t left = count - done, most = left < LANES ? left : LANES;
-        const size_t more = left == 0 ? 0
-                                      : careful(lanes, stretch, sample + done, most,
-                                                base == NULL ? NULL : base + done);
-        done += more;
-        if (more < most || done == count)
-            return done;
-    }
+    const size_t done = base == NULL ? fly_blocks(lanes, stretch, sample, count, NULL, true)
+                                     : fly_blocks(lanes, stretch, sample, count, base, false);
+    const size_t left = count - done;
+    if (left == 0 || left >= LANES)
+        return done;
+    return done + careful(lanes, stretch, sample + done, left, base == NULL ? NULL : base + done);
 }
 
 size_t lanes_run_plain(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
