@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#define INLINE static inline __attribute__((always_inline))
+
 enum { RIDE = 8 };
 
 // The samples of a ride, each with the amplitudes from there on.
@@ -11,7 +13,7 @@ typedef struct Ride {
     double bend; // |r''| is not larger
 } Ride;
 
-static void turn(const Press *press, Ride *ride, const double *base) {
+INLINE void turn(const Press *press, Ride *ride, const double *base) {
     const Pulse *p = press->pulse;
     const double *t = p->interval, rate = press->exact->plan->sample_rate;
     double d[4] = {press->d[0], press->d[1], press->d[2], press->d[3]}, bend = 0;
@@ -38,14 +40,14 @@ static void turn(const Press *press, Ride *ride, const double *base) {
     ride->bend = bend;
 }
 
-static void see(const Ride *ride, const PulseRow *row, double out[RIDE]) {
+INLINE void see(const Ride *ride, const PulseRow *row, double out[RIDE]) {
     for (int j = 0; j < RIDE; j++)
         out[j] = ((row->d[0] * ride->d[0][j + 1] + row->d[1] * ride->d[1][j + 1]) +
                   (row->d[2] * ride->d[2][j + 1] + row->d[3] * ride->d[3][j + 1])) +
                  (row->a * ride->a[j + 1] + row->s * ride->s[j + 1]);
 }
 
-static void set_start(Press *press, const Ride *ride, size_t j) {
+INLINE void set_start(Press *press, const Ride *ride, size_t j) {
     for (int i = 0; i < 4; i++)
         press->d[i] = ride->d[i][j];
     press->a = ride->a[j];
@@ -53,7 +55,7 @@ static void set_start(Press *press, const Ride *ride, size_t j) {
 }
 
 // How many intervals surely belong to the contact and show its peaks.
-static size_t count_clear(Press *press, const Ride *ride) {
+INLINE size_t count_clear(Press *press, const Ride *ride) {
     const Exact *exact = press->exact;
     const double sag = ride->bend * exact->interval * exact->interval / 8;
     const double speed = ride->bend * exact->interval;
@@ -82,22 +84,27 @@ static size_t count_clear(Press *press, const Ride *ride) {
     return clear;
 }
 
-static void take_sums(Press *press, const Ride *ride, size_t count) {
-    Exact *exact = press->exact;
+// What each interval adds.
+typedef struct Gains {
+    double swing[RIDE], v[RIDE], w[RIDE], base[RIDE], work[RIDE];
+} Gains;
+
+INLINE void see_gains(const Press *press, const Ride *ride, Gains *gains) {
+    const Exact *exact = press->exact;
     const Pulse *p = press->pulse;
-    const double h = exact->interval, total = exact->plan->mass[0] + exact->damper->mass;
-    double swing = 0, straight_v = 0, straight_w = 0, jump_v = 0, jump_w = 0, gain = 0, work = 0;
-    const bool is_still = exact->stretch.base_most == 0;
-    for (size_t j = 0; j < count; j++)
-        swing += ride->d[0][j] * ride->d[0][j] + ride->d[1][j] * ride->d[1][j];
-    for (size_t j = 0; j < count && !is_still; j++) {
+    const double h = exact->interval, mass = exact->damper->mass;
+    const double total = exact->plan->mass[0] + mass;
+    double x0[RIDE] = {exact->state.x}, r0[RIDE] = {exact->state.r};
+    for (int j = 1; j < RIDE; j++) {
+        x0[j] = ride->x[j - 1];
+        r0[j] = ride->r[j - 1];
+    }
+    for (int j = 0; j < RIDE; j++) {
         const double s = ride->s[j], a = ride->a[j], b = ride->a[j + 1];
-        const double x0 = j == 0 ? exact->state.x : ride->x[j - 1];
-        const double r0 = j == 0 ? exact->state.r : ride->r[j - 1];
-        const double v = p->v.s * s, w = p->w.s * s, jump = ride->s[j + 1] - s;
-        straight_v += v * (2 * (ride->x[j] - x0) - v * h);
-        straight_w += w * (2 * (ride->r[j] - r0) - w * h);
-        double x = 0, r = 0, dv = 0, dw = 0;
+        const double jump = ride->s[j + 1] - s, own = (a + b) / 2 * h;
+        const double v = p->v.s * s, w = p->w.s * s;
+        double x = p->x.a * own + p->x.s * s * h, r = p->r.a * own + p->r.s * s * h;
+        double dv = -jump * p->vv.jump2, dw = -jump * p->ww.jump2;
         for (int i = 0; i < 4; i++) {
             const double end = ride->d[i][j + 1], change = end - jump * p->jump[i] - ride->d[i][j];
             x += p->x_sum.d[i] * change;
@@ -105,38 +112,52 @@ static void take_sums(Press *press, const Ride *ride, size_t count) {
             dv += p->vv.jump[i] * end;
             dw += p->ww.jump[i] * end;
         }
-        jump_v += jump * (dv - jump * p->vv.jump2);
-        jump_w += jump * (dw - jump * p->ww.jump2);
-        const double own = (a + b) / 2 * h;
-        x += p->x.a * own + p->x.s * s * h;
-        r += p->r.a * own + p->r.s * s * h;
-        gain += own;
-        work += total * (b * ride->x[j] - a * x0 - s * x) +
-                exact->damper->mass * (b * ride->r[j] - a * r0 - s * r);
+        gains->swing[j] = ride->d[0][j] * ride->d[0][j] + ride->d[1][j] * ride->d[1][j];
+        gains->v[j] = v * (2 * (ride->x[j] - x0[j]) - v * h) - jump * dv;
+        gains->w[j] = w * (2 * (ride->r[j] - r0[j]) - w * h) - jump * dw;
+        gains->base[j] = own;
+        gains->work[j] = total * (b * ride->x[j] - a * x0[j] - s * x) +
+                         mass * (b * ride->r[j] - a * r0[j] - s * r);
     }
-    const double unit[4] = {1, 0, 0, 0}, slow = swing * pulse_slow(p, unit, h);
-    press->vv += p->vv.slow * slow + straight_v - jump_v;
-    press->ww += p->ww.slow * slow + straight_w - jump_w;
-    press->work -= work;
-    press->gained += gain;
-    press->length += (double)count * h;
-    press->elapsed += (double)count * h;
 }
 
-static void put(double *const *columns, ChannelId channel, size_t sample, const double *values,
+INLINE void take_sums(Press *press, const Ride *ride, size_t count) {
+    const Pulse *p = press->pulse;
+    const double length = (double)count * press->exact->interval;
+    Gains gains;
+    see_gains(press, ride, &gains);
+    double swing = 0, v = 0, w = 0, base = 0, work = 0;
+    for (size_t j = 0; j < count; j++) {
+        swing += gains.swing[j];
+        v += gains.v[j];
+        w += gains.w[j];
+        base += gains.base[j];
+        work += gains.work[j];
+    }
+    const double unit[4] = {1, 0, 0, 0};
+    const double slow = swing * pulse_slow(p, unit, press->exact->interval);
+    press->vv += p->vv.slow * slow + v;
+    press->ww += p->ww.slow * slow + w;
+    press->work -= work;
+    press->gained += base;
+    press->length += length;
+    press->elapsed += length;
+}
+
+INLINE void put(double *const *columns, ChannelId channel, size_t sample, const double *values,
                 size_t count) {
     if (columns[channel] != NULL)
         for (size_t j = 0; j < count; j++)
             columns[channel][sample + j] = values[j];
 }
 
-static double largest(const double *values, size_t count, double least) {
+INLINE double largest(const double *values, size_t count, double least) {
     for (size_t j = 0; j < count; j++)
         least = fabs(values[j]) > least ? fabs(values[j]) : least;
     return least;
 }
 
-static void take_samples(Press *press, const Ride *ride, size_t count) {
+INLINE void take_samples(Press *press, const Ride *ride, size_t count) {
     Exact *exact = press->exact;
     const Motion *m = &exact->flying;
     double acceleration[RIDE], z[RIDE], speed[RIDE], force[RIDE], depth[RIDE];
@@ -174,7 +195,7 @@ static void take_samples(Press *press, const Ride *ride, size_t count) {
     recorder_sums(&exact->recorder, count, xx, aa);
 }
 
-size_t press_ride(Press *press, size_t most) {
+INLINE size_t run(Press *press, size_t most) {
     Exact *exact = press->exact;
     const Pulse *p = press->pulse;
     const bool is_still = exact->stretch.base_most == 0;
@@ -211,4 +232,29 @@ size_t press_ride(Press *press, size_t most) {
             break;
     }
     return done;
+}
+
+static size_t run_plain(Press *press, size_t most) {
+    return run(press, most);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2"))) static size_t run_avx2(Press *press, size_t most) {
+    return run(press, most);
+}
+
+__attribute__((target("avx512f,avx512dq,prefer-vector-width=512"))) static size_t
+run_avx512(Press *press, size_t most) {
+    return run(press, most);
+}
+#endif
+
+size_t press_ride(Press *press, size_t most) {
+#ifdef __x86_64__
+    if (press->exact->lanes.width == LANES_AVX512)
+        return run_avx512(press, most);
+    if (press->exact->lanes.width == LANES_AVX2)
+        return run_avx2(press, most);
+#endif
+    return run_plain(press, most);
 }

@@ -34,7 +34,7 @@ void exact_stride_start(Exact *exact) {
     double *const *columns = exact->recorder.columns;
     if (base->form == BASE_SINE || (base->form == BASE_SAMPLED && exact->base.ratio != 1))
         return;
-    lanes_make(&exact->lanes, &exact->flying, exact->interval);
+    lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
     exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
     for (int side = 0; side < 2 && exact->has_hops; side++) {
         if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)

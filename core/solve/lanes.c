@@ -418,8 +418,8 @@ INLINE size_t run(const Lanes *lanes, Stretch *stretch, size_t sample, size_t co
     return done + careful(lanes, stretch, sample + done, left, base == NULL ? NULL : base + done);
 }
 
-size_t lanes_run_plain(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
-                       const double *base) {
+static size_t run_plain(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
+                        const double *base) {
     return run(lanes, stretch, sample, count, base);
 }
 
@@ -436,18 +436,28 @@ run_avx512(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count, co
 }
 #endif
 
-// The widest the processor has: all give the same bytes.
-static LanesRun *choose(void) {
+LanesWidth lanes_widest(void) {
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return run_avx512;
+        return LANES_AVX512;
     if (__builtin_cpu_supports("avx2"))
-        return run_avx2;
+        return LANES_AVX2;
 #endif
-    return lanes_run_plain;
+    return LANES_PLAIN;
 }
 
-void lanes_make(Lanes *lanes, const Motion *flying, double interval) {
+static LanesRun *run_of(LanesWidth width) {
+#ifdef __x86_64__
+    if (width == LANES_AVX512)
+        return run_avx512;
+    if (width == LANES_AVX2)
+        return run_avx2;
+#endif
+    (void)width;
+    return run_plain;
+}
+
+void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width) {
     memset(lanes, 0, sizeof *lanes);
     const double omega = sqrt(flying->omega2);
     if (!(LANES * interval * (omega > flying->damping ? omega : flying->damping) <= 1))
@@ -458,7 +468,8 @@ void lanes_make(Lanes *lanes, const Motion *flying, double interval) {
     lanes->omega = omega;
     make_powers(lanes, flying, interval);
     make_forms(lanes, flying, interval);
-    lanes->run = choose();
+    lanes->width = width;
+    lanes->run = run_of(width);
 }
 
 void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]) {

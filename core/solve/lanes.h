@@ -28,6 +28,9 @@ typedef struct Stretch {
     _Alignas(64) double sums[LANE_SUMS][LANES];
 } Stretch;
 
+// What the processor's vectors hold; the bytes are the same with all.
+typedef enum LanesWidth { LANES_PLAIN, LANES_AVX2, LANES_AVX512 } LanesWidth;
+
 typedef struct Lanes Lanes;
 typedef size_t LanesRun(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
                         const double *base);
@@ -41,10 +44,12 @@ struct Lanes {
     double interval;                  // [s]
     double omega2, damping, omega;    // of the structure: K / M, C / M, sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
+    LanesWidth width;
     LanesRun *run;                       // NULL: the interval is too long for the structure
 };
 
-void lanes_make(Lanes *lanes, const Motion *flying, double interval);
+LanesWidth lanes_widest(void); // on this processor
+void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width);
 
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
 // way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if still.
@@ -55,8 +60,5 @@ static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t samp
 
 // The sums over all lanes, emptied.
 void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]);
-
-// The run compiled for a processor without AVX, which gives the same bytes; for tests.
-LanesRun lanes_run_plain;
 
 #endif
