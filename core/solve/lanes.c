@@ -7,6 +7,7 @@
 #include "core/solve/lanes.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 #define INLINE static inline __attribute__((always_inline))
@@ -155,8 +156,8 @@ static void store_means(const Lanes *t, double *column, size_t count, double bef
     }
 }
 
-#define LOOSE(values) (*(Loose *)(void *)(values))
-#define LOAD(values) (*(Vector *)(void *)(values))
+#define LOOSE(values) (*(Loose *)(uintptr_t)(values))
+#define LOAD(values) (*(Vector *)(uintptr_t)(values))
 
 // The states between the blocks of a group, and all its samples.
 typedef struct Group {
@@ -231,33 +232,52 @@ INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sam
     }
 }
 
-// What `count` whole blocks add to the sums.
-INLINE void add_blocks(Stretch *s, const Group *group, size_t count, const double *a,
+// What a block adds to the sums.
+INLINE void add_block(Vector *sums, Vector X, Vector V, const double *a, bool is_still) {
+    sums[XX] += X * X;
+    sums[XV] += X * V;
+    sums[VV] += V * V;
+    if (is_still)
+        return;
+    const Vector A = LOOSE(a), B = LOOSE(a + 1);
+    sums[XB] += X * B;
+    sums[XA] += X * A;
+    sums[VB] += V * B;
+    sums[VA] += V * A;
+}
+
+INLINE void add_base(Vector *sums, Vector A, Vector B) {
+    sums[BB] += B * B;
+    sums[AB] += A * B;
+    sums[AA] += A * A;
+}
+
+// `count` whole blocks and of the next one the first `more` samples.
+INLINE void add_blocks(Stretch *s, const Group *group, size_t count, size_t more, const double *a,
                        bool is_still) {
     Vector sums[LANE_SUMS];
     for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
         sums[i] = LOAD(s->sums[i]);
     for (size_t b = 0; b < count; b++) {
-        const Vector X = LOAD(group->x + LANES * b), V = LOAD(group->v + LANES * b);
-        sums[XX] += X * X;
-        sums[XV] += X * V;
-        sums[VV] += V * V;
+        add_block(sums, LOAD(group->x + LANES * b), LOAD(group->v + LANES * b), a, is_still);
         if (!is_still) {
-            const Vector A = LOOSE(a + LANES * b), B = LOOSE(a + LANES * b + 1);
-            sums[XB] += X * B;
-            sums[XA] += X * A;
-            sums[VB] += V * B;
-            sums[VA] += V * A;
-            sums[BB] += B * B;
-            sums[AB] += A * B;
-            sums[AA] += A * A;
+            add_base(sums, LOOSE(a), LOOSE(a + 1));
+            a += LANES;
         }
+    }
+    if (more > 0) {
+        static const double ones[2 * LANES] = {1, 1, 1, 1, 1, 1, 1, 1};
+        const Vector keep = LOOSE(ones + LANES - more);
+        add_block(sums, keep * LOAD(group->x + LANES * count), keep * LOAD(group->v + LANES * count),
+                  a, is_still);
+        if (!is_still)
+            add_base(sums, keep * LOOSE(a), keep * LOOSE(a + 1));
     }
     for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
         LOAD(s->sums[i]) = sums[i];
 }
 
-// And what some more samples do; a is NULL where the base is still.
+// What single samples add; a is NULL where the base is still.
 static void add_samples(Stretch *s, size_t count, const double *x, const double *v,
                         const double *a) {
     for (size_t j = 0; j < count; j++) {
@@ -388,9 +408,8 @@ INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count
         if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
             store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + done + 1, flown, s->v,
                         group.v, a);
-        add_blocks(s, &group, clear, a, is_still);
+        add_blocks(s, &group, clear, more, a, is_still);
         if (more > 0) {
-            add_samples(s, more, x, v, b);
             s->x = x[more - 1];
             s->v = v[more - 1];
             s->r = r[more - 1];
