@@ -12,10 +12,7 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-typedef double Vector __attribute__((vector_size(64)));
-typedef double Loose __attribute__((vector_size(64), aligned(8), may_alias)); // anywhere in memory
-
-enum { SERIES = 24, GROUP = 4 };
+enum { SERIES = 24, GROUP = 8 };
 
 typedef struct Impulse {
     long double S, I1, I2;
@@ -156,9 +153,6 @@ static void store_means(const Lanes *t, double *column, size_t count, double bef
     }
 }
 
-#define LOOSE(values) (*(Loose *)(uintptr_t)(values))
-#define LOAD(values) (*(Vector *)(uintptr_t)(values))
-
 // The states between the blocks of a group, and all its samples.
 typedef struct Group {
     struct {
@@ -166,116 +160,6 @@ typedef struct Group {
     } state[GROUP + 1];
     _Alignas(64) double x[GROUP * LANES], v[GROUP * LANES], r[GROUP * LANES];
 } Group;
-
-// `count` blocks one after the other, from state 0.
-INLINE void fly_group(const Lanes *t, const Stretch *s, Group *group, size_t sample, size_t count,
-                      const double *a, bool is_still) {
-    const double h = t->interval, W = t->omega2, D = -t->damping, middle = s->middle;
-    double *const cx = s->columns[CHANNEL_DISPLACEMENT], *const cv = s->columns[CHANNEL_VELOCITY];
-    double *const ca = s->columns[CHANNEL_ACCELERATION];
-    double *const cd = s->columns[CHANNEL_DAMPER_DISPLACEMENT];
-    double *const cz = s->columns[CHANNEL_DAMPER_VELOCITY];
-    double x = group->state[0].x, v = group->state[0].v;
-    double r = group->state[0].r, z = group->state[0].z;
-    for (size_t b = 0; b < count; b++) {
-        const size_t at = sample + LANES * b + 1;
-        double dx8 = t->x_x[7] * x + t->x_v[7] * v, dv8 = t->v_x[7] * x + t->v_v[7] * v;
-        double dz8 = t->time[7] * z, z8 = z;
-        Vector dx = LOAD(t->x_x) * x + LOAD(t->x_v) * v;
-        Vector dv = LOAD(t->v_x) * x + LOAD(t->v_v) * v;
-        Vector dz = LOAD(t->time) * z;
-        if (!is_still) {
-            Vector fx = LOAD(t->x_a[0]) * a[0], fv = LOAD(t->v_a[0]) * a[0];
-            Vector fz = LOAD(t->z_a[0]) * a[0];
-            for (int i = 1; i <= LANES; i++) {
-                fx += LOAD(t->x_a[i]) * a[i];
-                fv += LOAD(t->v_a[i]) * a[i];
-                fz += LOAD(t->z_a[i]) * a[i];
-            }
-            dx8 += fx[7];
-            dv8 += fv[7];
-            dz8 += fz[7];
-            dx += fx;
-            dv += fv;
-            dz += fz;
-            z8 = z - h * ((((a[0] + a[8]) * 0.5 + (a[1] + a[2])) + ((a[3] + a[4]) + (a[5] + a[6]))) +
-                          a[7]);
-        }
-        const Vector X = x + dx, V = v + dv, R = r + (dz - dx);
-        LOAD(group->x + LANES * b) = X;
-        LOAD(group->v + LANES * b) = V;
-        LOAD(group->r + LANES * b) = R;
-        if (cx != NULL)
-            LOOSE(cx + at) = X;
-        if (cv != NULL)
-            LOOSE(cv + at) = V;
-        if (ca != NULL)
-            LOOSE(ca + at) = D * V - W * X;
-        if (cd != NULL)
-            LOOSE(cd + at) = X + (middle + R);
-        if (cz != NULL) {
-            Vector speed = {0};
-            for (int i = 0; i <= LANES && !is_still; i++)
-                speed += LOAD(t->speed_a[i]) * a[i];
-            LOOSE(cz + at) = z + speed;
-        }
-        if (!is_still)
-            a += LANES;
-        x += dx8;
-        v += dv8;
-        r += dz8 - dx8;
-        z = z8;
-        group->state[b + 1].x = x;
-        group->state[b + 1].v = v;
-        group->state[b + 1].r = r;
-        group->state[b + 1].z = z;
-    }
-}
-
-// What a block adds to the sums.
-INLINE void add_block(Vector *sums, Vector X, Vector V, const double *a, bool is_still) {
-    sums[XX] += X * X;
-    sums[XV] += X * V;
-    sums[VV] += V * V;
-    if (is_still)
-        return;
-    const Vector A = LOOSE(a), B = LOOSE(a + 1);
-    sums[XB] += X * B;
-    sums[XA] += X * A;
-    sums[VB] += V * B;
-    sums[VA] += V * A;
-}
-
-INLINE void add_base(Vector *sums, Vector A, Vector B) {
-    sums[BB] += B * B;
-    sums[AB] += A * B;
-    sums[AA] += A * A;
-}
-
-// `count` whole blocks and of the next one the first `more` samples.
-INLINE void add_blocks(Stretch *s, const Group *group, size_t count, size_t more, const double *a,
-                       bool is_still) {
-    Vector sums[LANE_SUMS];
-    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
-        sums[i] = LOAD(s->sums[i]);
-    for (size_t b = 0; b < count; b++) {
-        add_block(sums, LOAD(group->x + LANES * b), LOAD(group->v + LANES * b), a, is_still);
-        if (!is_still) {
-            add_base(sums, LOOSE(a), LOOSE(a + 1));
-            a += LANES;
-        }
-    }
-    if (more > 0) {
-        static const double ones[2 * LANES] = {1, 1, 1, 1, 1, 1, 1, 1};
-        const Vector keep = LOOSE(ones + LANES - more);
-        add_block(sums, keep * LOAD(group->x + LANES * count), keep * LOAD(group->v + LANES * count),
-                  a, is_still);
-        if (!is_still)
-            add_base(sums, keep * LOOSE(a), keep * LOOSE(a + 1));
-    }
-    for (int i = 0; i < (is_still ? 3 : LANE_SUMS); i++)
-        LOAD(s->sums[i]) = sums[i];
-}
 
 // What single samples add; a is NULL where the base is still.
 static void add_samples(Stretch *s, size_t count, const double *x, const double *v,
@@ -369,90 +253,21 @@ INLINE bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, 
            ((s->right < INFINITY) & (d > s->peaks->damper_displacement));
 }
 
-// As far as surely no stop is reached, by whole blocks but for the last.
-INLINE size_t fly_blocks(const Lanes *t, Stretch *s, size_t sample, size_t count, const double *a,
-                         bool is_still) {
-    const double h = t->interval, sagging = LANES * LANES * h * h / 8;
-    Group group;
-    size_t done = 0;
-    for (bool is_clear = true; is_clear && done + LANES <= count;) {
-        const size_t left = (count - done) / LANES, blocks = left < GROUP ? left : GROUP;
-        group.state[0].x = s->x;
-        group.state[0].v = s->v;
-        group.state[0].r = s->r;
-        group.state[0].z = s->z;
-        fly_group(t, s, &group, sample + done, blocks, a, is_still);
-        const double push = push_bound(t, s->x, s->v, GROUP * LANES, s->base_most);
-        size_t clear = 0, more = 0;
-        while (clear <= blocks && is_inside(s, group.state[clear].r, sagging * push))
-            clear++;
-        is_clear = clear > blocks;
-        clear -= clear > 0;
-        double z = group.state[clear].z;
-        const double *x = group.x + LANES * clear, *v = group.v + LANES * clear;
-        const double *r = group.r + LANES * clear, *b = is_still ? NULL : a + LANES * clear;
-        if (!is_clear) { // somewhere in this block: its intervals one by one
-            const double sag = h * h / 8 * push;
-            if (is_inside(s, group.state[clear].r, sag))
-                while (more < LANES && is_inside(s, r[more], sag))
-                    more++;
-            for (size_t j = 0; j < more && !is_still; j++)
-                z -= h * ((b[j] + b[j + 1]) / 2);
-            is_clear = more == LANES;
-        }
-        const size_t flown = clear * LANES + more;
-        if (flown == 0)
-            break;
-        if (may_hold_peak(t, s, &group, clear + (more > 0), sagging, push + s->base_most))
-            look_for_peaks(t, s, flown, group.x, group.v, group.r);
-        if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
-            store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + done + 1, flown, s->v,
-                        group.v, a);
-        add_blocks(s, &group, clear, more, a, is_still);
-        if (more > 0) {
-            s->x = x[more - 1];
-            s->v = v[more - 1];
-            s->r = r[more - 1];
-            s->z = z;
-        } else {
-            s->x = group.state[clear].x;
-            s->v = group.state[clear].v;
-            s->r = group.state[clear].r;
-            s->z = group.state[clear].z;
-        }
-        done += flown;
-        if (!is_still)
-            a += flown;
-    }
-    return done;
-}
-
-INLINE size_t run(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
-                  const double *base) {
-    const size_t done = base == NULL ? fly_blocks(lanes, stretch, sample, count, NULL, true)
-                                     : fly_blocks(lanes, stretch, sample, count, base, false);
-    const size_t left = count - done;
-    if (left == 0 || left >= LANES)
-        return done;
-    return done + careful(lanes, stretch, sample + done, left, base == NULL ? NULL : base + done);
-}
-
-static size_t run_plain(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
-                        const double *base) {
-    return run(lanes, stretch, sample, count, base);
-}
+#define WIDTH 2
+#define NAME(name) name##_plain
+#define TARGET
+#include "core/solve/lanes_run.h"
 
 #ifdef __x86_64__
-__attribute__((target("avx2"))) static size_t run_avx2(const Lanes *lanes, Stretch *stretch,
-                                                       size_t sample, size_t count,
-                                                       const double *base) {
-    return run(lanes, stretch, sample, count, base);
-}
+#define WIDTH 4
+#define NAME(name) name##_avx2
+#define TARGET __attribute__((target("avx2")))
+#include "core/solve/lanes_run.h"
 
-__attribute__((target("avx512f,avx512dq,prefer-vector-width=512"))) static size_t
-run_avx512(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count, const double *base) {
-    return run(lanes, stretch, sample, count, base);
-}
+#define WIDTH 8
+#define NAME(name) name##_avx512
+#define TARGET __attribute__((target("avx512f,avx512dq,prefer-vector-width=512")))
+#include "core/solve/lanes_run.h"
 #endif
 
 LanesWidth lanes_widest(void) {
