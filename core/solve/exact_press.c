@@ -1,9 +1,10 @@
 // Over each stretch the contact surely lasts, because
 // - where the buffer is slow beside the sample interval, p cannot get back to 0 between two samples
 //   against the bound of its curvature;
-// - elsewhere, with q = e^(c t / 2) p and s the structure's push, q'' + w^2 q = e^(c t / 2) s, so that
-//   by Sturm's comparison q stays positive up to pi - 2 S / (w p'(0)), S the most by which the right
-//   side pulls; from there on p falls.
+// - elsewhere, with q = e^(c t / 2) p and s the structure's push, q'' + w^2 q = e^(c t / 2) s, so
+// that
+//   by Sturm's comparison q stays positive up to pi - 2 S / (w p'(0)), S the most by which the
+//   right side pulls; from there on p falls.
 #include "core/solve/exact_press.h"
 
 #include <math.h>
@@ -52,8 +53,8 @@ static double surely_lasts(const Press *press) {
     // How fast the push can change: the structure's speed and acceleration, with room to spare.
     const double force = 2 * (pulse->contact_omega + pulse->damping) * w;
     const double omega = exact->lanes.omega;
-    const double own = (m->damping + omega) *
-                       (fabs(exact->state.v) + omega * fabs(exact->state.x) + w);
+    const double own =
+        (m->damping + omega) * (fabs(exact->state.v) + omega * fabs(exact->state.x) + w);
     const double bend = 2 * (own + exact->stretch.base_most) + m->share * force;
     const double rate = m->omega2 * (fabs(exact->state.v) + bend * T) + m->damping * bend;
     const double push = press->sign * exact_push(exact) - rate * T;
@@ -131,8 +132,8 @@ bool press_find_peak(Press *press, double guess, double length) {
             const double n = pulse_see(&p->n, d, a, press->slope) + press->sign * rate * step / 2;
             const Motion *m = &exact->flying;
             const double push = m->damping * at.v + m->omega2 * at.x;
-            const double moved = push + step * (m->omega2 * at.v +
-                                                m->damping * (m->share * n - push - a));
+            const double moved =
+                push + step * (m->omega2 * at.v + m->damping * (m->share * n - push - a));
             ledger_force(&exact->ledger, &exact->row, exact_effective_mass(exact) * fabs(n));
             ledger_acceleration(&exact->ledger, m->share * n - moved);
             return true;
@@ -148,9 +149,8 @@ static bool take_peak(Press *press, const double end[4], double length, bool is_
     const double from = press->sign * pulse_see(&p->n_rate, press->d, 0, press->slope);
     const double to = press->sign * pulse_see(&p->n_rate, end, 0, press->slope);
     if (from > 0 && to < 0)
-        return press_find_peak(press,
-                         is_slow ? length * from / (from - to) : p->peak_time - press->elapsed,
-                         length);
+        return press_find_peak(
+            press, is_slow ? length * from / (from - to) : p->peak_time - press->elapsed, length);
     // Over half a turn a force may rise, fall and rise.
     if (to < 0 || (from > 0 && p->omega[1] * length < 2))
         return true;
@@ -273,13 +273,12 @@ static bool is_known(const Press *press, const double end[4], double length) {
     const double fast = (fabs(p->n.d[2]) + fabs(p->n.d[3])) * (fabs(d[2]) + fabs(d[3]));
     const double from = pulse_see(&p->n, d, press->a, press->slope);
     const double to = pulse_see(&p->n, end, last, press->slope);
-    const double most = larger(fabs(from), fabs(to)) + 2 * fast +
-                        p->size2[0] * slow * length * length / 8;
+    const double most =
+        larger(fabs(from), fabs(to)) + 2 * fast + p->size2[0] * slow * length * length / 8;
     if (exact_effective_mass(press->exact) * most <= press->exact->row.impact.peak_force)
         return true;
     const double rises = pulse_see(&p->n_rate, d, 0, press->slope);
-    return fast <= 1e-13 * fabs(from) &&
-           rises * pulse_see(&p->n_rate, end, 0, press->slope) > 0;
+    return fast <= 1e-13 * fabs(from) && rises * pulse_see(&p->n_rate, end, 0, press->slope) > 0;
 }
 
 typedef enum Outcome { GOES_ON, ENDS, UNCLEAR } Outcome;

@@ -24,8 +24,8 @@ INLINE void turn(const Press *press, Ride *ride, const double *base) {
             ride->d[i][j] = d[i];
         if (j == RIDE)
             break;
-        const double here = p->size2[0] * (fabs(d[0]) + fabs(d[1])) +
-                            p->size2[1] * (fabs(d[2]) + fabs(d[3]));
+        const double here =
+            p->size2[0] * (fabs(d[0]) + fabs(d[1])) + p->size2[1] * (fabs(d[2]) + fabs(d[3]));
         bend = here > bend ? here : bend;
         ride->a[j + 1] = base == NULL ? 0 : base[j + 1];
         ride->s[j + 1] = base == NULL ? 0 : (base[j + 2] - base[j + 1]) * rate;
@@ -164,7 +164,8 @@ INLINE void take_samples(Press *press, const Ride *ride, size_t count) {
     const double mass = exact_effective_mass(exact);
     const double middle = exact_relative(exact) - exact->state.r;
     for (int j = 0; j < RIDE; j++) {
-        acceleration[j] = m->share * ride->n[j] - (m->damping * ride->v[j] + m->omega2 * ride->x[j]);
+        acceleration[j] =
+            m->share * ride->n[j] - (m->damping * ride->v[j] + m->omega2 * ride->x[j]);
         z[j] = ride->x[j] + (middle + ride->r[j]);
         speed[j] = ride->v[j] + ride->w[j];
         force[j] = mass * ride->n[j];
@@ -222,8 +223,8 @@ INLINE size_t run(Press *press, size_t most) {
         take_sums(press, &ride, count);
         take_samples(press, &ride, count);
         set_start(press, &ride, count);
-        exact->state = (State){ride.x[count - 1], ride.v[count - 1], ride.r[count - 1],
-                               ride.w[count - 1]};
+        exact->state =
+            (State){ride.x[count - 1], ride.v[count - 1], ride.r[count - 1], ride.w[count - 1]};
         exact->sample += count;
         exact->run->steps += (double)count;
         exact->recorder.last_velocity = exact->state.v;

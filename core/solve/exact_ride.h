@@ -9,10 +9,10 @@ typedef struct Press {
     Exact *exact;
     const Pulse *pulse;
     double sign;
-    double d[4], a, slope; // at the beginning of the present stretch
-    double elapsed;        // since the touch [s]
-    double lasts;          // surely until then [s]
-    double speed, absolute; // at the touch: |w|, and the free mass's velocity
+    double d[4], a, slope;               // at the beginning of the present stretch
+    double elapsed;                      // since the touch [s]
+    double lasts;                        // surely until then [s]
+    double speed, absolute;              // at the touch: |w|, and the free mass's velocity
     double vv, ww, work, gained, length; // since then
 } Press;
 
@@ -20,8 +20,8 @@ typedef struct Press {
 // cannot be told.
 bool press_find_peak(Press *press, double guess, double length);
 
-// From the present sample on over as many intervals as surely belong to the contact, `most` at most,
-// in eights; returns how many.
+// From the present sample on over as many intervals as surely belong to the contact, `most` at
+// most, in eights; returns how many.
 size_t press_ride(Press *press, size_t most);
 
 #endif

@@ -1,5 +1,5 @@
-// A stride: blocks of flight, a stop, its contact and the way back to a sample. Each step proves that
-// it misses nothing, or leaves state and ledger at its beginning for the arcs.
+// A stride: blocks of flight, a stop, its contact and the way back to a sample. Each step proves
+// that it misses nothing, or leaves state and ledger at its beginning for the arcs.
 #include "core/solve/exact_stride.h"
 
 #include <math.h>
@@ -118,8 +118,7 @@ static void take_hop(Exact *exact, const Hop *hop, double s) {
     const ArcIntegrals integrals = hop_integrals(hop, &exact->state, s);
     const Plan *plan = exact->plan;
     ledger_work(&exact->ledger,
-                -plan->mass[0] * integrals.av -
-                    exact->damper->mass * (integrals.av + integrals.aw),
+                -plan->mass[0] * integrals.av - exact->damper->mass * (integrals.av + integrals.aw),
                 plan->damping[0] * integrals.vv);
     recorder_base(&exact->recorder, integrals.a);
     exact->state = hop_at(hop, s);

@@ -1,8 +1,8 @@
 #include "core/solve/hop.h"
 
 void hop_make(Hop *hop, const Motion *flying, const State *start, const Slice *slice, double unit) {
-    static const double inverse[HOP_DEGREE + 1] = {0,        0,        1.0 / 2,  1.0 / 6,  1.0 / 12,
-                                                   1.0 / 20, 1.0 / 30, 1.0 / 42, 1.0 / 56, 1.0 / 72};
+    static const double inverse[HOP_DEGREE + 1] = {
+        0, 0, 1.0 / 2, 1.0 / 6, 1.0 / 12, 1.0 / 20, 1.0 / 30, 1.0 / 42, 1.0 / 56, 1.0 / 72};
     const double square = unit * unit, omega2 = flying->omega2 * square;
     const double damping = flying->damping * unit;
     const double a = slice->value * square, s = slice->slope * square * unit;

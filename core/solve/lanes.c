@@ -26,7 +26,8 @@ static Impulse impulse_at(long double omega2, long double damping, long double t
         out.S += term;
         out.I1 += term * t / (k + 1);
         out.I2 += term * t * t / ((k + 1) * (k + 2));
-        const long double next = -(damping * k * term * t + omega2 * before * t * t) / (k * (k + 1));
+        const long double next =
+            -(damping * k * term * t + omega2 * before * t * t) / (k * (k + 1));
         before = term;
         term = next;
     }
@@ -91,8 +92,8 @@ static void make_forms(Lanes *lanes, const Motion *flying, double interval) {
         const double h = weight[i] * interval, from = node[i], to = 1 - node[i];
         const double vv[LANE_SUMS] = {x * x,     2 * x * v, v * v, 2 * x * b, 2 * x * a,
                                       2 * v * b, 2 * v * a, b * b, 2 * a * b, a * a};
-        const double av[LANE_SUMS] = {0,        0,        0,      x * to,              x * from,
-                                      v * to, v * from, b * to, a * to + b * from, a * from};
+        const double av[LANE_SUMS] = {
+            0, 0, 0, x * to, x * from, v * to, v * from, b * to, a * to + b * from, a * from};
         for (int s = 0; s < LANE_SUMS; s++) {
             lanes->vv[s] += h * vv[s];
             lanes->av[s] += h * av[s];
@@ -138,8 +139,8 @@ INLINE void look_for_peaks(const Lanes *t, Stretch *s, size_t count, const doubl
             most[3][j] = larger(size(X + (s->middle + here[2][j])), most[3][j]);
         }
     }
-    double *const peaks[4] = {&s->peaks->displacement, &s->peaks->velocity,
-                              &s->peaks->acceleration, &s->peaks->damper_displacement};
+    double *const peaks[4] = {&s->peaks->displacement, &s->peaks->velocity, &s->peaks->acceleration,
+                              &s->peaks->damper_displacement};
     for (int i = 0; i < (s->right < INFINITY ? 4 : 3); i++)
         for (int j = 0; j < LANES; j++)
             *peaks[i] = larger(most[i][j], *peaks[i]);
@@ -256,18 +257,18 @@ INLINE bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, 
 #define WIDTH 2
 #define NAME(name) name##_plain
 #define TARGET
-#include "core/solve/lanes_run.h"
+#include "core/solve/lanes_run.inc"
 
 #ifdef __x86_64__
 #define WIDTH 4
 #define NAME(name) name##_avx2
 #define TARGET __attribute__((target("avx2")))
-#include "core/solve/lanes_run.h"
+#include "core/solve/lanes_run.inc"
 
 #define WIDTH 8
 #define NAME(name) name##_avx512
 #define TARGET __attribute__((target("avx512f,avx512dq,prefer-vector-width=512")))
-#include "core/solve/lanes_run.h"
+#include "core/solve/lanes_run.inc"
 #endif
 
 LanesWidth lanes_widest(void) {

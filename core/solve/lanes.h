@@ -39,20 +39,21 @@ typedef size_t LanesRun(const Lanes *lanes, Stretch *stretch, size_t sample, siz
 struct Lanes {
     _Alignas(64) double x_x[LANES], x_v[LANES], v_x[LANES], v_v[LANES], time[LANES];
     double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
-    double z_a[LANES + 1][LANES];     // displacement of the free mass
-    double speed_a[LANES + 1][LANES]; // its velocity
-    double interval;                  // [s]
-    double omega2, damping, omega;    // of the structure: K / M, C / M, sqrt(K / M)
+    double z_a[LANES + 1][LANES];        // displacement of the free mass
+    double speed_a[LANES + 1][LANES];    // its velocity
+    double interval;                     // [s]
+    double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
     LanesWidth width;
-    LanesRun *run;                       // NULL: the interval is too long for the structure
+    LanesRun *run; // NULL: the interval is too long for the structure
 };
 
 LanesWidth lanes_widest(void); // on this processor
 void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width);
 
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
-// way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if still.
+// way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if
+// still.
 static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
                                const double *base) {
     return lanes->run(lanes, stretch, sample, count, base);

@@ -1,9 +1,9 @@
 // With x = X e^(lambda t), r = R e^(lambda t), D = C / M, W = K / M, c and k of the contact:
 //   (lambda^2 + D lambda + W) X = share (c lambda + k) R
 //   (lambda^2 + c lambda + k) R = (D lambda + W) X
-// The quadratic pencil's left vectors p = (D lambda + W, lambda^2 + D lambda + W) take a state apart
-// into amplitudes, scaled here so that r is the sum of their real parts. Made in long double: the
-// rows' sizes differ by the square of the contact's frequency.
+// The quadratic pencil's left vectors p = (D lambda + W, lambda^2 + D lambda + W) take a state
+// apart into amplitudes, scaled here so that r is the sum of their real parts. Made in long double:
+// the rows' sizes differ by the square of the contact's frequency.
 #include "core/solve/pulse.h"
 
 #include <complex.h>
@@ -21,7 +21,8 @@ typedef struct Pencil {
 static Complex characteristic(const Pencil *p, Complex l, Complex *slope) {
     const Complex own = (l + p->D) * l + p->W, contact = (l + p->c) * l + p->k;
     const Complex push = p->D * l + p->W, force = p->share * (p->c * l + p->k);
-    *slope = (2 * l + p->D) * contact + own * (2 * l + p->c) - p->share * p->c * push - force * p->D;
+    *slope =
+        (2 * l + p->D) * contact + own * (2 * l + p->c) - p->share * p->c * push - force * p->D;
     return own * contact - force * push;
 }
 
@@ -97,7 +98,8 @@ static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
 static bool find_oscillations(const Pencil *p, Complex l[2]) {
     // The whole swinging with its buffer shut, and the pair against each other.
     const long double rest = 1 - p->share;
-    const long double slow_damping = rest * p->D / 2, slow2 = rest * p->W - slow_damping * slow_damping;
+    const long double slow_damping = rest * p->D / 2,
+                      slow2 = rest * p->W - slow_damping * slow_damping;
     const long double fast_damping = (p->c + p->share * p->D) / 2;
     const long double fast2 = p->k + p->share * p->W - fast_damping * fast_damping;
     if (!(slow2 > 0) || !(fast2 > 0))
@@ -123,12 +125,13 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
     pulse->time = 3.14159265358979323846 / pulse->contact_omega;
     pulse->damping = m->contact_damping;
     pulse->growth = exp(half * pulse->time);
-    // With r = Im e^(lambda t) the force's slope is Im (rate e^(lambda t)); past a right angle and a
-    // half it falls from the start.
+    // With r = Im e^(lambda t) the force's slope is Im (rate e^(lambda t)); past a right angle and
+    // a half it falls from the start.
     const Complex own = CMPLXL(-half, pulse->contact_omega);
     const Complex rate = own * (p.c * own + p.k);
     if (cimagl(rate) > 0)
-        pulse->peak_time = atan2((double)cimagl(rate), -(double)creall(rate)) / pulse->contact_omega;
+        pulse->peak_time =
+            atan2((double)cimagl(rate), -(double)creall(rate)) / pulse->contact_omega;
     PulseRow *const rows[] = {&pulse->r, &pulse->w, &pulse->r_bend};
     Complex fixed[2] = {0, 0}; // what x and r are under a_g = 1, and what its slope adds
     Complex fixed_slope[2] = {0, 0};
@@ -202,19 +205,18 @@ void pulse_turn(const Pulse *pulse, double time, double turn[4]) {
         const double s = pulse->sigma[i] * rest, w = pulse->omega[i] * rest;
         const double w2 = w * w;
         const double size =
-            1 +
-            s * (1 +
-                 s * (1.0 / 2 +
-                      s * (1.0 / 6 +
-                           s * (1.0 / 24 +
-                                s * (1.0 / 120 +
-                                     s * (1.0 / 720 + s * (1.0 / 5040 + s * (1.0 / 40320 + s * (1.0 / 362880)))))))));
+            1 + s * (1 + s * (1.0 / 2 +
+                              s * (1.0 / 6 +
+                                   s * (1.0 / 24 +
+                                        s * (1.0 / 120 +
+                                             s * (1.0 / 720 +
+                                                  s * (1.0 / 5040 + s * (1.0 / 40320 +
+                                                                         s * (1.0 / 362880)))))))));
         const double sine =
-            w * (1 - w2 * (1.0 / 6 -
-                           w2 * (1.0 / 120 - w2 * (1.0 / 5040 - w2 * (1.0 / 362880)))));
+            w * (1 - w2 * (1.0 / 6 - w2 * (1.0 / 120 - w2 * (1.0 / 5040 - w2 * (1.0 / 362880)))));
         const double cosine =
-            1 - w2 * (1.0 / 2 -
-                      w2 * (1.0 / 24 - w2 * (1.0 / 720 - w2 * (1.0 / 40320 - w2 * (1.0 / 3628800)))));
+            1 - w2 * (1.0 / 2 - w2 * (1.0 / 24 - w2 * (1.0 / 720 -
+                                                       w2 * (1.0 / 40320 - w2 * (1.0 / 3628800)))));
         small[2 * i] = size * cosine;
         small[2 * i + 1] = size * sine;
     }

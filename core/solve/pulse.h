@@ -1,6 +1,6 @@
-// One linear contact in closed form: two damped oscillations, a slow one of the whole and a fast one
-// of the buffer, about what a linear base makes of both. Not for contacts that are no oscillation or
-// hardly two: is_usable says so, and arcs do. Used by the exact solver.
+// One linear contact in closed form: two damped oscillations, a slow one of the whole and a fast
+// one of the buffer, about what a linear base makes of both. Not for contacts that are no
+// oscillation or hardly two: is_usable says so, and arcs do. Used by the exact solver.
 #ifndef CORE_SOLVE_PULSE_H
 #define CORE_SOLVE_PULSE_H
 
@@ -15,34 +15,35 @@ typedef struct PulseRow {
 } PulseRow;
 typedef struct PulseForm {
     double of[10]; // of d d', upper triangle by rows
-    double jump[4], jump2; // what it gains as the base's slope does: slope (jump . d) + slope^2 jump2
+    double jump[4],
+        jump2;   // what it gains as the base's slope does: slope (jump . d) + slope^2 jump2
     double slow; // times pulse_slow(...): the slow oscillation's mean square, kept apart from a
                  // difference that would lose it where that hardly decays
 } PulseForm;
 
 typedef struct Pulse {
     bool is_usable;
-    double into[4][6];                   // d from (x, v, r, w, a, s)
-    double jump[4];                      // of d per unit that the slope of the base gains
-    PulseRow x, v, r, w, n;              // n = N / m_e
-    PulseRow r_bend, n_rate, n_bend;     // derivatives
-    PulseRow x_sum, r_sum;               // integrals
-    PulseForm vv, ww;                    // integrals of the squares of v and w, less their constants'
-    double sigma[2], omega[2];           // of the oscillations [1/s], [rad/s]
-    double size2[2];                     // |lambda|^2
-    double time;                         // T_c of an isolated contact [s]
-    double peak_time;                    // of its largest force
-    double contact_omega;                // pi / T_c [rad/s]
-    double growth;                       // e^(c T_c / (2 m_e))
-    double damping;                      // c / m_e
-    double table[PULSE_TABLE + 1][4];    // the oscillations over i / PULSE_TABLE_UNIT of T_c
-    double interval[4];                  // and over a sample interval
+    double into[4][6];                // d from (x, v, r, w, a, s)
+    double jump[4];                   // of d per unit that the slope of the base gains
+    PulseRow x, v, r, w, n;           // n = N / m_e
+    PulseRow r_bend, n_rate, n_bend;  // derivatives
+    PulseRow x_sum, r_sum;            // integrals
+    PulseForm vv, ww;                 // integrals of the squares of v and w, less their constants'
+    double sigma[2], omega[2];        // of the oscillations [1/s], [rad/s]
+    double size2[2];                  // |lambda|^2
+    double time;                      // T_c of an isolated contact [s]
+    double peak_time;                 // of its largest force
+    double contact_omega;             // pi / T_c [rad/s]
+    double growth;                    // e^(c T_c / (2 m_e))
+    double damping;                   // c / m_e
+    double table[PULSE_TABLE + 1][4]; // the oscillations over i / PULSE_TABLE_UNIT of T_c
+    double interval[4];               // and over a sample interval
 } Pulse;
 
 void pulse_make(Pulse *pulse, const Motion *touching, double interval);
 
-// What the oscillations are multiplied by over a time; quick up to PULSE_TABLE / PULSE_TABLE_UNIT of
-// T_c.
+// What the oscillations are multiplied by over a time; quick up to PULSE_TABLE / PULSE_TABLE_UNIT
+// of T_c.
 void pulse_turn(const Pulse *pulse, double time, double turn[4]);
 
 static inline void pulse_multiply(const double turn[4], const double d[4], double out[4]) {
