@@ -244,7 +244,7 @@ __attribute__((target("avx2"))) static size_t run_avx2(Press *press, size_t most
     return run(press, most);
 }
 
-__attribute__((target("avx512f,avx512dq,prefer-vector-width=512"))) static size_t
+__attribute__((target("avx512f,avx512dq"))) static size_t
 run_avx512(Press *press, size_t most) {
     return run(press, most);
 }

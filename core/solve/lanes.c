@@ -267,7 +267,7 @@ INLINE bool may_hold_peak(const Lanes *t, const Stretch *s, const Group *group, 
 
 #define WIDTH 8
 #define NAME(name) name##_avx512
-#define TARGET __attribute__((target("avx512f,avx512dq,prefer-vector-width=512")))
+#define TARGET __attribute__((target("avx512f,avx512dq")))
 #include "core/solve/lanes_run.inc"
 #endif
 

@@ -13,6 +13,15 @@
 typedef long double complex Complex;
 
 enum { NEWTON_STEPS = 30 };
+static const double PI = 3.14159265358979323846;
+
+static double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+static Complex complex_of(long double real, long double imaginary) {
+    return real + imaginary * I;
+}
 
 typedef struct Pencil {
     long double D, W, c, k, share;
@@ -75,15 +84,26 @@ static void make_form(PulseForm *form, const Complex g[2], const Complex l[2],
     form->jump[3] = of[3] * jump[0] + of[6] * jump[1] + of[8] * jump[2] + 2 * of[9] * jump[3];
 }
 
-static Complex turn_by(Complex l, long double time) {
-    const long double size = expl(creall(l) * time), angle = cimagl(l) * time;
-    return CMPLXL(size * cosl(angle), size * sinl(angle));
+// e^z by its series near 0, and squared. The C library's would give other last bits on other
+// processors.
+static Complex power_of_e(Complex z) {
+    int halvings = 0;
+    for (; square(z) > 1.0L / 64 && halvings < 64; halvings++)
+        z /= 2;
+    Complex less = z, term = z; // e^z - 1, as nothing else survives so many squarings
+    for (int k = 2; k < 16; k++) {
+        term *= z / k;
+        less += term;
+    }
+    for (; halvings > 0; halvings--)
+        less = less * (less + 2);
+    return 1 + less;
 }
 
 static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
     for (int mode = 0; mode < 2; mode++) {
-        const Complex step = turn_by(l[mode], (long double)pulse->time / PULSE_TABLE_UNIT);
-        const Complex whole = turn_by(l[mode], interval);
+        const Complex step = power_of_e(l[mode] * (long double)pulse->time / PULSE_TABLE_UNIT);
+        const Complex whole = power_of_e(l[mode] * interval);
         Complex power = 1;
         for (int i = 0; i <= PULSE_TABLE; i++, power *= step) {
             pulse->table[i][2 * mode] = (double)creall(power);
@@ -104,8 +124,8 @@ static bool find_oscillations(const Pencil *p, Complex l[2]) {
     const long double fast2 = p->k + p->share * p->W - fast_damping * fast_damping;
     if (!(slow2 > 0) || !(fast2 > 0))
         return false;
-    l[0] = CMPLXL(-slow_damping, sqrtl(slow2));
-    l[1] = CMPLXL(-fast_damping, sqrtl(fast2));
+    l[0] = complex_of(-slow_damping, sqrtl(slow2));
+    l[1] = complex_of(-fast_damping, sqrtl(fast2));
     if (!find_root(p, &l[0]) || !find_root(p, &l[1]))
         return false;
     for (int i = 0; i < 2; i++)
@@ -122,16 +142,14 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
     if (!(contact2 > 0) || !find_oscillations(&p, l))
         return;
     pulse->contact_omega = sqrt(contact2);
-    pulse->time = 3.14159265358979323846 / pulse->contact_omega;
+    pulse->time = PI / pulse->contact_omega;
     pulse->damping = m->contact_damping;
-    pulse->growth = exp(half * pulse->time);
-    // With r = Im e^(lambda t) the force's slope is Im (rate e^(lambda t)); past a right angle and
-    // a half it falls from the start.
-    const Complex own = CMPLXL(-half, pulse->contact_omega);
-    const Complex rate = own * (p.c * own + p.k);
-    if (cimagl(rate) > 0)
-        pulse->peak_time =
-            atan2((double)cimagl(rate), -(double)creall(rate)) / pulse->contact_omega;
+    pulse->growth = (double)creall(power_of_e(half * (long double)pulse->time));
+    // In an isolated contact of damping ratio Z = sin b the force is largest after a right angle
+    // less 3 b; a guess.
+    const double Z = half / sqrt(m->contact_omega2),
+                 b = Z * (1 + Z * Z * (1.0 / 6 + Z * Z * 0.075));
+    pulse->peak_time = larger(PI / 2 - 3 * b, 0) / pulse->contact_omega;
     PulseRow *const rows[] = {&pulse->r, &pulse->w, &pulse->r_bend};
     Complex fixed[2] = {0, 0}; // what x and r are under a_g = 1, and what its slope adds
     Complex fixed_slope[2] = {0, 0};
