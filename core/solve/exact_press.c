@@ -80,7 +80,7 @@ static void nudge(const Pulse *pulse, double time, double d[4]) {
     }
 }
 
-enum { SEARCH_STEPS = 12 };
+enum { SEARCH_STEPS = 12, RIDE_AGAIN = 8 };
 static const double NEAR = 1e-5; // an angle whose cube is below rounding
 
 // p = 0 within `length` of the stretch's beginning, from a guess; false where the search leaves it.
@@ -375,7 +375,7 @@ size_t exact_press(Exact *exact, size_t most) {
     if (!pulse->is_usable || !(fabs(exact->state.w) > 0) || step * STEPS_MOST < exact->interval ||
         (exact->stretch.base_most > 0 && exact->sample + 1 >= exact->run->base->count))
         return 0;
-    size_t count = 0;
+    size_t count = 0, ride_from = 0;
     Press press;
     start(&press, exact);
     bool is_walking = step > exact->interval;
@@ -383,8 +383,10 @@ size_t exact_press(Exact *exact, size_t most) {
         press.lasts = surely_lasts(&press);
     Outcome outcome = GOES_ON;
     while (count < most) {
-        if (is_walking && exact->offset == 0 && step > exact->interval)
+        if (is_walking && exact->offset == 0 && step > exact->interval && count >= ride_from) {
             count += press_ride(&press, most - count);
+            ride_from = count + RIDE_AGAIN; // it has ended, most often because the contact will
+        }
         if (count >= most)
             break;
         const double left = exact->interval - exact->offset;
