@@ -6,10 +6,11 @@
 //        +--(impulse)--> u' -> -e u' ----------------------------------> RESTING(side)
 //                                                 push becomes tensile -> FLIGHT
 //
-// Flight over a whole sample interval is one matrix step where a bound on the gap's curvature
-// proves that no stop can be reached; everything else goes by arcs (arc.h), whose polynomials
-// locate events to rounding. Time is a sample's number and an offset from it, so that short
-// contacts keep their digits late in a run.
+// What is common goes by strides (exact_stride.h): many samples of flight at once, contacts in
+// closed form, each with a proof that nothing is missed. Where there is none, flight over a whole
+// interval is one matrix step if a bound on the gap's curvature allows it, and everything else goes
+// by arcs (arc.h), whose polynomials locate events to rounding. Time is a sample's number and an
+// offset from it, so that short contacts keep their digits late in a run.
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
