@@ -196,7 +196,7 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
         TRY(plan_damper(structure, plan, i, &scene->dampers.at[i]));
     TRY(decide_contact(scene, plan));
     TRY(plan_modes(structure, plan, problem));
-    TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL, "%s",
+    TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
                       strcmp(asked, solver) == 0
                           ? "the scene asks for it"
                           : "every contact state is linear, so its motion is known exactly"));

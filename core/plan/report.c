@@ -56,6 +56,8 @@ const Field plan_report_fields[] = {
 
 // The text of a format, owned by the caller; NULL without memory.
 static char *text_of(const char *format, va_list arguments) {
+    if (strchr(format, '%') == NULL)
+        return strdup(format);
     char text[1024], cut[512];
     vsnprintf(text, sizeof text, format, arguments);
     text_fit(cut, sizeof cut, text);

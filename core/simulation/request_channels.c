@@ -99,8 +99,19 @@ static Status refuse(const char *name, const char *meant, const char *detail, co
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
-static Status check_name(const char *name, const Owners *owners, const char *pointer,
-                         Problem *problem) {
+static bool is_right(const char *name, const Owners *owners) {
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    if (channel == NULL)
+        return false;
+    const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
+    return owners_count(owners, channel) > 0 &&
+           (is_numbered ? number >= 1 && number <= owners_count(owners, channel) : number == 0);
+}
+
+// Says what is wrong with a name that is not right.
+static Status refuse_name(const char *name, const Owners *owners, const char *pointer,
+                          Problem *problem) {
     size_t number;
     const Channel *channel = channel_find(name, &number);
     if (strcmp(name, CHANNEL_USUAL) == 0)
@@ -114,8 +125,6 @@ static Status check_name(const char *name, const Owners *owners, const char *poi
                            "%s needs a damper, the scene has none", name);
     const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
     const size_t most = owners_count(owners, channel);
-    if (is_numbered ? number >= 1 && number <= most : number == 0)
-        return STATUS_OK;
     char meant[NAME_SIZE], last[NAME_SIZE], detail[sizeof((Fault){0}.detail)];
     put_name(meant, owners, channel,
              number > most || channel->owner == CHANNEL_OF_STOREY ? most : 1);
@@ -141,15 +150,20 @@ Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, cons
         TRY(expand(names, &owners, is_spectrum, problem));
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
+        size_t first = 0;
+        while (first < i && strcmp(names->at[i], names->at[first]) != 0)
+            first++;
+        const bool is_wrong = are_known && !is_right(names->at[i], &owners);
+        if (!is_wrong && first == i)
+            continue;
+        status = STATUS_INVALID;
         char place[sizeof((Fault){0}.pointer)];
         pointer_index(place, sizeof place, pointer, i);
-        if (are_known && check_name(names->at[i], &owners, place, problem) != STATUS_OK)
-            status = STATUS_INVALID;
-        for (size_t j = 0; j < i; j++)
-            if (strcmp(names->at[i], names->at[j]) == 0)
-                status = problem_add(problem, STATUS_INVALID, place,
-                                     "%.64s is asked for twice, first at %s/%zu", names->at[i],
-                                     pointer, j);
+        if (is_wrong)
+            (void)refuse_name(names->at[i], &owners, place, problem);
+        if (first < i)
+            problem_add(problem, STATUS_INVALID, place, "%.64s is asked for twice, first at %s/%zu",
+                        names->at[i], pointer, first);
     }
     return status;
 }
