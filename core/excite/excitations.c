@@ -9,8 +9,10 @@ const Field excitation_fields[] = {
 };
 // clang-format on
 
-const ExcitationKind *const excitations[] = {&excitation_free, &excitation_random, &excitation_sine,
-                                             &excitation_record, NULL};
+const ExcitationKind *const excitations[] = {
+    &excitation_free,  &excitation_random,    &excitation_sine,       &excitation_record,
+    &excitation_chirp, &excitation_half_sine, &excitation_triangular, NULL,
+};
 
 static const Kind *excitation_at(size_t index) {
     return index < COUNT(excitations) - 1 ? &excitations[index]->kind : NULL;
