@@ -76,7 +76,7 @@ RecordLook record_look(const Reals *samples, double interval, double scale) {
 bool record_drifts(const RecordLook *look) {
     const double lesser = fmin(look->highest, -look->lowest);
     return lesser > 0.1 * fmax(look->highest, -look->lowest) &&
-           fabs(look->end_velocity) > 0.5 * look->peak_velocity;
+           fabs(look->end_velocity) > 0.3 * look->peak_velocity;
 }
 
 static void record_doubt(const Excitation *excitation, const Span *span, const char *pointer,
