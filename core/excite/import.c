@@ -178,7 +178,7 @@ static Status choose_interval(const ImportRequest *request, const ImportHeader *
                               Import *import, Problem *problem) {
     const double told = !isnan(import->interval) ? import->interval : header->interval;
     char place[64], is[32], asked[32];
-    (void)text_place(place, header->count_line > 0 ? header->count_line : 1, 0);
+    (void)text_place(place, header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
     if (isnan(told) && isnan(request->interval))
         return problem_add(problem, STATUS_UNREADABLE, place,
                            "must tell the interval of the samples; where it does not, it must be "

@@ -46,7 +46,7 @@ static void read_count(const char *line, ImportHeader *header) {
     if (!isnan(header->count)) {
         const char *at = line + strspn(line, " \t");
         at += strcspn(at, " \t,;");
-        header->interval = number_behind(at + strspn(at, ",;"));
+        header->interval = number_behind(at + strspn(at, " \t,;"));
         return;
     }
     header->layout = "at2";

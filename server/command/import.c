@@ -32,11 +32,11 @@ static const Field import_fields[] = {
 };
 // clang-format on
 
-static void unit_tell(const char *path, const Import *import) {
+static void unit_tell(const char *path, const Import *import, bool is_given) {
     const char *unit = import_unit_names[import->unit];
-    if (import->stated_unit == CHOICE_ABSENT)
+    if (import->stated_unit == CHOICE_ABSENT && !is_given)
         fprintf(stderr, "%s: warning: the file tells no unit, %s is taken\n", path, unit);
-    else if (import->stated_unit != import->unit)
+    else if (import->stated_unit != CHOICE_ABSENT && import->stated_unit != import->unit)
         fprintf(stderr, "%s: warning: the file tells %s, %s is taken\n", path,
                 import_unit_names[import->stated_unit], unit);
 }
@@ -109,7 +109,7 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
         status = excitation_write(&record, settings->output, problem);
     if (status == STATUS_OK) {
         summary_tell(path, &import, settings);
-        unit_tell(path, &import);
+        unit_tell(path, &import, settings->unit != CHOICE_ABSENT);
         problem_clear(problem);
         doubts_tell(path, &record.excitation, problem);
     }
