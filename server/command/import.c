@@ -92,9 +92,9 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
     Import import;
     TRY(import_read(text->at != NULL ? text->at : "", text->count, &request, &import, problem));
     char source[1000];
-    const char *slash = strrchr(path, '/');
+    const char *name = scene_file_name(path), *slash = strrchr(path, '/');
     char named[2000];
-    snprintf(named, sizeof named, "%.200s%s%s", slash != NULL ? slash + 1 : path,
+    snprintf(named, sizeof named, "%.200s%s%s", slash != NULL ? slash + 1 : name,
              import.header[0] != '\0' ? ": " : "", import.header);
     text_fit(source, sizeof source, named);
     ExcitationRecord record = {.excitation.variant.kind = &excitation_record.kind,
@@ -108,10 +108,10 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
     if (status == STATUS_OK)
         status = excitation_write(&record, settings->output, problem);
     if (status == STATUS_OK) {
-        summary_tell(path, &import, settings);
-        unit_tell(path, &import, settings->unit != CHOICE_ABSENT);
+        summary_tell(name, &import, settings);
+        unit_tell(name, &import, settings->unit != CHOICE_ABSENT);
         problem_clear(problem);
-        doubts_tell(path, &record.excitation, problem);
+        doubts_tell(name, &record.excitation, problem);
     }
     import_clear(&import);
     return status;
