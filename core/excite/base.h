@@ -1,6 +1,6 @@
 // The base's acceleration a_g(t) as a solver meets it: still, linear between samples, a sine, or a
-// few pieces between any instants; exact in each form. Not an excitation: how the samples came
-// about is the excitation's business. Used by excite/, solve/ and simulation/.
+// few pieces; exact in each form. Not an excitation: how the samples came about is the excitation's
+// business. Used by excite/, solve/ and simulation/.
 #ifndef CORE_EXCITE_BASE_H
 #define CORE_EXCITE_BASE_H
 

@@ -1,6 +1,6 @@
 // A measured base acceleration as samples, as the scene gives it.
-// Not the motion itself (base.h). Used by record.c, by who makes records and by tests; everyone
-// else sees an Excitation.
+// Not the motion itself (base.h). Used by record.c, import.c and command/; others see an
+// Excitation.
 #ifndef CORE_EXCITE_RECORD_H
 #define CORE_EXCITE_RECORD_H
 
