@@ -126,12 +126,8 @@ static void chirp_doubt(const Excitation *excitation, const Span *span, const ch
                           text_real(is, chirp->rate), text_real(limit, highest(chirp)),
                           turn * turn / 12);
     const bool is_end = chirp->end_frequency >= chirp->start_frequency;
-    pointer_join(place, sizeof place, pointer, is_end ? "end_frequency" : "start_frequency");
-    if (highest(chirp) > span->sample_rate / 2)
-        (void)problem_add(doubts, STATUS_INVALID, place,
-                          "is %s Hz, above half the sample rate, %s Hz: the output's samples do "
-                          "not show the motion",
-                          text_real(is, highest(chirp)), text_real(limit, span->sample_rate / 2));
+    excitation_doubt_frequency(highest(chirp), span, pointer,
+                               is_end ? "end_frequency" : "start_frequency", doubts);
 }
 
 const ExcitationKind excitation_chirp = {

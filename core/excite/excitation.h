@@ -46,6 +46,10 @@ extern const Field excitation_fields[]; // the rows that every kind has
 extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record,
     excitation_chirp, excitation_half_sine, excitation_triangular;
 
+// A doubt at pointer/name where the output's samples cannot show motion of this frequency.
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts);
+
 static inline const ExcitationKind *excitation_kind(const Excitation *excitation) {
     return (const ExcitationKind *)(const void *)excitation->variant.kind;
 }

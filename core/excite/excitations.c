@@ -1,4 +1,4 @@
-// All excitations, the default first, and the rows that each of them begins with.
+// All excitations, the default first, and what several of them share.
 #include "core/excite/excitation.h"
 
 // clang-format off
@@ -19,3 +19,16 @@ static const Kind *excitation_at(size_t index) {
 }
 
 const KindTable excitation_kinds = {"kind", excitation_at};
+
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts) {
+    if (!(frequency > span->sample_rate / 2))
+        return;
+    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
+    pointer_join(place, sizeof place, pointer, name);
+    (void)problem_add(
+        doubts, STATUS_INVALID, place,
+        "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
+        "the motion",
+        text_real(is, frequency), text_real(limit, span->sample_rate / 2));
+}

@@ -104,6 +104,20 @@ static void a_sine_beyond_numbers_is_refused(void **state) {
     variant_free(&excitation->variant);
 }
 
+static void a_sine_between_the_samples_is_doubted(void **state) {
+    (void)state;
+    Excitation *excitation = excitation_new("sine");
+    *real_of(excitation, "frequency") = 500;
+    excitation_sine.doubt(excitation, &span, "/excitation", &problem);
+    assert_int_equal(problem.count, 0);
+    *real_of(excitation, "frequency") = 500.5;
+    excitation_sine.doubt(excitation, &span, "/excitation", &problem);
+    assert_string_equal(detail_at(&problem, "/excitation/frequency"),
+                        "is 500.5 Hz, above half the sample rate, 500 Hz: the output's samples do "
+                        "not show the motion");
+    variant_free(&excitation->variant);
+}
+
 static void a_sine_needs_its_frequency_and_amplitude(void **state) {
     (void)state;
     Excitation *excitation = excitation_new("sine");
@@ -191,6 +205,7 @@ int main(void) {
         cmocka_unit_test(a_sine_of_acceleration_is_taken_as_it_is),
         cmocka_unit_test(a_sine_of_displacement_is_differentiated_twice),
         cmocka_unit_test(a_sine_beyond_numbers_is_refused),
+        cmocka_unit_test(a_sine_between_the_samples_is_doubted),
         cmocka_unit_test(a_sine_needs_its_frequency_and_amplitude),
         cmocka_unit_test(a_record_is_scaled_and_copied),
         cmocka_unit_test(a_record_needs_samples_that_stay_finite),
