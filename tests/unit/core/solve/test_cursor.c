@@ -73,7 +73,7 @@ static void a_piece_on_a_sample_leaves_the_interval_whole(void **state) {
         Base base = {.form = BASE_PIECES, .pieces = {{700.1, 3, 2}, {700.2, 0, 0}}};
         base.piece_count = 2;
         for (size_t i = 0; i < 2 && side != 0; i++)
-            base.pieces[i].time = nextafter(base.pieces[i].time, side * INFINITY);
+            base.pieces[i].time = nextafter(base.pieces[i].time, side < 0 ? -1.0 : 1e9);
         BaseCursor cursor;
         Slice slice;
         base_cursor_make(&cursor, &base, 1000);
