@@ -218,6 +218,24 @@ static void a_record_on_another_grid_gives_the_same_motion(void **state) {
         }
 }
 
+// Knots 1/80 of the structure's 1/omega apart, so that all arcs are short and the base moves them.
+static void the_balance_closes_under_a_base_far_faster_than_the_structure(void **state) {
+    (void)state;
+    const double intervals[] = {0.5e-3, 0.99e-3, 0.25e-3};
+    double swings[4 * SWINGS];
+    for (size_t i = 0; i < COUNT(swings); i++)
+        swings[i] = i % 3 == 2 ? -1 : (double)(i % 3);
+    for (size_t i = 0; i < COUNT(intervals); i++) {
+        Simulation simulation;
+        record_scene(&simulation, true, false, 1000);
+        record(&simulation, swings, COUNT(swings), intervals[i]);
+        Outcome *outcome = run(&simulation);
+        if (!(outcome->summary.energy_residual < 1e-12))
+            fail_msg("knots %g s apart leave %g", intervals[i], outcome->summary.energy_residual);
+        outcome_drop(outcome);
+    }
+}
+
 static void pulses_are_what_other_kinds_make_of_them(void **state) {
     (void)state;
     Simulation simulation;
@@ -268,6 +286,7 @@ int main(void) {
         cmocka_unit_test(a_sweep_is_met_to_a_billionth),
         cmocka_unit_test(a_sweep_with_fewer_knots_errs_with_their_fourth_power),
         cmocka_unit_test(a_record_on_another_grid_gives_the_same_motion),
+        cmocka_unit_test(the_balance_closes_under_a_base_far_faster_than_the_structure),
         cmocka_unit_test(pulses_are_what_other_kinds_make_of_them),
         cmocka_unit_test(a_later_pulse_gives_the_same_motion_later),
     };
