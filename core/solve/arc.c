@@ -37,7 +37,7 @@ static void base_series(Arc *arc, const Slice *slice, double length) {
 void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
               double length) {
     arc->length = length;
-    arc->rho = length * motion->rate;
+    arc->rho = length * fmax(motion->rate, slice->omega);
     arc->degree = degree_for(arc->rho);
     base_series(arc, slice, length);
     const double square = length * length;
