@@ -285,6 +285,10 @@ static Status solve(Exact *exact) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return problem_set(problem, STATUS_UNSUPPORTED_TYPE,
+                           "this solver runs one storey with at most one damper, not %zu with %zu",
+                           run->plan->storeys, run->plan->damper_count);
     Exact exact;
     TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);
