@@ -267,7 +267,7 @@ static void compare(const FrameTruth *answer, const FrameTruth *truth, const Pla
     }
     qsort(answer->impacts, answer->impact_count, sizeof *answer->impacts, by_start);
     qsort(truth->impacts, truth->impact_count, sizeof *truth->impacts, by_start);
-    const double least = 1e-7 * scales[APPROACH];
+    const double least = fmax(1e-7 * scales[APPROACH], 1e-30);
     for (size_t i = 0, j = 0, number = 0;; number++) {
         const TruthImpact *a = next(answer, &i, least), *b = next(truth, &j, least);
         if (a == NULL && b == NULL)
