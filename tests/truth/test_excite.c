@@ -288,8 +288,7 @@ static void a_pulse_far_shorter_than_all_else_is_a_release(void **state) {
     pulse(&simulation, "half_sine", (double)(PI / 2 * 0.3e9L), 0, 1e-9);
     Outcome *one = run(&simulation);
     record_scene(&simulation, false, false, 1000);
-    ((Excitation *)(void *)simulation.scene.excitation)->displacement = 0;
-    ((Excitation *)(void *)simulation.scene.excitation)->velocity = -0.3;
+    scene_start(&simulation, 0, -0.3);
     Outcome *other = run(&simulation);
     assert_true(one->summary.impacts > 3 && one->summary.impacts == other->summary.impacts);
     assert_true(one->summary.energy_residual < 1e-12);
