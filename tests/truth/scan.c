@@ -9,20 +9,22 @@
 typedef long double Real;
 
 enum { TERMS = 26 };
-static const Real MISS = 1e-12L; // of the lengths there are
+static const Real MISS = 1e-11L; // of the lengths there are
 static const Real ULP = 2.3e-16L;
 static const Real REACH = 0.5L; // longest piece, as an angle of the fastest motion
 
 typedef enum Phase { FLIGHT, CONTACT, REST } Phase;
 static const char *const phase_names[] = {"a gap closes", "a contact opens", "a rest is pulled at"};
 
-// r is the free mass's displacement relative to the middle of its stops.
+// r is the free mass's displacement relative to the stop last touched, before that to the middle: a
+// penetration of a stiff stop has no digits to lose.
 typedef struct Walk {
     const ReferenceScene *scene;
     Scan *scan;
-    Real omega2, damping, share, half, base_omega, base_amplitude;
+    Real omega2, damping, share, base_omega, base_amplitude;
     Real contact_omega2[2], contact_damping[2], rate[2], flight_rate;
     Real t, x, v, r, w;
+    Real room[2]; // to either stop at r = 0
     Phase phase;
     int side;
     Real length, speed, push; // largest there are
@@ -88,7 +90,6 @@ static Real base(const Walk *walk, Real *value, Real *slope) {
 static void piece_make(const Walk *walk, Real h, Real value, Real slope, Piece *piece) {
     const Real k = walk->phase == CONTACT ? walk->contact_omega2[walk->side] : 0;
     const Real c = walk->phase == CONTACT ? walk->contact_damping[walk->side] : 0;
-    const Real stop = walk->side == SIDE_RIGHT ? walk->half : -walk->half;
     Real *x = piece->x, *r = piece->r, a[TERMS + 2] = {value, slope * h};
     memset(piece, 0, sizeof *piece);
     x[0] = walk->x, x[1] = walk->v * h, r[0] = walk->r, r[1] = walk->w * h;
@@ -97,7 +98,7 @@ static void piece_make(const Walk *walk, Real h, Real value, Real slope, Piece *
         const Real v = i + 1 < TERMS ? next * x[i + 1] / h : 0;
         const Real w = i + 1 < TERMS ? next * r[i + 1] / h : 0;
         const Real push = walk->omega2 * x[i] + walk->damping * v;
-        const Real press = walk->phase == REST ? push : k * (i == 0 ? r[0] - stop : r[i]) + c * w;
+        const Real press = walk->phase == REST ? push : k * r[i] + c * w;
         piece->push[i] = push;
         if (i + 2 >= TERMS)
             break;
@@ -108,6 +109,22 @@ static void piece_make(const Walk *walk, Real h, Real value, Real slope, Piece *
     }
 }
 
+static void piece_end(Walk *walk, const Piece *piece, Real h) {
+    walk->x = at(piece->x, 1);
+    walk->v = slope_at_end(piece->x) / h;
+    walk->r = at(piece->r, 1);
+    walk->w = slope_at_end(piece->r) / h;
+}
+
+// A little further, or back.
+static void step(Walk *walk, Real h) {
+    Real value, slope;
+    Piece piece;
+    base(walk, &value, &slope);
+    piece_make(walk, h, value, slope, &piece);
+    piece_end(walk, &piece, h);
+}
+
 // What must stay positive: the gap to a stop, the penetration, or the push into the stop.
 static void guard(const Walk *walk, const Piece *piece, int side, Real *f) {
     const Real sign = side == SIDE_RIGHT ? 1 : -1;
@@ -115,8 +132,8 @@ static void guard(const Walk *walk, const Piece *piece, int side, Real *f) {
         f[i] = sign * (walk->phase == FLIGHT    ? -piece->r[i]
                        : walk->phase == CONTACT ? piece->r[i]
                                                 : piece->push[i]);
-    if (walk->phase != REST)
-        f[0] += walk->phase == FLIGHT ? walk->half : -walk->half;
+    if (walk->phase == FLIGHT)
+        f[0] += walk->room[side];
 }
 
 // Of a gap or a penetration, or of a push.
@@ -164,10 +181,7 @@ static bool advance(Walk *walk, Real until) {
                 ? !prove(walk, &piece, SIDE_LEFT) || !prove(walk, &piece, SIDE_RIGHT)
                 : !prove(walk, &piece, walk->side))
             return false;
-        walk->x = at(piece.x, 1);
-        walk->v = slope_at_end(piece.x) / h;
-        walk->r = at(piece.r, 1);
-        walk->w = slope_at_end(piece.r) / h;
+        piece_end(walk, &piece, h);
         walk->t = is_cut ? walk->t + h : target;
         walk->length = fmaxl(walk->length, fabsl(walk->x));
         walk->push =
@@ -191,9 +205,11 @@ static bool event(Walk *walk, const Impact *impact) {
     const Real sign = side == SIDE_RIGHT ? 1 : -1, e = walk->scene->restitution[side];
     const Real end = isnan(impact->end) ? (Real)walk->scene->duration : (Real)impact->end;
     if (!advance(walk, impact->start) ||
-        !meets(walk, "the stop", fabsl(sign * walk->r - walk->half), allowed(walk)))
+        !meets(walk, "the stop", fabsl(sign * walk->r - walk->room[side]), allowed(walk)))
         return false;
-    walk->r = sign * walk->half;
+    walk->r = 0;
+    walk->room[side] = 0;
+    walk->room[1 - side] = walk->scene->clearance;
     walk->side = side;
     if (impact->kind == IMPACT_RESTING) {
         // All bounces that are left, at once.
@@ -214,17 +230,17 @@ static bool event(Walk *walk, const Impact *impact) {
     if (!advance(walk, end))
         return false;
     if (walk->phase == CONTACT && !isnan(impact->end)) {
-        // An ulp of the time is much in a short contact: the last step goes on to p = 0.
-        const Real p = sign * walk->r - walk->half, late = -p / (sign * walk->w);
-        const Real k = walk->contact_omega2[side], c = walk->contact_damping[side];
-        if (!meets(walk, "the end of the contact", fabsl(p), allowed(walk)))
+        if (!meets(walk, "the end of the contact", fabsl(walk->r), allowed(walk)))
             return false;
-        const Real press = c * walk->w + sign * k * p,
-                   push = walk->omega2 * walk->x + walk->damping * walk->v;
-        walk->x += walk->v * late;
-        walk->v += (walk->share * press - push) * late;
-        walk->w += (push - press) * late;
-        walk->r = sign * walk->half;
+        // An ulp of the time is much in a short contact: go on to where p is 0 and call that the
+        // end.
+        for (int i = 0; i < 4; i++) {
+            const Real late = -walk->r / walk->w;
+            if (late != 0 && fabsl(late) * walk->rate[side] < REACH)
+                step(walk, late);
+        }
+        walk->t = end;
+        walk->r = 0;
     }
     walk->phase = FLIGHT;
     return true;
@@ -237,7 +253,7 @@ void scan_run(const ReferenceScene *scene, const Impacts *impacts, Scan *scan) {
                  .omega2 = (Real)scene->stiffness / M,
                  .damping = (Real)scene->damping / M,
                  .share = m / (M + m),
-                 .half = (Real)scene->clearance / 2,
+                 .room = {(Real)scene->clearance / 2, (Real)scene->clearance / 2},
                  .x = scene->displacement,
                  .v = scene->velocity,
                  .r = scene->position,

@@ -15,7 +15,7 @@ typedef struct Scan {
 } Scan;
 
 // Times are taken as listed, so that rounding does not grow from impact to impact: what remains is
-// a miss of 1e-12 of the lengths there are, and of an ulp of the time at the speeds there are.
+// a miss of 1e-11 of the lengths there are, and of an ulp of the time at the speeds there are.
 void scan_run(const ReferenceScene *scene, const Impacts *impacts, Scan *scan);
 
 #endif
