@@ -183,7 +183,6 @@ static bool advance(Walk *walk, Real until) {
             return false;
         piece_end(walk, &piece, h);
         walk->t = is_cut ? walk->t + h : target;
-        walk->length = fmaxl(walk->length, fabsl(walk->x));
         walk->push =
             fmaxl(walk->push, fabsl(walk->omega2 * walk->x) + fabsl(walk->damping * walk->v));
         walk->speed = fmaxl(walk->speed, fabsl(walk->w));
@@ -236,7 +235,7 @@ static bool event(Walk *walk, const Impact *impact) {
         // end.
         for (int i = 0; i < 4; i++) {
             const Real late = -walk->r / walk->w;
-            if (late != 0 && fabsl(late) * walk->rate[side] < REACH)
+            if (late != 0 && fabsl(late) < 4 * ULP * end)
                 step(walk, late);
         }
         walk->t = end;
@@ -246,7 +245,7 @@ static bool event(Walk *walk, const Impact *impact) {
     return true;
 }
 
-void scan_run(const ReferenceScene *scene, const Impacts *impacts, Scan *scan) {
+void scan_run(const ReferenceScene *scene, const Impacts *impacts, double reach, Scan *scan) {
     const Real M = scene->mass, m = scene->damper_mass, pi = acosl(-1);
     Walk walk = {.scene = scene,
                  .scan = scan,
@@ -259,7 +258,7 @@ void scan_run(const ReferenceScene *scene, const Impacts *impacts, Scan *scan) {
                  .r = scene->position,
                  .w = scene->relative_velocity,
                  .phase = FLIGHT,
-                 .length = fmaxl(scene->clearance, fabsl(scene->displacement)),
+                 .length = fmaxl(scene->clearance, reach),
                  .speed = fabsl(scene->relative_velocity)};
     memset(scan, 0, sizeof *scan);
     if (scene->base == REFERENCE_SINE) {

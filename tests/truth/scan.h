@@ -15,7 +15,8 @@ typedef struct Scan {
 } Scan;
 
 // Times are taken as listed, so that rounding does not grow from impact to impact: what remains is
-// a miss of 1e-11 of the lengths there are, and of an ulp of the time at the speeds there are.
-void scan_run(const ReferenceScene *scene, const Impacts *impacts, Scan *scan);
+// a miss of 1e-11 of the lengths there are, and of an ulp of the time at the speeds there are;
+// `reach` is the structure's largest displacement.
+void scan_run(const ReferenceScene *scene, const Impacts *impacts, double reach, Scan *scan);
 
 #endif

@@ -34,7 +34,7 @@ static void no_impact_is_missed(void **state) {
         if (outcome == NULL) {
             refused++;
         } else {
-            scan_run(&scene, &outcome->response.impacts, &scan);
+            scan_run(&scene, &outcome->response.impacts, outcome->summary.peak_displacement, &scan);
             impacts += outcome->response.impacts.count;
             pieces += scan.pieces;
             worst = fmax(worst, scan.worst);
@@ -79,7 +79,7 @@ static void a_ledger_that_is_not_whole_is_seen(void **state) {
                     memmove(&wrong.at[j], &wrong.at[j + 1], (--wrong.count - j) * sizeof(Impact));
                 else
                     wrong.at[j].start += 1e-9;
-                scan_run(&scene, &wrong, &scan);
+                scan_run(&scene, &wrong, outcome->summary.peak_displacement, &scan);
                 if (scan.is_whole) {
                     drawn_print(&scene);
                     fail_msg("scene %zu, row %zu at %.17g, way %d", i, j, from->at[j].start, way);
