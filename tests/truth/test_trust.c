@@ -41,7 +41,7 @@ static void paper_like(ReferenceScene *scene, size_t number) {
                               .sample_rate = RATE};
     if (number % 2 == 0) {
         scene->base = REFERENCE_SINE;
-        scene->frequency = number == 0 ? 1 : draws_uniform(&draws, 0.8, 5);
+        scene->frequency = number == 0 ? 1 : draws_uniform(&draws, 0.8, 1.6);
         scene->amplitude = number == 0 ? 1 : draws_uniform(&draws, 0.8, 2);
         return;
     }
