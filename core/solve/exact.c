@@ -222,8 +222,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
-    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
-                exact->interval);
+    flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
@@ -285,6 +284,10 @@ static Status solve(Exact *exact) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return problem_set(problem, STATUS_UNSUPPORTED_TYPE,
+                           "this solver runs one storey with at most one damper, not %zu with %zu",
+                           run->plan->storeys, run->plan->damper_count);
     Exact exact;
     TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);

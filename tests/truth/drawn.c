@@ -9,6 +9,7 @@
 #include "core/excite/record.h"
 #include "core/excite/sine.h"
 #include "tests/support/paper.h"
+#include "tests/support/scenes.h"
 
 static uint64_t draw(Draws *draws) {
     uint64_t z = draws->state += 0x9e3779b97f4a7c15U;
@@ -160,9 +161,7 @@ void drawn_simulation(const ReferenceScene *scene, bool has_channels, Simulation
         record->interval = scene->interval;
         simulation.scene.excitation = (Variant *)(void *)record;
     }
-    Excitation *excitation = (Excitation *)(void *)simulation.scene.excitation;
-    excitation->displacement = scene->displacement;
-    excitation->velocity = scene->velocity;
+    scene_start(&simulation, scene->displacement, scene->velocity);
     paper_model(&simulation, scene->is_impulse ? "impulse" : "spring_damper");
     paper_channels(&simulation, wanted, has_channels ? COUNT(wanted) : 0);
     paper_no_psd(&simulation);
