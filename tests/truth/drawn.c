@@ -101,6 +101,20 @@ void drawn_scene(ReferenceScene *scene, uint64_t number, double duration) {
     }
 }
 
+// SEPARATION_ZERO_FORCE by its name; -1 where the product does not offer it.
+static int zero_force(void) {
+    for (int i = 0; separation_names[i] != NULL; i++)
+        if (strcmp(separation_names[i], "zero_force") == 0)
+            return i;
+    return -1;
+}
+
+bool drawn_zero_force(ReferenceScene *scene, uint64_t number) {
+    Draws draws = {number * 0x9e3779b97f4a7c15U};
+    scene->is_zero_force = !scene->is_impulse && zero_force() >= 0 && draws_chance(&draws, 0.5);
+    return scene->is_zero_force;
+}
+
 void drawn_clear(ReferenceScene *scene) {
     free((void *)(uintptr_t)scene->samples);
     scene->samples = NULL;
@@ -163,6 +177,8 @@ void drawn_simulation(const ReferenceScene *scene, bool has_channels, Simulation
     }
     scene_start(&simulation, scene->displacement, scene->velocity);
     paper_model(&simulation, scene->is_impulse ? "impulse" : "spring_damper");
+    if (scene->is_zero_force)
+        ((Contact *)(void *)simulation.scene.contact)->separation = zero_force();
     paper_channels(&simulation, wanted, has_channels ? COUNT(wanted) : 0);
     paper_no_psd(&simulation);
     *out = simulation;

@@ -21,6 +21,10 @@ bool draws_chance(Draws *draws, double p);
 // T_c of 3e-5 s to 5e-2 s, still, sine and record. Cleared by drawn_clear.
 void drawn_scene(ReferenceScene *scene, uint64_t number, double duration);
 void drawn_clear(ReferenceScene *scene);
+
+// Has half of the scenes with buffers end their contacts by zero_force, where the product can.
+bool drawn_zero_force(ReferenceScene *scene, uint64_t number);
+
 void drawn_print(const ReferenceScene *scene);
 
 // The scene as the product takes it, not completed; all channels of the reference, or none.

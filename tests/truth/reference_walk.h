@@ -278,8 +278,10 @@ static void NAME(open)(NAME(Walk) * walk, NAME(Phase) phase) {
     walk->phase = phase;
     walk->open = (ReferenceImpact){
         phase == NAME(REST), walk->side, (double)walk->t, NAN, NAN, NAN, NAN, NAN, NAN};
+    // A mass that is pressed again while it leaves the buffer approaches nothing.
+    const real inward = walk->side == 1 ? walk->w : -walk->w;
     if (phase == NAME(CONTACT))
-        walk->open.approach = (double)real_abs(walk->w);
+        walk->open.approach = inward > 0 ? (double)inward : 0;
     const real n = NAME(pressure)(walk);
     walk->peak = real_abs(n);
     walk->impulse = walk->lost = 0;

@@ -303,6 +303,7 @@ static void random_scenes_agree_with_quad_precision(void **state) {
     for (size_t i = 0; i < scenes; i++) {
         ReferenceScene scene;
         drawn_scene(&scene, seed * 1000003 + i, 3);
+        drawn_zero_force(&scene, seed * 1000003 + i);
         judge(&scene, i, &tally);
         drawn_clear(&scene);
     }
