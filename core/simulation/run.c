@@ -241,13 +241,17 @@ size_t outcome_bytes(const Outcome *outcome) {
 }
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
-// shows that the stops are out of reach.
-static double flight_arcs(const Scene *scene, double structure) {
+// shows that the stops are out of reach, and coupled modes have no closed form for a whole
+// interval.
+static double flight_arcs(const Scene *scene, double fastest) {
     const Excitation *excitation = scene_excitation(scene);
-    double rate = structure;
+    double rate = fastest;
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
+    const Structure *structure = scene_structure(scene);
+    const bool is_by_arcs = scene->dampers.count > 0 ||
+                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
+    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
 }
 
 // A frame's sample is a step for each mode and each damper, or a product with a matrix where
