@@ -69,6 +69,24 @@ static Real depth(const Real *f, Real a, Real b, Real fa, Real fb, Real bend, Re
     return left > 0 ? left : depth(f, middle, b, fm, fb, bend, allowed);
 }
 
+// Whether f or g stays above its limit at every point of [a, b]: outside the buffer its force would
+// mean nothing.
+static bool either(const Real *f, const Real *g, Real a, Real b, const Real *bends,
+                   const Real *limits) {
+    const Real fa = at(f, a), fb = at(f, b), ga = at(g, a), gb = at(g, b);
+    if ((fa < -limits[0] && ga < -limits[1]) || (fb < -limits[0] && gb < -limits[1]))
+        return false;
+    const Real sag = (b - a) * (b - a) / 8;
+    if (fminl(fa, fb) - sag * bends[0] >= -limits[0] ||
+        fminl(ga, gb) - sag * bends[1] >= -limits[1])
+        return true;
+    const Real middle = (a + b) / 2;
+    // Where one takes over from the other, a point is as good as a proof.
+    if (b - a < 1e-12L)
+        return true;
+    return either(f, g, a, middle, bends, limits) && either(f, g, middle, b, bends, limits);
+}
+
 // The base from now on, and until when it is smooth.
 static Real base(const Walk *walk, Real *value, Real *slope) {
     const ReferenceScene *scene = walk->scene;
@@ -130,18 +148,16 @@ static void step(Walk *walk, Real h) {
     piece_end(walk, &piece, h);
 }
 
-// What must stay positive: the gap to a stop, the penetration or the force, the push into the stop;
-// what must not: the force that a buffer which let go would have.
+// What must stay positive: the gap to a stop, the penetration or the force, the push into the stop.
 static void guard(const Walk *walk, const Piece *piece, int side, Real *f) {
     const Real sign = side == SIDE_RIGHT ? 1 : -1;
     const bool is_force = walk->phase == CONTACT && walk->scene->is_zero_force;
-    const bool is_gap = walk->phase == FLIGHT || side != walk->side;
+    const bool is_gap = walk->phase == FLIGHT || walk->phase == INSIDE;
     for (int i = 0; i < TERMS; i++)
-        f[i] = sign * (is_gap                  ? -piece->r[i]
-                       : walk->phase == INSIDE ? -piece->press[i]
-                       : is_force              ? piece->press[i]
-                       : walk->phase == REST   ? piece->push[i]
-                                               : piece->r[i]);
+        f[i] = sign * (is_gap                ? -piece->r[i]
+                       : is_force            ? piece->press[i]
+                       : walk->phase == REST ? piece->push[i]
+                                             : piece->r[i]);
     if (is_gap)
         f[0] += walk->room[side];
 }
@@ -156,28 +172,48 @@ static Real allowed_force(const Walk *walk, int side) {
            walk->contact_damping[side] * MISS * walk->speed;
 }
 
-static Real allowed(const Walk *walk, int side) {
+static Real allowed(const Walk *walk) {
     if (walk->phase == REST)
         return MISS * walk->push;
     const bool is_force = walk->phase == CONTACT && walk->scene->is_zero_force;
-    return is_force || (walk->phase == INSIDE && side == walk->side) ? allowed_force(walk, side)
-                                                                     : allowed_length(walk);
+    return is_force ? allowed_force(walk, walk->side) : allowed_length(walk);
+}
+
+static Real bend_of(const Real *f) {
+    Real bend = 0;
+    for (int i = 2; i < TERMS; i++)
+        bend += (Real)(i * (i - 1)) * fabsl(f[i]);
+    return bend;
+}
+
+// A buffer that let go does not press again: outside of it, or no force.
+static bool prove_inside(Walk *walk, const Piece *piece) {
+    Real force[TERMS], gap[TERMS];
+    for (int i = 0; i < TERMS; i++) {
+        force[i] = walk->side == SIDE_RIGHT ? -piece->press[i] : piece->press[i];
+        gap[i] = walk->side == SIDE_RIGHT ? -piece->r[i] : piece->r[i];
+    }
+    const Real bends[2] = {bend_of(force), bend_of(gap)};
+    const Real limits[2] = {allowed_force(walk, walk->side), allowed_length(walk)};
+    if (either(force, gap, 0, 1, bends, limits))
+        return true;
+    snprintf(walk->scan->why, sizeof walk->scan->why, "%s on side %d near %.17Lg s",
+             phase_names[INSIDE], walk->side, walk->t);
+    return false;
 }
 
 static bool prove(Walk *walk, const Piece *piece, int side) {
-    Real f[TERMS], bend = 0, most = 0;
+    Real f[TERMS], most = 0;
     guard(walk, piece, side, f);
-    for (int i = 1; i < TERMS; i++) {
+    for (int i = 1; i < TERMS; i++)
         most += fabsl(f[i]);
-        bend += (Real)(i * (i - 1)) * fabsl(f[i]);
-    }
     if (f[0] >= most)
         return true;
     // No finer than the coefficients are known.
-    const Real limit = allowed(walk, side) + 1e-17L * (fabsl(f[0]) + most);
+    const Real limit = allowed(walk) + 1e-17L * (fabsl(f[0]) + most);
     if (limit == 0)
         return true;
-    const Real deep = depth(f, 0, 1, f[0], at(f, 1), bend, limit);
+    const Real deep = depth(f, 0, 1, f[0], at(f, 1), bend_of(f), limit);
     if (deep == 0)
         return true;
     snprintf(walk->scan->why, sizeof walk->scan->why,
@@ -200,7 +236,9 @@ static bool advance(Walk *walk, Real until) {
         piece_make(walk, h, value, slope, &piece);
         walk->scan->pieces++;
         const bool is_free = walk->phase == FLIGHT || walk->phase == INSIDE;
-        if (!prove(walk, &piece, walk->side) || (is_free && !prove(walk, &piece, 1 - walk->side)))
+        if (walk->phase == INSIDE ? !prove_inside(walk, &piece) : !prove(walk, &piece, walk->side))
+            return false;
+        if (is_free && !prove(walk, &piece, 1 - walk->side))
             return false;
         piece_end(walk, &piece, h);
         walk->t = is_cut ? walk->t + h : target;
@@ -231,7 +269,7 @@ static Real press(const Walk *walk) {
 static bool let_go(Walk *walk, Real end) {
     const bool is_force = walk->scene->is_zero_force;
     const Real miss = is_force ? fabsl(press(walk)) : fabsl(walk->r);
-    if (!meets(walk, "the end of the contact", miss, allowed(walk, walk->side)))
+    if (!meets(walk, "the end of the contact", miss, allowed(walk)))
         return false;
     for (int i = 0; i < 4; i++) {
         const Real push = walk->omega2 * walk->x + walk->damping * walk->v, n = press(walk);
@@ -255,11 +293,11 @@ static bool event(Walk *walk, const Impact *impact) {
     if (!advance(walk, impact->start))
         return false;
     if (walk->phase == INSIDE && side == walk->side && impact->approach_speed == 0) {
-        if (!meets(walk, "the force", fabsl(press(walk)), allowed(walk, side)))
+        if (!meets(walk, "the force", fabsl(press(walk)), allowed_force(walk, side)))
             return false;
     } else {
         walk->phase = FLIGHT;
-        if (!meets(walk, "the stop", fabsl(sign * walk->r - walk->room[side]), allowed(walk, side)))
+        if (!meets(walk, "the stop", fabsl(sign * walk->r - walk->room[side]), allowed(walk)))
             return false;
         walk->r = 0;
         walk->room[side] = 0;
