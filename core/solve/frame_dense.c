@@ -214,7 +214,7 @@ static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *p
     Work work = {.frame = frame,
                  .n = n,
                  .size = size,
-                 .is_sine = frame->run->base->form == BASE_SINE,
+                 .is_sine = frame->run->base->omega > 0,
                  .omega = frame->run->base->omega,
                  .h = frame->interval};
     work.T = room;
