@@ -131,8 +131,8 @@ static void summarize(Outcome *outcome) {
                   .impacts = impacts,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
-                  .error_estimate = NAN,
-                  .trust_horizon = NAN};
+                  .error_estimate = response->has_trust ? response->error_estimate : NAN,
+                  .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
 }
 
 // Finite inputs can still be too large for their products.
