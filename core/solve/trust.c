@@ -10,7 +10,8 @@
 // So a contact's map is exp(A T) in these, and the state does not enter.
 //
 // exp(A T) y: powers of two of exp(A D) by binary digits of T / D, and for the rest, at most D / 2,
-// a series of second order. D is a fifth of the fastest motion's time: 2e-4 of y at most is lost.
+// a short series. In contact it must be a good one: r hardly matters to the speed that is left, and
+// what the series misses of it is multiplied by the contact's rate.
 #include "core/solve/trust.h"
 
 #include <float.h>
@@ -19,15 +20,16 @@
 
 enum { X, V, R, W, SIZE };
 
-static const double STEP = 0.2; // D times the system's rate
+// D times the system's rate.
+static const double SWING_STEP = 0.2, CONTACT_STEP = 0.05;
 static const double ROUNDING = DBL_EPSILON;
 
 // n steps of D and what is left.
-static uint64_t divide(double length, double rate, double *rest) {
+static uint64_t divide(double length, double step, double *rest) {
     const double most = (double)(UINT64_C(1) << TRUST_LEVELS) - 1;
-    const double count = length * rate / STEP + 0.5;
+    const double count = length / step + 0.5;
     const uint64_t n = (uint64_t)(!(count < most) ? most : count > 0 ? count : 0);
-    *rest = length - (double)n * STEP / rate;
+    *rest = length - (double)n * step;
     if (!(count < most))
         *rest = 0;
     return n;
@@ -36,7 +38,7 @@ static uint64_t divide(double length, double rate, double *rest) {
 static void swing_levels(TrustSwing *swing, int levels) {
     if (swing->levels == 0) {
         // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
-        const double h = STEP / swing->rate;
+        const double h = SWING_STEP / swing->rate;
         for (int column = 0; column < 2; column++) {
             double x = column == 0, v = column == 1, term_x = x, term_v = v;
             for (int i = 1; i < 12; i++) {
@@ -62,7 +64,7 @@ static void swing_levels(TrustSwing *swing, int levels) {
 
 static void swing_go(TrustSwing *swing, double (*y)[TRUST_LANES], double length) {
     double h;
-    uint64_t n = divide(length, swing->rate, &h);
+    uint64_t n = divide(length, SWING_STEP / swing->rate, &h);
     const double half = h * h / 2;
     for (int i = 0; i < TRUST_LANES; i++) {
         const double x = y[X][i], v = y[V][i], a = -swing->omega2 * x - swing->damping * v;
@@ -97,7 +99,7 @@ static void contact_slope(const TrustContact *contact, const double *y, double *
 
 static void contact_levels(TrustContact *contact, int levels) {
     if (contact->levels == 0) {
-        const double h = STEP / contact->motion.rate;
+        const double h = CONTACT_STEP / contact->motion.rate;
         for (int column = 0; column < SIZE; column++) {
             double term[SIZE] = {0}, sum[SIZE] = {0};
             term[column] = sum[column] = 1;
@@ -126,14 +128,15 @@ static void contact_levels(TrustContact *contact, int levels) {
 
 static void contact_go(TrustContact *contact, double (*y)[TRUST_LANES], double length) {
     double h;
-    uint64_t n = divide(length, contact->motion.rate, &h);
+    uint64_t n = divide(length, CONTACT_STEP / contact->motion.rate, &h);
     for (int i = 0; i < TRUST_LANES; i++) {
         const double at[SIZE] = {y[X][i], y[V][i], y[R][i], y[W][i]};
-        double first[SIZE], second[SIZE];
+        double first[SIZE], second[SIZE], third[SIZE];
         contact_slope(contact, at, first);
         contact_slope(contact, first, second);
+        contact_slope(contact, second, third);
         for (int row = 0; row < SIZE; row++)
-            y[row][i] = at[row] + h * (first[row] + h / 2 * second[row]);
+            y[row][i] = at[row] + h * (first[row] + h / 2 * (second[row] + h / 3 * third[row]));
     }
     for (int level = 0; n > 0; level++, n >>= 1) {
         if (level >= contact->levels)
