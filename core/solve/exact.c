@@ -18,6 +18,7 @@
 
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_state.h"
+#include "core/solve/frame.h"
 #include "core/solve/solver.h"
 
 // Between exact steps energy comes from nowhere but rounding, some 1e-14 of it.
@@ -294,6 +295,8 @@ static Status solve(Exact *exact) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return frame_run(run, response, problem);
     Exact exact;
     TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);
