@@ -21,9 +21,6 @@
 #include "core/solve/frame.h"
 #include "core/solve/solver.h"
 
-// Between exact steps energy comes from nowhere but rounding, some 1e-14 of it.
-static const double GAIN_MOST = 1e-6;
-
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
 
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
@@ -237,7 +234,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
                 exact->damper->clearance, run->base->form == BASE_SINE, plan->duration);
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
-    exact->ledger.gain_most = GAIN_MOST;
+    exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
     return STATUS_OK;
 }

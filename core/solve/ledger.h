@@ -23,6 +23,9 @@ typedef struct LedgerRow {
     Impact impact;
 } LedgerRow;
 
+// Gain_most of an exact solver: there energy comes from nothing but rounding, some 1e-14 of it.
+#define LEDGER_GAIN_EXACT 1e-6
+
 typedef struct Ledger {
     Response *response;
     size_t room, most;
