@@ -141,8 +141,18 @@ static void summarize(Outcome *outcome) {
                   .impacts = impacts,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
-                  .error_estimate = NAN,
-                  .trust_horizon = NAN};
+                  .error_estimate = response->has_trust ? response->error_estimate : NAN,
+                  .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
+}
+
+static Status warn_of_horizon(Outcome *outcome, Problem *problem) {
+    if (isnan(outcome->summary.trust_horizon) ||
+        warnings_add(&outcome->warnings, "/duration",
+                     "the run goes on beyond t = %.6g s: there rounding has moved the displacement "
+                     "by %g of its largest value, and from there on only statistics hold",
+                     outcome->summary.trust_horizon, RESPONSE_PARTING) == STATUS_OK)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
 }
 
 // Finite inputs can still be too large for their products.
@@ -188,6 +198,7 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     summarize(outcome);
     TRY(check_finite(outcome, problem));
+    TRY(warn_of_horizon(outcome, problem));
     TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
@@ -229,6 +240,7 @@ void outcome_drop(Outcome *outcome) {
     fields_clear(plan_report_fields, &outcome->plan);
     response_clear(&outcome->response);
     spectrum_clear(&outcome->spectrum);
+    warnings_clear(&outcome->warnings);
     free(outcome);
 }
 
