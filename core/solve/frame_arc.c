@@ -55,7 +55,7 @@ void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, doubl
     arc->rho = length * frame_rate(frame);
     arc->degree = arc_degree(arc->rho);
     arc_base_series(arc->base, arc->degree, slice, length);
-    double *speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
+    double *restrict speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
     for (size_t i = 0; i < n; i++) {
         arc->q[i] = frame->q[i];
         arc->q[n + i] = frame->p[i] * length;
@@ -76,7 +76,7 @@ void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, doubl
         if (k + 2 > arc->degree)
             break;
         const double scale = length * length / (double)((k + 1) * (k + 2));
-        double *after = arc->q + (k + 2) * n;
+        double *restrict after = arc->q + (k + 2) * n;
         for (size_t i = 0; i < n; i++)
             after[i] = -elastic[i] - share[i] * arc->base[k];
         for (size_t d = 0; d < m; d++) {
@@ -156,9 +156,10 @@ static void speeds(const FrameArc *arc, size_t n, const Quadrature *rule, double
     for (size_t k = 1; k <= arc->degree; k++) {
         const double *q = arc->q + k * n;
         for (size_t j = 0; j < rule->count; j++) {
+            double *restrict of = out + j * n;
             const double factor = (double)k * power[j];
             for (size_t i = 0; i < n; i++)
-                out[j * n + i] += factor * q[i];
+                of[i] += factor * q[i];
             power[j] *= rule->node[j];
         }
     }

@@ -30,7 +30,7 @@ double frame_relative(const FrameDamper *damper) {
     return damper->plan->offset + origin + damper->r;
 }
 
-void frame_elastic(const Frame *frame, const double *q, const double *p, double *out) {
+void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
     const size_t n = frame->storeys;
     if (frame->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
@@ -176,8 +176,8 @@ void frame_hold_make(Frame *frame) {
     }
 }
 
-// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a mass
-// that rests on another.
+// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a
+// mass that rests on another.
 static double mobility(const Modes *modes, size_t j, size_t k) {
     const double *a = modes->shapes + j * modes->count, *b = modes->shapes + k * modes->count;
     long double sum = 0, size = 0;

@@ -123,7 +123,7 @@ double frame_room(const FrameDamper *damper, Side side);
 double frame_relative(const FrameDamper *damper);
 
 // out = D p + W^2 q.
-void frame_elastic(const Frame *frame, const double *q, const double *p, double *out);
+void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
 void frame_feel(Frame *frame);
 // That, and x, v, a of all storeys.

@@ -1,7 +1,7 @@
-// Two small errors y = (x, v, r, w) of different signs go along with the motion. Over a stretch
-// they follow its homogeneous system; where the motion jumps or its equations change they change by
-// what the shifted event makes of them (saltation). Each stretch adds about one rounding of what it
-// held.
+// Small errors y = (x, v, r, w) go along with the motion. Over a stretch they follow its
+// homogeneous system; where the motion jumps or its equations change they change by what the
+// shifted event makes of them (saltation). Each stretch adds about one rounding of what it held,
+// each time with other signs that are the same in every run.
 //
 // In contact  x' = v, v' = -s + share n, r' = w, w' = s - n,  n = c w + k r.  The force jumps by c
 // w at touch and exit, and an event that comes dt = -dr / w late leaves dw - c dr behind: that is

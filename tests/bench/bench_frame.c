@@ -46,6 +46,9 @@ static Plan *make_plan(const Case *from) {
         frames_damper(plan, d, (n - 1) / (d + 1), 30, 0.05, from->restitution, from->contact_time);
     for (size_t i = 0; i < n && !from->is_random; i++)
         plan->displacement[i] = 0.1 * (double)(i + 1) / (double)n;
+    if (modes_make(&plan->modes, n, plan->mass, plan->stiffness, plan->damping, plan->influence,
+                   NULL) != STATUS_OK)
+        abort();
     return plan;
 }
 

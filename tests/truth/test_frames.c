@@ -89,7 +89,7 @@ static Drawn scene_draw(uint64_t number) {
         frames_damper(plan, d, draw() % n, mass * scattered(0.01, 2), reach * uniform(0.05, 1),
                       uniform(0.1, 0.95), is_impulse ? NAN : scattered(1e-3, 0.05));
         PlanDamper *damper = &plan->dampers[d];
-        if (!is_impulse && chance(0.1))
+        if (chance(0.1))
             damper->clearance = 0;
         damper->offset = chance(0.3) ? reach * uniform(-1, 1) : 0;
         damper->position = chance(0.3) ? damper->clearance * uniform(-0.5, 0.5) : 0;
