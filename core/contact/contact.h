@@ -12,8 +12,9 @@ typedef enum ContactForm {
     CONTACT_LINEAR,    // N = k p + c p'
 } ContactForm;
 
-// When a contact ends. Zero penetration is the paper's rule (p back at 0).
-typedef enum Separation { SEPARATION_ZERO_PENETRATION } Separation;
+// When a contact ends. Zero penetration is the paper's rule (p back at 0); zero force ends it before
+// N would pull.
+typedef enum Separation { SEPARATION_ZERO_PENETRATION, SEPARATION_ZERO_FORCE } Separation;
 extern const char *const separation_names[];
 
 // The scene's "contact" object.
