@@ -3,11 +3,12 @@
 //
 //   0 <= pressed_d   and   parting speed after >= e_d closing speed before,  one of them equal.
 //
-// The impulses act through M^-1, so one on any storey may press or free a mass on another. The
-// conditions are those of the least squares problem with matrix `yield`, positive definite, so they
-// have one solution, and relaxing one impulse after the other always comes to it. Momentum is
-// conserved whatever the impulses are; no energy is gained, for each pressed stop takes
-// pressed (closing - parting) / 2.
+// Between stops without clearance the other stop would press where one would have to pull, so there
+// the impulse may have any sign. The impulses act through M^-1, so one on any storey may press or
+// free a mass on another. The conditions are those of the least squares problem with matrix
+// `yield`, positive definite, so they have one solution, and relaxing one impulse after the other
+// always comes to it. Momentum is conserved whatever the impulses are; no energy is gained, for
+// each pressed stop takes pressed (closing - parting) / 2.
 #include "core/solve/frame_collide.h"
 
 #include <float.h>
@@ -41,9 +42,11 @@ static double sweep(Frame *frame) {
             if (frame->damper[e].is_met)
                 missing -=
                     sign * row[e] * frame_sign(frame->damper[e].side) * frame->damper[e].pressed;
-        const double next = fmax(damper->pressed + missing / row[d], 0);
+        double next = damper->pressed + missing / row[d];
+        if (damper->plan->clearance > 0)
+            next = fmax(next, 0);
         change = fmax(change, fabs(next - damper->pressed));
-        most = fmax(most, next);
+        most = fmax(most, fabs(next));
         damper->pressed = next;
     }
     return most > 0 ? change / most : 0;
@@ -62,7 +65,7 @@ void frame_collide(Frame *frame) {
     frame_push(frame, impulses);
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
-        if (damper->is_met && damper->pressed > 0)
+        if (damper->is_met && damper->pressed != 0)
             damper->w = -frame_sign(damper->side) * damper->parting;
     }
 }

@@ -263,7 +263,8 @@ static void collide(Walk *walk, const bool *is_met, const Quad *parting, Quad *i
         bool is_good = true;
         for (size_t d = 0; d < walk->m; d++) {
             const bool is_in = (set >> d & 1) != 0;
-            is_good = is_good && (is_met[d] || !is_in);
+            const bool is_held = is_met[d] && walk->plan->dampers[d].clearance == 0;
+            is_good = is_good && (is_met[d] || !is_in) && (is_in || !is_held);
             trial.mass[d].phase = is_in ? RESTING : FLYING;
             want[d] = walk->mass[d].w + sign_of(walk->mass[d].side) * parting[d];
             impulses[d] = 0;
@@ -275,7 +276,8 @@ static void collide(Walk *walk, const bool *is_met, const Quad *parting, Quad *i
         for (size_t d = 0; d < walk->m; d++) {
             const Quad sign = sign_of(walk->mass[d].side);
             if ((set >> d & 1) != 0)
-                is_good = is_good && sign * impulses[d] >= 0;
+                is_good =
+                    is_good && (sign * impulses[d] >= 0 || walk->plan->dampers[d].clearance == 0);
             else if (is_met[d])
                 is_good = is_good && -sign * trial.mass[d].w >= parting[d] - (Quad)1e-28;
         }
