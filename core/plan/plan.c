@@ -3,38 +3,71 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Identified identify(const Plan *plan, double mass, const Buffer *buffer) {
-    if (plan->form == CONTACT_LINEAR)
-        return isnan(buffer->stiffness)
-                   ? identify_measured(mass, buffer->restitution, buffer->contact_time)
-                   : identify_given(mass, buffer->stiffness,
-                                    isnan(buffer->damping) ? 0 : buffer->damping);
-    return (Identified){.effective_mass = mass,
-                        .restitution = buffer->restitution,
-                        .contact_time = NAN,
-                        .stiffness = NAN,
-                        .damping = NAN,
-                        .damping_ratio = NAN};
+// What an isolated contact of this pair of masses comes to, if that is one thing at all speeds.
+static void report_parameters(const ContactStop *stop, double mass, Derived *derived) {
+    const ContactParameters *own = &stop->parameters;
+    const bool is_carried = stop->mass != mass;
+    derived->effective_mass = mass;
+    derived->identified_mass = is_carried ? stop->mass : (double)NAN;
+    derived->restitution = own->restitution;
+    derived->contact_time = stop->numbers.contact_time;
+    derived->stiffness =
+        stop->law->form == CONTACT_POWER ? stop->numbers.stiffness : own->stiffness;
+    derived->damping = own->damping;
+    derived->exponent = own->exponent;
+    derived->damping_ratio = derived->factor = (double)NAN;
+    derived->reached_restitution = derived->reached_contact_time = (double)NAN;
+    if (stop->law->form == CONTACT_IMPULSIVE || stop->numbers.rows.count > 0)
+        return;
+    if (stop->law->form == CONTACT_POWER) {
+        derived->factor = own->factor;
+        derived->reached_restitution = stop->law->reached(own->factor, own->exponent);
+        derived->reached_contact_time =
+            stop->numbers.contact_time * pow(mass / stop->mass, 1 / (own->exponent + 1));
+        return;
+    }
+    const Identified found =
+        identify_given(mass, own->stiffness, own->damping, (Separation)stop->separation);
+    derived->damping_ratio = found.damping_ratio;
+    if (isnan(stop->numbers.contact_time)) {
+        derived->restitution = found.restitution;
+        derived->contact_time = found.contact_time;
+    } else if (is_carried) {
+        derived->reached_restitution = found.restitution;
+        derived->reached_contact_time = found.contact_time;
+    }
+}
+
+// The plan outlives the scene, whose rows are the numbers'.
+static Status keep_rows(ContactRows *rows) {
+    if (rows->count == 0)
+        return STATUS_OK;
+    ContactRow *own = malloc(rows->count * sizeof *own);
+    if (own != NULL)
+        memcpy(own, rows->at, rows->count * sizeof *own);
+    rows->at = own;
+    return own != NULL ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
 // The stops' parameters of one damper, into the plan and its report.
-static Status derive(Plan *plan, size_t index, const Damper *damper) {
-    DerivedList *list = &plan->report.derived;
+static Status derive(const Scene *scene, Plan *plan, size_t index) {
+    const Damper *damper = &scene->dampers.at[index];
     PlanDamper *planned = &plan->dampers[index];
+    const double mass = planned->effective_mass;
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
-        const Identified identified = identify(plan, planned->effective_mass, buffer);
-        planned->stops[side] =
-            (PlanStop){identified.restitution, identified.stiffness, identified.damping};
-        Derived *derived = &list->at[list->count++];
-        *derived = (Derived){.damper = index + 1,
-                             .side = side,
-                             .restitution = identified.restitution,
-                             .contact_time = identified.contact_time,
-                             .effective_mass = identified.effective_mass,
-                             .stiffness = identified.stiffness,
-                             .damping = identified.damping,
-                             .damping_ratio = identified.damping_ratio};
+        const ContactNumbers numbers = buffer_numbers(buffer);
+        PlanStop *stop = &planned->stops[side];
+        stop->contact = contact_prepare(plan->law, scene_contact(scene)->separation,
+                                        damper_identified_mass(damper, mass), mass, &numbers);
+        TRY(keep_rows(&stop->contact.numbers.rows));
+        stop->restitution = stop->contact.parameters.restitution;
+        stop->stiffness = stop->contact.parameters.stiffness;
+        stop->damping = stop->contact.parameters.damping;
+        Derived *derived = &plan->report.derived.at[plan->report.derived.count++];
+        derived->damper = index + 1;
+        derived->side = side;
+        report_parameters(&stop->contact, mass, derived);
         if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
             return STATUS_NO_MEMORY;
     }
@@ -56,6 +89,9 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
                              "only restitution is known, no contact time");
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(&scene->dampers.at[0], (Side)side);
+        if (buffer->table.count > 0)
+            return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
+                                 "contact times over approach speed are known");
         if (!isnan(buffer->contact_time))
             return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time,
                                  "s", "a contact time is known");
@@ -82,7 +118,8 @@ static Status plan_room(Plan *plan, size_t storeys, size_t dampers) {
     return STATUS_OK;
 }
 
-static Status plan_damper(Plan *plan, size_t index, const Damper *damper) {
+static Status plan_damper(const Scene *scene, Plan *plan, size_t index) {
+    const Damper *damper = &scene->dampers.at[index];
     const size_t storey = (size_t)damper->storey - 1;
     plan->dampers[index] = (PlanDamper){
         .storey = storey,
@@ -94,7 +131,7 @@ static Status plan_damper(Plan *plan, size_t index, const Damper *damper) {
         .velocity = damper->velocity,
     };
     plan->damper_count = index + 1;
-    return derive(plan, index, damper);
+    return derive(scene, plan, index);
 }
 
 static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan) {
@@ -113,7 +150,7 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     plan->law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     plan->form = plan->law->form;
     for (size_t i = 0; i < scene->dampers.count; i++)
-        TRY(plan_damper(plan, i, &scene->dampers.at[i]));
+        TRY(plan_damper(scene, plan, i));
     TRY(decide_contact(scene, plan));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL, "%s",
                       strcmp(asked, solver) == 0
@@ -140,6 +177,9 @@ void plan_free(Plan *plan) {
     if (plan == NULL)
         return;
     fields_clear(plan_report_fields, &plan->report);
+    for (size_t i = 0; i < plan->damper_count; i++)
+        for (int side = 0; side < 2; side++)
+            free(plan->dampers[i].stops[side].contact.numbers.rows.at);
     free(plan->mass);
     free(plan->dampers);
     free(plan);

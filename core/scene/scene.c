@@ -50,28 +50,58 @@ static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
                             duration, rate, count, most);
 }
 
-// e and T_c that each are in range may still come to a stiffness that no double holds.
+// Whether numbers that each are in range come to parameters that doubles can hold, at the edges of
+// what a stop may meet.
+static bool is_sound(const ContactLaw *law, int separation, double mass,
+                     const ContactNumbers *numbers) {
+    static const double speeds[] = {CONTACT_SPEED_LEAST, 1, 1e3};
+    const ContactStop stop = contact_prepare(law, separation, mass, mass, numbers);
+    for (size_t i = 0; i < COUNT(speeds); i++) {
+        const ContactParameters frozen = contact_freeze(&stop, speeds[i]);
+        if (!is_positive(frozen.stiffness) ||
+            !(law->form == CONTACT_POWER || isfinite(frozen.damping)))
+            return false;
+    }
+    return true;
+}
+
+static Status check_contact(const Scene *scene, const ContactLaw *law, size_t index, Side side,
+                            double own_mass, Problem *problem) {
+    const Damper *damper = &scene->dampers.at[index];
+    const Buffer *buffer = damper_buffer(damper, side);
+    const double mass = damper_identified_mass(damper, own_mass);
+    const int separation = scene_contact(scene)->separation;
+    ContactNumbers numbers = buffer_numbers(buffer);
+    const ContactRows rows = numbers.rows;
+    numbers.rows = (ContactRows){NULL, 0};
+    for (size_t i = 0; i < (rows.count > 0 ? rows.count : 1); i++) {
+        char place[sizeof((Fault){0}.pointer)], row[64] = "";
+        if (rows.count > 0) {
+            numbers.restitution = rows.at[i].restitution;
+            numbers.contact_time = rows.at[i].contact_time;
+            snprintf(row, sizeof row, "/table/%zu", i);
+        }
+        if (isnan(numbers.contact_time) || is_sound(law, separation, mass, &numbers))
+            continue;
+        snprintf(place, sizeof place, "/dampers/%zu/%s%s/contact_time", index,
+                 buffer == &damper->buffer        ? "buffer"
+                 : buffer == &damper->left_buffer ? "left_buffer"
+                                                  : "right_buffer",
+                 row);
+        return problem_add_real(problem, STATUS_INVALID, place, numbers.contact_time, "s",
+                                "must give a stiffness (m_e (pi^2 + ln(e)^2) / T_c^2 or its like) "
+                                "that numbers can hold");
+    }
+    return STATUS_OK;
+}
+
 static Status check_contacts(const Scene *scene, Problem *problem) {
     const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
-    for (size_t i = 0; i < scene->dampers.count; i++) {
-        const Damper *damper = &scene->dampers.at[i];
-        const double m_e = effective_mass(sdof->mass, damper->mass);
-        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
-            const Buffer *buffer = damper_buffer(damper, (Side)side);
-            if (isnan(buffer->contact_time))
-                continue;
-            const Identified found =
-                identify_measured(m_e, buffer->restitution, buffer->contact_time);
-            char place[sizeof((Fault){0}.pointer)];
-            snprintf(place, sizeof place, "/dampers/%zu/%s/contact_time", i,
-                     buffer == &damper->buffer        ? "buffer"
-                     : buffer == &damper->left_buffer ? "left_buffer"
-                                                      : "right_buffer");
-            if (!is_positive(found.stiffness) || !isfinite(found.damping))
-                return problem_add_real(problem, STATUS_INVALID, place, buffer->contact_time, "s",
-                                        "must give a stiffness m_e (pi^2 + ln(e)^2) / T_c^2 that "
-                                        "numbers can hold");
-        }
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
+        const double mass = effective_mass(sdof->mass, scene->dampers.at[i].mass);
+        TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
+        TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
     }
     return STATUS_OK;
 }
@@ -87,7 +117,7 @@ static Status complete_dampers(Scene *scene, Problem *problem) {
             status = STATUS_INVALID;
     }
     Contact *contact = (Contact *)(void *)scene->contact;
-    if (law->form == CONTACT_IMPULSIVE)
+    if (law->form != CONTACT_LINEAR)
         contact->separation = CHOICE_ABSENT;
     else if (contact->separation == CHOICE_ABSENT)
         contact->separation = SEPARATION_ZERO_PENETRATION;

@@ -24,7 +24,8 @@ static void table_one_of_the_paper_is_met_within_half_a_percent(void **state) {
     };
     const double m_e = effective_mass(1.35, 0.1107);
     for (size_t i = 0; i < COUNT(table); i++) {
-        const Identified found = identify_measured(m_e, table[i].e, table[i].T_c);
+        const Identified found =
+            identify_measured(m_e, table[i].e, table[i].T_c, SEPARATION_ZERO_PENETRATION);
         assert_near(found.stiffness, table[i].k_b, 0.005);
         assert_near(found.damping, table[i].c_b, 0.005);
     }
@@ -32,7 +33,8 @@ static void table_one_of_the_paper_is_met_within_half_a_percent(void **state) {
 
 static void the_sponge_comes_to_these_numbers(void **state) {
     (void)state;
-    const Identified sponge = identify_measured(effective_mass(1.35, 0.1107), 0.61, 0.025);
+    const Identified sponge =
+        identify_measured(effective_mass(1.35, 0.1107), 0.61, 0.025, SEPARATION_ZERO_PENETRATION);
     assert_near(sponge.effective_mass, 0.10231054, 5e-8);
     assert_near(sponge.stiffness, 1655.6191, 5e-8);
     assert_near(sponge.damping, 4.0457377, 5e-8);
@@ -46,8 +48,10 @@ static void what_was_measured_comes_back_from_stiffness_and_damping(void **state
     static const double times[] = {1e-6, 0.0003, 0.025, 10};
     for (size_t i = 0; i < COUNT(restitutions); i++)
         for (size_t j = 0; j < COUNT(times); j++) {
-            const Identified there = identify_measured(0.1, restitutions[i], times[j]);
-            const Identified back = identify_given(0.1, there.stiffness, there.damping);
+            const Identified there =
+                identify_measured(0.1, restitutions[i], times[j], SEPARATION_ZERO_PENETRATION);
+            const Identified back =
+                identify_given(0.1, there.stiffness, there.damping, SEPARATION_ZERO_PENETRATION);
             assert_near(back.restitution, restitutions[i], 1e-13);
             assert_near(back.contact_time, times[j], 1e-13);
             assert_near(back.damping_ratio, there.damping_ratio, 1e-14);
@@ -56,16 +60,17 @@ static void what_was_measured_comes_back_from_stiffness_and_damping(void **state
 
 static void an_elastic_buffer_has_no_damping(void **state) {
     (void)state;
-    const Identified elastic = identify_measured(1, 1, 0.5);
+    const Identified elastic = identify_measured(1, 1, 0.5, SEPARATION_ZERO_PENETRATION);
     assert_true(elastic.damping == 0 && !signbit(elastic.damping));
     assert_true(elastic.damping_ratio == 0);
-    const Identified back = identify_given(1, elastic.stiffness, 0);
+    const Identified back = identify_given(1, elastic.stiffness, 0, SEPARATION_ZERO_PENETRATION);
     assert_true(back.restitution == 1);
 }
 
 static void an_overdamped_buffer_never_lets_go(void **state) {
     (void)state;
-    const Identified critical = identify_given(1, 1, 2), over = identify_given(1, 1, 5);
+    const Identified critical = identify_given(1, 1, 2, SEPARATION_ZERO_PENETRATION),
+                     over = identify_given(1, 1, 5, SEPARATION_ZERO_PENETRATION);
     assert_true(critical.restitution == 0 && isinf(critical.contact_time));
     assert_true(over.restitution == 0 && isinf(over.contact_time));
     assert_near(over.damping_ratio, 2.5, 1e-15);
