@@ -84,6 +84,7 @@ typedef struct Plan {
     size_t damper_count;
     const ContactLaw *law;
     ContactForm form; // the law's: never CONTACT_CHOSEN
+    Separation separation;
     double duration, sample_rate;
     size_t count; // samples
     PlanReport report;

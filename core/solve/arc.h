@@ -79,4 +79,19 @@ State arc_at(const Arc *arc, double s);
 
 double slice_at(const Slice *slice, double time);
 
+// What other polynomials in s = t / length need as well: the degree that leaves only rounding where
+// coefficients fall like rho^k / k! (rho at most 1), a_g's coefficients, the integral over [0, 1],
+// and the largest |value| if it is above `least`, else `least`; *s is where, or untouched.
+size_t arc_degree(double rho);
+void arc_base_series(double *base, size_t degree, const Slice *slice, double length);
+double arc_integral(const double *c, size_t degree);
+double arc_largest(const double *c, size_t degree, double least, double *s);
+
+// Gauss-Legendre quadrature on [0, 1] that is exact but for rounding for products of two solutions.
+typedef struct Quadrature {
+    size_t count;
+    double node[8], weight[8];
+} Quadrature;
+const Quadrature *arc_quadrature(double rho);
+
 #endif
