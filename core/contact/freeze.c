@@ -30,7 +30,7 @@ ContactStop contact_prepare(const ContactLaw *law, int separation, double mass, 
                         .numbers = *numbers,
                         .parameters = {.restitution = numbers->restitution,
                                        .stiffness = numbers->stiffness,
-                                       .damping = numbers->damping,
+                                       .damping = law->form == CONTACT_POWER ? 0 : numbers->damping,
                                        .exponent = numbers->exponent,
                                        .mass = own_mass}};
     const bool is_given = law->form == CONTACT_LINEAR && !isnan(numbers->stiffness);

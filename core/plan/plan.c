@@ -149,6 +149,8 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     plan->count = scene_sample_count(scene);
     plan->law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     plan->form = plan->law->form;
+    plan->separation = plan->form == CONTACT_LINEAR ? (Separation)scene_contact(scene)->separation
+                                                    : SEPARATION_ZERO_PENETRATION;
     for (size_t i = 0; i < scene->dampers.count; i++)
         TRY(plan_damper(scene, plan, i));
     TRY(decide_contact(scene, plan));
