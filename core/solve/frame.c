@@ -11,16 +11,18 @@
 
 #include "core/solve/frame_arc.h"
 #include "core/solve/frame_events.h"
+#include "core/solve/frame_flight.h"
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
-enum { STILL_EVENTS = 1000 };
+enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8 };
 
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
 
 typedef struct Engine {
     Frame frame;
     FrameArc arc;
+    FrameFlight flight;
     FrameRecord record;
     double work; // since the watch was asked
 } Engine;
@@ -150,6 +152,23 @@ static Status cross(Engine *engine, double length) {
     return STATUS_OK;
 }
 
+// The whole interval in one step. False: it must go by arcs.
+static bool fly(Engine *engine) {
+    Frame *frame = &engine->frame;
+    Slice slice;
+    FrameWork work;
+    if (engine->flight.block == NULL || !base_cursor_interval(&frame->base, frame->sample, &slice))
+        return false;
+    for (size_t d = 0; d < frame->dampers; d++)
+        if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
+            return false;
+    if (!frame_flight_step(&engine->flight, frame, &slice, &work))
+        return false;
+    ledger_work(&frame->ledger, work.input, work.damping);
+    engine->record.base_speed += work.ground;
+    return true;
+}
+
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
 static Status settle(Engine *engine) {
     Frame *frame = &engine->frame;
@@ -186,7 +205,10 @@ static Status solve(Engine *engine) {
     TRY(settle(engine));
     take_sample(engine);
     while (frame->sample + 1 < plan->count) {
-        TRY(cross(engine, frame->interval));
+        if (fly(engine))
+            TRY(count_step(engine, FLIGHT_WORK));
+        else
+            TRY(cross(engine, frame->interval));
         frame->sample++;
         frame->offset = 0;
         take_sample(engine);
@@ -211,6 +233,7 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     Frame *frame = &engine->frame;
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
+    TRY(frame_flight_make(&engine->flight, frame, problem));
     TRY(frame_record_start(&engine->record, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
@@ -226,6 +249,7 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (engine.record.block != NULL)
         frame_record_finish(&engine.record, &engine.frame, response);
     frame_record_clear(&engine.record);
+    frame_flight_clear(&engine.flight);
     frame_arc_clear(&engine.arc);
     frame_clear(&engine.frame);
     return status;

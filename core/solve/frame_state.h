@@ -35,6 +35,8 @@ typedef struct FrameDamper {
     ContactParameters contact; // frozen at the touch
     LedgerRow row;             // of the present contact or rest
 
+    // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
+    double storey_speed, gained;
     // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
     // that presses it [m/s], [m/s], [N s].
     bool is_met, is_bounced; // is_met: takes part; is_bounced: not from rest
