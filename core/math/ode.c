@@ -5,26 +5,84 @@
 #include "core/math/ode.h"
 
 #include <arkode/arkode_erkstep.h>
+#include <float.h>
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double tolerance = 1e-13;
+static const double tolerance = 1e-14;
 
-enum { ODE_HALVINGS = 60, ODE_RETAKES = 8 };
+enum { ODE_HALVINGS = 60, ODE_RETAKES = 8, ODE_FAILURES = 60 };
 
 struct Ode {
     OdeSystem system;
     SUNContext context;
     void *stepper;
     N_Vector y, from, within, scale;
-    double t, step;          // the step that the next one should take
+    double t, step;          // the last step, a guess of the next
     double *value, *slope;   // of the watched functions, at t
     double *ahead, *incline; // at the step's end
     double *probe, *rise;    // somewhere inside it
 };
+
+// Prince and Dormand, J. Comp. Appl. Math. 7 (1981) 67-75, RK8(7)13M. Of ARKODE's own tables the
+// one of order 8 has an error estimate that is blind to y' = f(t), and with it to a contact's
+// touch.
+enum { STAGES = 13, ORDER = 8, EMBEDDED = 7 };
+
+// clang-format off
+static const double nodes[STAGES] = {
+    0, 1.0 / 18, 1.0 / 12, 1.0 / 8, 5.0 / 16, 3.0 / 8, 59.0 / 400, 93.0 / 200,
+    5490023248.0 / 9719169821.0, 13.0 / 20, 1201146811.0 / 1299019798.0, 1, 1};
+static const double stages[STAGES][STAGES] = {
+    {0},
+    {1.0 / 18},
+    {1.0 / 48, 1.0 / 16},
+    {1.0 / 32, 0, 3.0 / 32},
+    {5.0 / 16, 0, -75.0 / 64, 75.0 / 64},
+    {3.0 / 80, 0, 0, 3.0 / 16, 3.0 / 20},
+    {29443841.0 / 614563906.0, 0, 0, 77736538.0 / 692538347.0, -28693883.0 / 1125000000.0,
+     23124283.0 / 1800000000.0},
+    {16016141.0 / 946692911.0, 0, 0, 61564180.0 / 158732637.0, 22789713.0 / 633445777.0,
+     545815736.0 / 2771057229.0, -180193667.0 / 1043307555.0},
+    {39632708.0 / 573591083.0, 0, 0, -433636366.0 / 683701615.0, -421739975.0 / 2616292301.0,
+     100302831.0 / 723423059.0, 790204164.0 / 839813087.0, 800635310.0 / 3783071287.0},
+    {246121993.0 / 1340847787.0, 0, 0, -37695042795.0 / 15268766246.0,
+     -309121744.0 / 1061227803.0, -12992083.0 / 490766935.0, 6005943493.0 / 2108947869.0,
+     393006217.0 / 1396673457.0, 123872331.0 / 1001029789.0},
+    {-1028468189.0 / 846180014.0, 0, 0, 8478235783.0 / 508512852.0, 1311729495.0 / 1432422823.0,
+     -10304129995.0 / 1701304382.0, -48777925059.0 / 3047939560.0, 15336726248.0 / 1032824649.0,
+     -45442868181.0 / 3398467696.0, 3065993473.0 / 597172653.0},
+    {185892177.0 / 718116043.0, 0, 0, -3185094517.0 / 667107341.0, -477755414.0 / 1098053517.0,
+     -703635378.0 / 230739211.0, 5731566787.0 / 1027545527.0, 5232866602.0 / 850066563.0,
+     -4093664535.0 / 808688257.0, 3962137247.0 / 1805957418.0, 65686358.0 / 487910083.0},
+    {403863854.0 / 491063109.0, 0, 0, -5068492393.0 / 434740067.0, -411421997.0 / 543043805.0,
+     652783627.0 / 914296604.0, 11173962825.0 / 925320556.0, -13158990841.0 / 6184727034.0,
+     3936647629.0 / 1978049680.0, -160528059.0 / 685178525.0, 248638103.0 / 1413531060.0}};
+static const double weights[STAGES] = {
+    14005451.0 / 335480064.0, 0, 0, 0, 0, -59238493.0 / 1068277825.0, 181606767.0 / 758867731.0,
+    561292985.0 / 797845732.0, -1041891430.0 / 1371343529.0, 760417239.0 / 1151165299.0,
+    118820643.0 / 751138087.0, -528747749.0 / 2220607170.0, 1.0 / 4};
+static const double embedded[STAGES] = {
+    13451932.0 / 455176623.0, 0, 0, 0, 0, -808719846.0 / 976000145.0,
+    1757004468.0 / 5645159321.0, 656045339.0 / 265891186.0, -3867574721.0 / 1518517206.0,
+    465885868.0 / 322736535.0, 53011238.0 / 667516719.0, 2.0 / 45, 0};
+// clang-format on
+
+static bool set_method(void *stepper) {
+    double rows[STAGES * STAGES], at[STAGES], sums[STAGES], second[STAGES];
+    memcpy(rows, stages, sizeof rows);
+    memcpy(at, nodes, sizeof at);
+    memcpy(sums, weights, sizeof sums);
+    memcpy(second, embedded, sizeof second);
+    ARKodeButcherTable table =
+        ARKodeButcherTable_Create(STAGES, ORDER, EMBEDDED, at, rows, sums, second);
+    const bool is_set = table != NULL && ERKStepSetTable(stepper, table) == 0;
+    ARKodeButcherTable_Free(table);
+    return is_set;
+}
 
 static double *data(N_Vector vector) {
     return N_VGetArrayPointer(vector);
@@ -59,8 +117,8 @@ static bool is_made(Ode *ode) {
         *arrays[i] = ode->value + (i + 1) * (ode->system.roots + 1);
     ode->stepper = ERKStepCreate(rate, 0, ode->y, ode->context);
     return ode->stepper != NULL && ERKStepSetErrHandlerFn(ode->stepper, hush, NULL) == 0 &&
-           ERKStepSetUserData(ode->stepper, ode) == 0 &&
-           ERKStepSetTableNum(ode->stepper, ARKODE_FEHLBERG_13_7_8) == 0 &&
+           ERKStepSetUserData(ode->stepper, ode) == 0 && set_method(ode->stepper) &&
+           ERKStepSetMaxErrTestFails(ode->stepper, ODE_FAILURES) == 0 &&
            ERKStepSVtolerances(ode->stepper, tolerance, ode->scale) == 0;
 }
 
@@ -109,6 +167,7 @@ Status ode_start(Ode *ode, const double *y, const double *scale, double step, Pr
     for (size_t i = 0; i < system->size; i++)
         data(ode->scale)[i] = tolerance * fmax(scale[i], 1e-290);
     ode->t = 0;
+    ode->step = step;
     system->watch(system->context, 0, data(ode->y), ode->value, ode->slope);
     // The stepper keeps a copy of the tolerances.
     return place(ode, 0, ode->y, step) &&
@@ -187,12 +246,28 @@ static bool settle(Ode *ode, size_t i, double t0, double t1, double guess) {
     return true;
 }
 
+// Less time than the stepper's clock can tell from none.
+static void creep(Ode *ode, double until) {
+    const OdeSystem *system = &ode->system;
+    system->rate(system->context, ode->t, data(ode->y), data(ode->within));
+    N_VLinearSum(1, ode->y, until - ode->t, ode->within, ode->y);
+    ode->t = until;
+}
+
 Status ode_step(Ode *ode, double until, double *t, double *y, int *root, Problem *problem) {
     const OdeSystem *system = &ode->system;
     const double t0 = ode->t;
     double t1, first = 0;
     *root = ODE_NO_ROOT;
     memcpy(data(ode->from), data(ode->y), system->size * sizeof(double));
+    if (until - t0 <= 16 * DBL_EPSILON * fabs(t0)) {
+        creep(ode, until);
+        if (!place(ode, until, ode->y, ode->step))
+            return failed(t0, problem);
+        *t = until;
+        memcpy(y, data(ode->y), system->size * sizeof(double));
+        return STATUS_OK;
+    }
     if (ERKStepSetStopTime(ode->stepper, until) != 0 ||
         ERKStepEvolve(ode->stepper, until, ode->y, &t1, ARK_ONE_STEP) < 0 || !(t1 > t0))
         return failed(t0, problem);
@@ -212,9 +287,12 @@ Status ode_step(Ode *ode, double until, double *t, double *y, int *root, Problem
         if (!settle(ode, (size_t)*root, t0, t1, first))
             return failed(first, problem);
         system->watch(system->context, ode->t, data(ode->y), ode->value, ode->slope);
+        // It has fallen, whichever side of zero rounding left it on.
+        ode->value[*root] = fmin(ode->value[*root], 0);
         if (!place(ode, ode->t, ode->y, t1 - t0))
             return failed(first, problem);
     }
+    ode->step = t1 - t0;
     *t = ode->t;
     memcpy(y, data(ode->y), system->size * sizeof(double));
     return STATUS_OK;

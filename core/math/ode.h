@@ -27,7 +27,7 @@ Ode *ode_new(const OdeSystem *system);
 void ode_free(Ode *ode);
 
 // Begins at t = 0 with y. `scale` says of each component what is large for it: errors are held to
-// 1e-13 of that or of the component itself. `step` is a first guess of the step [s].
+// 1e-14 of that or of the component itself. `step` is a first guess of the step [s].
 Status ode_start(Ode *ode, const double *y, const double *scale, double step, Problem *problem);
 
 // One step, at most until `until` (> the present time), cut short where a function that was above

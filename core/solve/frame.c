@@ -12,10 +12,11 @@
 #include "core/solve/frame_arc.h"
 #include "core/solve/frame_events.h"
 #include "core/solve/frame_flight.h"
+#include "core/solve/frame_ode.h"
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
-enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8 };
+enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64 };
 
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
 
@@ -23,6 +24,7 @@ typedef struct Engine {
     Frame frame;
     FrameArc arc;
     FrameFlight flight;
+    FrameOde ode;
     FrameRecord record;
     double work; // since the watch was asked
 } Engine;
@@ -108,6 +110,34 @@ static void pass(Engine *engine, const FrameEvent *hit) {
     }
 }
 
+// The event at the end of a step.
+static Status happen(Engine *engine, const FrameEvent *event) {
+    Frame *frame = &engine->frame;
+    frame->events++;
+    if (++frame->still_events > STILL_EVENTS * frame->dampers)
+        return problem_set(frame->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events at one instant, t = %.17g s",
+                           STILL_EVENTS * frame->dampers, frame_time(frame));
+    frame_happen(frame, event);
+    return ledger_status(&frame->ledger, frame->problem);
+}
+
+// One step of contact under a power law, at most `length` long.
+static Status press(Engine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameOdeStep step;
+    TRY(frame_ode_step(&engine->ode, slice, length, &step, frame->problem));
+    ledger_work(&frame->ledger, step.input, step.damping);
+    engine->record.base_speed += step.ground;
+    frame->offset += step.length;
+    frame->ground = slice_at(slice, step.length);
+    frame->still_events = 0;
+    frame_record_note(frame);
+    if (step.is_event)
+        TRY(happen(engine, &step.event));
+    return count_step(engine, PRESS_WORK);
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(Engine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -115,6 +145,8 @@ static Status advance(Engine *engine, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &slice);
     frame->ground = slice.value;
+    if (frame_ode_serves(&engine->ode))
+        return press(engine, &slice, fmin(length, knot));
     frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), 1 / frame_rate(frame)));
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
@@ -122,15 +154,8 @@ static Status advance(Engine *engine, double length) {
         frame_arc_cut(arc, frame, event.s);
     if (arc->length > 0)
         pass(engine, is_event ? &event : NULL);
-    if (is_event) {
-        frame->events++;
-        if (++frame->still_events > STILL_EVENTS * frame->dampers)
-            return problem_set(frame->problem, STATUS_UNSTABLE,
-                               "more than %zu contact events at one instant, t = %.17g s",
-                               STILL_EVENTS * frame->dampers, frame_time(frame));
-        frame_happen(frame, &event);
-        TRY(ledger_status(&frame->ledger, frame->problem));
-    }
+    if (is_event)
+        TRY(happen(engine, &event));
     return count_step(engine, 2 * (double)arc->degree);
 }
 
@@ -234,6 +259,7 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, problem));
     TRY(frame_record_start(&engine->record, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
@@ -250,6 +276,7 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
         frame_record_finish(&engine.record, &engine.frame, response);
     frame_record_clear(&engine.record);
     frame_flight_clear(&engine.flight);
+    frame_ode_clear(&engine.ode);
     frame_arc_clear(&engine.arc);
     frame_clear(&engine.frame);
     return status;

@@ -192,9 +192,12 @@ static Status start(FrameOde *ode, Problem *problem) {
     for (size_t d = 0; d < m; d++) {
         const ContactForce force = force_at(frame, d, y);
         ode->strain[d] = force.strain;
-        ode->turn[d] = force.kink < 0 ? -1 : 1;
+        // At a kink rounding alone says on which side.
+        if (!ode->is_turned)
+            ode->turn[d] = force.kink < 0 ? -1 : 1;
     }
     const double time = make_scale(ode);
+    ode->is_turned = false;
     ode->at = 0;
     return ode_start(ode->ode, y, ode->scale, time / 64, problem);
 }
@@ -260,9 +263,14 @@ Status frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOde
                 frame->damper[d].phase == FRAME_CONTACT ? frame->damper[d].side : (Side)which;
             step->is_event = true;
             step->event = (FrameEvent){.damper = d, .s = 1, .side = side};
-        } else if (which == KINK) {
-            ode->turn[d] = -ode->turn[d];
-            ode->events = SIZE_MAX; // a new beginning: no step may straddle it
+        } else {
+            frame->events++; // a step may end where it began
+            if (which == PEAK) {
+                ode->events = frame->events;
+            } else { // no step may straddle it: the motion begins anew
+                ode->turn[d] = -ode->turn[d];
+                ode->is_turned = true;
+            }
         }
     }
     find_open(frame, step);

@@ -14,6 +14,7 @@ typedef struct FrameOde {
     double *y, *before, *scale, *rates;
     double *strain;  // of the dampers' buffers, at the last step [J]
     double *turn;    // of the dampers: the sign of their law's kink function
+    bool is_turned;  // one of these a moment ago
     double *elastic; // scratch
     double *block;
     Slice slice;   // of the base

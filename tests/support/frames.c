@@ -65,11 +65,17 @@ void frames_damper(Plan *plan, size_t index, size_t storey, double mass, double 
     damper->effective_mass = 1 / (1 / mass + 1 / plan->mass[storey * plan->storeys + storey]);
     if (isnan(contact_time))
         plan->form = CONTACT_IMPULSIVE;
-    const Identified identified =
-        identify_measured(damper->effective_mass, restitution, contact_time);
+    const ContactLaw *law =
+        plan->form == CONTACT_IMPULSIVE ? &contact_impulse : &contact_spring_damper;
+    const ContactNumbers numbers = {.restitution = restitution,
+                                    .contact_time = contact_time,
+                                    .stiffness = NAN,
+                                    .damping = NAN,
+                                    .exponent = NAN};
     for (int side = 0; side < 2; side++) {
-        damper->stops[side].restitution = restitution;
-        damper->stops[side].stiffness = identified.stiffness;
-        damper->stops[side].damping = identified.damping;
+        const ContactStop stop = contact_prepare(law, plan->separation, damper->effective_mass,
+                                                 damper->effective_mass, &numbers);
+        damper->stops[side] = (PlanStop){stop.parameters.restitution, stop.parameters.stiffness,
+                                         stop.parameters.damping, stop};
     }
 }
