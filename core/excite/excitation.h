@@ -10,9 +10,9 @@
 
 // First member of every excitation's struct.
 typedef struct Excitation {
-    Variant variant;     // kind is an ExcitationKind's
-    double displacement; // of the structure at t = 0, relative to the base [m]
-    double velocity;     // [m/s]
+    Variant variant;    // kind is an ExcitationKind's
+    Reals displacement; // of each storey at t = 0, relative to the base; none: 0 [m]
+    Reals velocity;     // [m/s]
 } Excitation;
 
 // What an excitation needs to know of the run it serves.

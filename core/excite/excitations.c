@@ -1,10 +1,12 @@
 // All excitations, the default first, and the rows that each of them begins with.
 #include "core/excite/excitation.h"
 
+enum { START_NUMBERS = 200 }; // as many as storeys, at most
+
 // clang-format off
 const Field excitation_fields[] = {
-    FIELD_REAL(Excitation, displacement, "m",   ANY, 0, "of the structure at the start, relative to the base"),
-    FIELD_REAL(Excitation, velocity,     "m/s", ANY, 0, "of the structure at the start, relative to the base"),
+    FIELD_LONE_REALS(Excitation, displacement, "m",   ANY, START_NUMBERS, PRESENCE_OPTIONAL, "of the structure at the start, relative to the base; of several storeys a list of each; 0 if not given"),
+    FIELD_LONE_REALS(Excitation, velocity,     "m/s", ANY, START_NUMBERS, PRESENCE_OPTIONAL, "of the structure at the start, relative to the base; of several storeys a list of each; 0 if not given"),
     FIELD_END
 };
 // clang-format on

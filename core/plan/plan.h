@@ -6,6 +6,7 @@
 #include "core/base/field.h"
 #include "core/contact/freeze.h"
 #include "core/contact/identify.h"
+#include "core/plan/modes.h"
 #include "core/scene/scene.h"
 
 // One choice of the planner, for people. Texts are static or live as long as the Decisions.
@@ -36,6 +37,16 @@ typedef struct DerivedList {
     size_t count;
 } DerivedList;
 
+// One natural mode of the structure, as people know it.
+typedef struct PlanMode {
+    double frequency;     // [Hz]
+    double damping_ratio; // of the mode by itself; NAN where it does not swing
+} PlanMode;
+typedef struct PlanModes {
+    PlanMode *at;
+    size_t count;
+} PlanModes;
+
 typedef struct Warning {
     char *pointer, *detail;
 } Warning;
@@ -50,9 +61,11 @@ typedef struct PlanReport {
     char *solver;
     Decisions decisions;
     DerivedList derived;
+    PlanModes modes;
 } PlanReport;
 
-extern const Field plan_report_fields[], derived_fields[], decision_fields[], warning_fields[];
+extern const Field plan_report_fields[], derived_fields[], decision_fields[], mode_fields[],
+    warning_fields[];
 
 // One stop's contact parameters, ready for a solver. The first three are those of every impact;
 // where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)
@@ -80,6 +93,7 @@ typedef struct Plan {
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
+    Modes modes;                        // empty where plan_is_single
     PlanDamper *dampers;
     size_t damper_count;
     const ContactLaw *law;
@@ -95,6 +109,10 @@ typedef struct Plan {
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
 void plan_free(Plan *plan);
+
+// Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
+// and a law whose contact phases are linear or instantaneous.
+bool plan_is_single(const Plan *plan);
 
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.

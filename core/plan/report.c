@@ -37,6 +37,12 @@ const Field derived_fields[] = {
     FIELD_END
 };
 
+const Field mode_fields[] = {
+    FIELD_REAL(PlanMode, frequency, "Hz", ANY, OPTIONAL, "natural frequency without damping"),
+    FIELD_REAL(PlanMode, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio xi of the mode by itself; unknown where it does not swing"),
+    FIELD_END
+};
+
 const Field warning_fields[] = {
     FIELD_TEXT(Warning, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to what is doubtful"),
     FIELD_TEXT(Warning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful about it"),
@@ -48,12 +54,15 @@ const Field plan_report_fields[] = {
     FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
     FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
     FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
+    FIELD_LIST(PlanReport, modes, mode_fields, 0, PRESENCE_DEFAULT, "natural modes of the structure, the slowest first"),
     FIELD_END
 };
 // clang-format on
 
 // The text of a format, owned by the caller; NULL without memory.
 static char *text_of(const char *format, va_list arguments) {
+    if (strchr(format, '%') == NULL)
+        return strdup(format);
     char text[1024], cut[512];
     vsnprintf(text, sizeof text, format, arguments);
     text_fit(cut, sizeof cut, text);

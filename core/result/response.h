@@ -44,7 +44,8 @@ typedef struct Energy {
     double residual;           // [-]
 } Energy;
 
-// Peaks over samples and event instants, whether or not the channel was asked for.
+// Peaks over samples and event instants, whether or not the channel was asked for; of several
+// storeys or dampers the largest.
 typedef struct Peaks {
     double displacement, velocity, acceleration, damper_displacement, contact_force;
 } Peaks;
@@ -56,8 +57,8 @@ typedef struct Response {
     Impacts impacts;
     Energy energy;
     Peaks peaks;
-    double sum_squares_displacement,
-        sum_squares_acceleration; // over samples from statistics_from on
+    // Over samples from statistics_from on; of several storeys the largest.
+    double sum_squares_displacement, sum_squares_acceleration;
     size_t statistics_count;
 } Response;
 

@@ -111,7 +111,7 @@ static Status check_stops(const Damper *damper, const char *pointer, Problem *pr
 
 static Status check_storey(const Damper *damper, size_t storeys, const char *pointer,
                            Problem *problem) {
-    if (damper->storey <= storeys)
+    if (storeys == 0 || damper->storey <= storeys)
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)];
     pointer_join(place, sizeof place, pointer, "storey");
@@ -179,7 +179,7 @@ static void normalise_buffers(Damper *damper, const ContactLaw *law) {
 
 Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
                        Problem *problem) {
-    if (damper->storey == COUNT_ABSENT)
+    if (damper->storey == COUNT_ABSENT && storeys > 0)
         damper->storey = storeys;
     if (damper->identified_for == CHOICE_ABSENT)
         damper->identified_for = IDENTIFIED_FOR_SCENE;

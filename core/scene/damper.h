@@ -52,9 +52,10 @@ double damper_identified_mass(const Damper *damper, double own);
 // time or k, c is known on any side, else impulse.
 const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact);
 
-// Faults that rows cannot see, below `pointer`, under the law that dampers_contact_law found. Then
-// fills the storey, erases what the law does not use, and gives equal buffers one form: `buffer`
-// where both sides are the same, else one for each side.
+// Faults that rows cannot see, below `pointer`, under the law that dampers_contact_law found, on a
+// structure of so many storeys (0: not known). Then fills the storey, erases what the law does not
+// use, and gives equal buffers one form: `buffer` where both sides are the same, else one for each
+// side.
 Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
                        Problem *problem);
 

@@ -6,12 +6,10 @@
 
 #include "core/contact/identify.h"
 
-enum { STOREYS = 1, DAMPERS = 1 };
-
 // clang-format off
 const Field scene_fields[] = {
     FIELD_VARIANT(Scene, structure, &structure_kinds, PRESENCE_REQUIRED, "the primary structure"),
-    FIELD_LIST(Scene, dampers, damper_fields, DAMPERS, PRESENCE_DEFAULT, "impact dampers"),
+    FIELD_LIST(Scene, dampers, damper_fields, SCENE_DAMPERS, PRESENCE_DEFAULT, "impact dampers"),
     FIELD_VARIANT(Scene, contact, &contact_kinds, PRESENCE_DEFAULT, "how a free mass and a stop meet"),
     FIELD_VARIANT(Scene, excitation, &excitation_kinds, PRESENCE_DEFAULT, "motion of the base, and the initial state"),
     FIELD_REAL(Scene, duration, "s", ABOVE(0), REQUIRED, "simulated time"),
@@ -96,24 +94,32 @@ static Status check_contact(const Scene *scene, const ContactLaw *law, size_t in
 }
 
 static Status check_contacts(const Scene *scene, Problem *problem) {
-    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
+    const Structure *structure = scene_structure(scene);
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
-        const double mass = effective_mass(sdof->mass, scene->dampers.at[i].mass);
+        const Damper *damper = &scene->dampers.at[i];
+        if (damper->storey < 1 || damper->storey > structure_storeys(structure))
+            continue; // told by the rows
+        double moved;
+        const Status known =
+            structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
+        if (known == STATUS_NO_MEMORY)
+            return problem_set(problem, known, "no memory for a scene");
+        const double mass = effective_mass(moved, damper->mass);
         TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
         TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
     }
     return STATUS_OK;
 }
 
-static Status complete_dampers(Scene *scene, Problem *problem) {
+static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     Status status = STATUS_OK;
     // More than the rows allow were told by the rows.
-    for (size_t i = 0; i < scene->dampers.count && i < DAMPERS; i++) {
+    for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
         char place[sizeof((Fault){0}.pointer)];
         pointer_index(place, sizeof place, "/dampers", i);
-        if (damper_complete(&scene->dampers.at[i], law, STOREYS, place, problem) != STATUS_OK)
+        if (damper_complete(&scene->dampers.at[i], law, storeys, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     Contact *contact = (Contact *)(void *)scene->contact;
@@ -134,6 +140,30 @@ static Status reset_contact(Scene *scene, Problem *problem) {
     return STATUS_OK;
 }
 
+// The initial state has one number per storey; a lone 0 means rest whatever their number.
+static Status complete_start(Reals *start, const char *name, const char *unit, size_t storeys,
+                             Problem *problem) {
+    if (start->count == 0 || (start->count == 1 && start->at[0] == 0))
+        return structure_zeros(start, storeys, problem);
+    if (start->count != 1 || storeys == 1)
+        return structure_check_count(start, storeys, "/excitation", name, problem);
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, "/excitation", name);
+    return problem_add_real(problem, STATUS_INVALID, place, start->at[0], unit,
+                            "must be a list of %zu numbers, one per storey, or 0", storeys);
+}
+
+static Status complete_starts(Scene *scene, size_t storeys, Problem *problem) {
+    Excitation *excitation = (Excitation *)(void *)scene->excitation;
+    if (storeys == 0)
+        return STATUS_OK;
+    const Status displacement =
+        complete_start(&excitation->displacement, "displacement", "m", storeys, problem);
+    const Status velocity =
+        complete_start(&excitation->velocity, "velocity", "m/s", storeys, problem);
+    return displacement != STATUS_OK ? displacement : velocity;
+}
+
 static Status complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
     Excitation *excitation = (Excitation *)(void *)scene->excitation;
     const ExcitationKind *kind = excitation_kind(excitation);
@@ -144,17 +174,26 @@ static Status complete_excitation(Scene *scene, size_t most_samples, Problem *pr
     return kind->complete(excitation, &span, "/excitation", problem);
 }
 
+size_t scene_storeys(const Scene *scene, const Problem *problem) {
+    return scene->structure == NULL || problem_concerns(problem, "/structure")
+               ? 0
+               : structure_storeys(scene_structure(scene));
+}
+
 Status scene_complete(Scene *scene, size_t most_samples, Problem *problem) {
-    Status faults[4] = {STATUS_OK};
+    Status faults[5] = {STATUS_OK};
     if (scene->structure != NULL)
         faults[0] =
             structure_complete((Structure *)(void *)scene->structure, "/structure", problem);
+    const size_t storeys = scene_storeys(scene, problem);
     if (scene->contact != NULL)
-        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, problem)
+        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, storeys, problem)
                                              : reset_contact(scene, problem);
     faults[2] = check_samples(scene, most_samples, problem);
-    if (scene->excitation != NULL)
+    if (scene->excitation != NULL) {
         faults[3] = complete_excitation(scene, most_samples, problem);
+        faults[4] = complete_starts(scene, storeys, problem);
+    }
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
     if (problem_concerns(problem, "/structure") || problem_concerns(problem, "/dampers") ||

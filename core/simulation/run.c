@@ -58,14 +58,24 @@ typedef struct Journey {
     Base base;
     Columns hidden;      // channels that only a spectrum wants
     Columns transformed; // borrowed values of the spectrum's channels
-    RunColumn wanted[CHANNEL_COUNT];
+    const char **units;  // of their densities
+    RunColumn *wanted;   // room for all names that ask for one
     size_t wanted_count;
     Outcome *outcome;
 } Journey;
 
-static RunColumn *find_column(Journey *journey, const Channel *channel) {
+// What a name asks for; a bare one is of the first storey or damper.
+static RunColumn column_of(const char *name) {
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    return (RunColumn){(ChannelId)(channel - channels), number > 0 ? number - 1 : 0, NULL};
+}
+
+static const RunColumn *find_column(const Journey *journey, const char *name) {
+    const RunColumn asked = column_of(name);
     for (size_t i = 0; i < journey->wanted_count; i++)
-        if (&channels[journey->wanted[i].channel] == channel)
+        if (journey->wanted[i].channel == asked.channel &&
+            journey->wanted[i].number == asked.number)
             return &journey->wanted[i];
     return NULL;
 }
@@ -73,40 +83,40 @@ static RunColumn *find_column(Journey *journey, const Channel *channel) {
 // Columns for `names` that no earlier request has, entered into the journey's list.
 static Status make_columns(Journey *journey, const Texts *names, Columns *columns,
                            Problem *problem) {
-    const size_t first = journey->wanted_count;
-    for (size_t i = 0; i < names->count; i++) {
-        const Channel *channel = channel_find(names->at[i]);
-        if (channel != NULL && find_column(journey, channel) == NULL)
-            journey->wanted[journey->wanted_count++] =
-                (RunColumn){.channel = (ChannelId)(channel - channels)};
-    }
-    const size_t count = journey->wanted_count - first;
+    size_t count = 0;
+    for (size_t i = 0; i < names->count; i++)
+        count += find_column(journey, names->at[i]) == NULL;
     if (count == 0)
         return STATUS_OK;
     TRY(columns_make(columns, count, journey->plan->count, 0, problem));
-    for (size_t i = 0; i < count; i++) {
-        RunColumn *wanted = &journey->wanted[first + i];
-        columns_name(columns, i, channels[wanted->channel].name, channels[wanted->channel].unit);
-        wanted->values = columns->at[i].values;
+    for (size_t i = 0, made = 0; i < names->count; i++) {
+        if (find_column(journey, names->at[i]) != NULL)
+            continue;
+        RunColumn *wanted = &journey->wanted[journey->wanted_count++];
+        *wanted = column_of(names->at[i]);
+        columns_name(columns, made, names->at[i], channels[wanted->channel].unit);
+        wanted->values = columns->at[made++].values;
     }
     return STATUS_OK;
 }
 
 static Status make_spectrum(Journey *journey, Problem *problem) {
     const SpectrumRequest *request = &journey->simulation->output.psd;
-    const char *units[CHANNEL_COUNT];
     if (request->channels.count == 0)
         return STATUS_OK;
     Columns *columns = &journey->transformed;
     columns->at = calloc(request->channels.count, sizeof *columns->at);
-    if (columns->at == NULL)
+    const char **units = calloc(request->channels.count, sizeof *units);
+    journey->units = units;
+    if (columns->at == NULL || units == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the spectra");
     columns->count = request->channels.count;
     columns->rows = journey->plan->count;
     for (size_t i = 0; i < columns->count; i++) {
-        const Channel *channel = channel_find(request->channels.at[i]);
-        columns_name(columns, i, channel->name, channel->unit);
-        columns->at[i].values = find_column(journey, channel)->values;
+        const RunColumn *wanted = find_column(journey, request->channels.at[i]);
+        const Channel *channel = &channels[wanted->channel];
+        columns_name(columns, i, request->channels.at[i], channel->unit);
+        columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
     Stage stage = {journey->watch, 0.9, 0.1};
@@ -166,6 +176,11 @@ static Status travel(Journey *journey, Problem *problem) {
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
+    journey->wanted =
+        calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,
+               sizeof *journey->wanted);
+    if (journey->wanted == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
     TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, problem));
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
     run.columns = journey->wanted;
@@ -190,6 +205,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
         .simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
     const Status status = travel(&journey, problem);
     free(journey.transformed.at); // its values are the other columns'
+    free(journey.units);
+    free(journey.wanted);
     columns_clear(&journey.hidden);
     base_clear(&journey.base);
     plan_free(journey.plan);
@@ -225,13 +242,25 @@ size_t outcome_bytes(const Outcome *outcome) {
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
 // shows that the stops are out of reach.
-static double flight_arcs(const Scene *scene) {
-    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene_structure(scene);
+static double flight_arcs(const Scene *scene, double structure) {
     const Excitation *excitation = scene_excitation(scene);
-    double rate = fmax(sqrt(sdof->stiffness / sdof->mass), structure_damping(sdof) / sdof->mass);
+    double rate = structure;
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
     return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
+}
+
+// A frame's sample is a step for each mode and each damper, or a product with a matrix where
+// damping couples the modes; and finding the modes comes before.
+static double steps_a_sample(const Scene *scene, double *planning) {
+    const Structure *structure = scene_structure(scene);
+    const double storeys = (double)structure_storeys(structure);
+    *planning = 0;
+    if (storeys == 1 && scene->dampers.count <= 1)
+        return 1;
+    *planning = 2 * storeys * storeys * storeys;
+    const bool may_couple = storeys > 1 && isnan(structure->damping_ratio);
+    return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
 }
 
 Cost simulation_cost(const Simulation *simulation) {
@@ -240,7 +269,12 @@ Cost simulation_cost(const Simulation *simulation) {
     const bool has_damper = simulation->scene.dampers.count > 0;
     // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
     // transformed sample costs about a third of a step, and overlap transforms it several times.
-    double steps = samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene);
+    StructureRates rates;
+    if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
+        rates.fastest = 0; // a guess without memory: the run will tell
+    double planning, step = steps_a_sample(&simulation->scene, &planning);
+    double steps = planning + step * (samples * (has_damper ? 1.1 : 1) +
+                                      flight_arcs(&simulation->scene, rates.fastest));
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /
                  (double)(psd->segment - psd->overlap) / 3;

@@ -17,6 +17,7 @@
 
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_state.h"
+#include "core/solve/frame.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
@@ -285,6 +286,8 @@ static Status solve(Exact *exact) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return frame_run(run, response, problem);
     Exact exact;
     TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);

@@ -273,9 +273,12 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     frame->storeys = n;
     frame->dampers = plan->damper_count;
     frame->interval = 1 / plan->sample_rate;
-    TRY(modes_make(&frame->own_modes, n, plan->mass, plan->stiffness, plan->damping,
-                   plan->influence, problem));
-    frame->modes = &frame->own_modes;
+    frame->modes = &plan->modes;
+    if (plan->modes.count == 0) {
+        TRY(modes_make(&frame->own_modes, n, plan->mass, plan->stiffness, plan->damping,
+                       plan->influence, problem));
+        frame->modes = &frame->own_modes;
+    }
     if (make_room(frame) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     make_damping(frame);

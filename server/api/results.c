@@ -31,17 +31,10 @@ static Status read_scene(const ResultRow *row, Simulation *simulation, Problem *
     return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
 }
 
-// Of "displacement" as of "displacement_2".
 static const char *channel_unit(const char *name) {
-    for (size_t i = 0; i < CHANNEL_COUNT; i++) {
-        const size_t size = strlen(channels[i].name);
-        if (strncmp(name, channels[i].name, size) != 0)
-            continue;
-        const char *rest = name + size;
-        if (*rest == '\0' || (*rest == '_' && rest[1 + strspn(rest + 1, "0123456789")] == '\0'))
-            return channels[i].unit;
-    }
-    return NULL;
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    return channel != NULL ? channel->unit : NULL;
 }
 
 static void write_units(Bytes *bytes, const Simulation *simulation) {

@@ -102,8 +102,21 @@ static double allowed_number(const Range *range) {
 
 static void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *target,
                        const char *pointer) {
-    if (!json_is_array(value)) {
-        refuse_type(reader, pointer, value, field, "an array of numbers");
+    const bool takes_number = (field->flags & FIELD_LONE) != 0;
+    if (!json_is_array(value) && !(takes_number && json_is_number(value))) {
+        refuse_type(reader, pointer, value, field,
+                    takes_number ? "a number or an array of numbers" : "an array of numbers");
+        return;
+    }
+    if (json_is_number(value)) {
+        double *at = malloc(sizeof *at);
+        if (at == NULL) {
+            out_of_memory(reader);
+            return;
+        }
+        *at = number_of(value);
+        free(target->at);
+        *target = (Reals){at, 1};
         return;
     }
     const size_t count = json_array_size(value);
@@ -129,6 +142,32 @@ static void read_reals(Reader *reader, const json_t *value, const Field *field, 
     }
     free(target->at);
     *target = (Reals){at, count};
+}
+
+// A row that could not be read stays empty, so that those behind it keep their places.
+static void read_rows(Reader *reader, const json_t *value, const Field *field, Rows *target,
+                      const char *pointer) {
+    if (!json_is_array(value)) {
+        refuse_type(reader, pointer, value, field, "an array of rows of numbers");
+        return;
+    }
+    const size_t count = json_array_size(value);
+    if (!allows_length(reader, value, field, count, "rows", pointer))
+        return;
+    Reals *at = count > 0 ? calloc(count, sizeof *at) : NULL;
+    if (at == NULL && count > 0) {
+        out_of_memory(reader);
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        char place[POINTER_SIZE];
+        pointer_index(place, sizeof place, pointer, i);
+        read_reals(reader, json_array_get(value, i), field, &at[i], place);
+    }
+    for (size_t i = 0; i < target->count; i++)
+        free(target->at[i].at);
+    free(target->at);
+    *target = (Rows){at, count};
 }
 
 // "key=value", or `value` alone without a key.
@@ -333,6 +372,9 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         break;
     case FIELD_KIND_REALS:
         read_reals(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_ROWS:
+        read_rows(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_TEXTS:
         read_texts(reader, value, field, member, pointer);

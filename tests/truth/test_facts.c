@@ -169,7 +169,7 @@ static void a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts(void **s
     simulation.scene.dampers.at[0].mass = 1e-3;
     simulation.scene.dampers.at[0].clearance = 2;
     constant_base(&simulation, -g, 2);
-    ((Excitation *)(void *)simulation.scene.excitation)->displacement = g * 1e-6; // M g / K
+    scene_start(&simulation, g * 1e-6, 0); // M g / K
     Outcome *outcome = run(&simulation);
     double speed = sqrt(2 * g);
     size_t count = 0;

@@ -16,6 +16,7 @@
 #include "core/excite/record.h"
 #include "core/excite/sine.h"
 #include "tests/support/paper.h"
+#include "tests/support/scenes.h"
 #include "tests/truth/reference.h"
 
 static size_t scenes = 60;
@@ -197,9 +198,7 @@ static Outcome *solver_run(const ReferenceScene *scene) {
         record->interval = scene->interval;
         simulation.scene.excitation = (Variant *)(void *)record;
     }
-    Excitation *excitation = (Excitation *)(void *)simulation.scene.excitation;
-    excitation->displacement = scene->displacement;
-    excitation->velocity = scene->velocity;
+    scene_start(&simulation, scene->displacement, scene->velocity);
     paper_model(&simulation, scene->is_impulse ? "impulse" : "spring_damper");
     paper_channels(&simulation, wanted, COUNT(wanted));
     paper_no_psd(&simulation);

@@ -44,7 +44,7 @@ static void the_list_begins_with_free_and_every_kind_takes_an_initial_state(void
         Excitation *excitation = (Excitation *)(void *)variant_new(&excitations[i]->kind);
         assert_ptr_equal(real_of(excitation, "displacement"), &excitation->displacement);
         assert_ptr_equal(real_of(excitation, "velocity"), &excitation->velocity);
-        assert_true(excitation->displacement == 0 && excitation->velocity == 0);
+        assert_true(excitation->displacement.count == 0 && excitation->velocity.count == 0);
         assert_non_null(excitations[i]->make);
         variant_free(&excitation->variant);
     }

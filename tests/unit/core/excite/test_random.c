@@ -332,7 +332,7 @@ static void the_rows_fill_in_seed_and_start(void **state) {
     assert_int_equal(fields_default(excitation_random.kind.fields, &random), STATUS_OK);
     assert_int_equal(random.seed, 0);
     assert_true(isnan(random.rate) && isnan(random.rms) && random.band.count == 0);
-    assert_true(random.start.displacement == 0 && random.start.velocity == 0);
+    assert_true(random.start.displacement.count == 0 && random.start.velocity.count == 0);
     fields_clear(excitation_random.kind.fields, &random);
 }
 

@@ -45,7 +45,7 @@ static void pair_scene(Simulation *simulation, const Pair *pair) {
     }
     scene_choose(&simulation->scene.contact, &contact_kinds, pair->model);
     ((Contact *)(void *)simulation->scene.contact)->separation = pair->separation;
-    ((Excitation *)(void *)simulation->scene.excitation)->displacement = 0;
+    scene_start(simulation, 0, 0);
     simulation->scene.duration = 1;
     simulation->scene.sample_rate = 100;
 }
