@@ -75,7 +75,6 @@ static void start(const Reals *given, double *start) {
 
 bool plan_is_single(const Plan *plan) {
     return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1 &&
-           (plan->form == CONTACT_LINEAR || plan->form == CONTACT_IMPULSIVE) &&
            plan->separation == SEPARATION_ZERO_PENETRATION &&
            (plan->damper_count == 0 || !stops_vary(&plan->dampers[0]));
 }

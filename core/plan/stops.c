@@ -79,7 +79,18 @@ void stops_clear(Plan *plan) {
             free(plan->dampers[i].stops[side].contact.numbers.rows.at);
 }
 
+static bool varies(const PlanStop *stop) {
+    return stop->contact.numbers.rows.count > 0 ||
+           (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER);
+}
+
 bool stops_vary(const PlanDamper *damper) {
-    return damper->stops[SIDE_LEFT].contact.numbers.rows.count > 0 ||
-           damper->stops[SIDE_RIGHT].contact.numbers.rows.count > 0;
+    return varies(&damper->stops[SIDE_LEFT]) || varies(&damper->stops[SIDE_RIGHT]);
+}
+
+ContactParameters stops_freeze(const PlanStop *stop, double approach_speed) {
+    if (varies(stop))
+        return contact_freeze(&stop->contact, approach_speed);
+    return (ContactParameters){
+        .restitution = stop->restitution, .stiffness = stop->stiffness, .damping = stop->damping};
 }

@@ -1,5 +1,5 @@
 // A damper's two stops made ready: their contact parameters, into the plan and its report.
-// Not the parameters themselves (contact/freeze.h). Used by plan.c.
+// Not the parameters themselves (contact/freeze.h). Used by plan.c and solve/.
 #ifndef CORE_PLAN_STOPS_H
 #define CORE_PLAN_STOPS_H
 
@@ -12,5 +12,8 @@ void stops_clear(Plan *plan);
 
 // Whether a stop's parameters depend on the approach speed.
 bool stops_vary(const PlanDamper *damper);
+
+// Parameters of an impact that begins with this approach speed.
+ContactParameters stops_freeze(const PlanStop *stop, double approach_speed);
 
 #endif

@@ -18,6 +18,7 @@
 #include <float.h>
 #include <math.h>
 
+#include "core/plan/stops.h"
 #include "core/solve/frame_collide.h"
 #include "core/solve/frame_record.h"
 
@@ -31,7 +32,7 @@ static void begin_contact(Frame *frame, size_t d, Side side) {
     damper->origin = (FrameOrigin)side;
     damper->r = 0;
     damper->is_fresh = true;
-    damper->contact = contact_freeze(&damper->plan->stops[side].contact, speed);
+    damper->contact = stops_freeze(&damper->plan->stops[side], speed);
     ledger_open(&damper->row, IMPACT_IMPACT, frame_time(frame), d, side, speed);
     ledger_force(&frame->ledger, &damper->row, damper->contact.damping * speed);
 }
@@ -161,7 +162,7 @@ static void bounce(Frame *frame, size_t d, Side side) {
         damper->origin = (FrameOrigin)at;
         damper->r = 0;
         damper->closing = fmax(frame_sign(at) * damper->w, 0);
-        damper->contact = contact_freeze(&damper->plan->stops[at].contact, damper->closing);
+        damper->contact = stops_freeze(&damper->plan->stops[at], damper->closing);
         damper->parting =
             frame->still_events > STILL_BOUNCES ? 0 : damper->contact.restitution * damper->closing;
     }

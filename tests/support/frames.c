@@ -65,17 +65,11 @@ void frames_damper(Plan *plan, size_t index, size_t storey, double mass, double 
     damper->effective_mass = 1 / (1 / mass + 1 / plan->mass[storey * plan->storeys + storey]);
     if (isnan(contact_time))
         plan->form = CONTACT_IMPULSIVE;
-    const ContactLaw *law =
-        plan->form == CONTACT_IMPULSIVE ? &contact_impulse : &contact_spring_damper;
-    const ContactNumbers numbers = {.restitution = restitution,
-                                    .contact_time = contact_time,
-                                    .stiffness = NAN,
-                                    .damping = NAN,
-                                    .exponent = NAN};
+    const Identified identified = identify_measured(damper->effective_mass, restitution,
+                                                    contact_time, SEPARATION_ZERO_PENETRATION);
     for (int side = 0; side < 2; side++) {
-        const ContactStop stop = contact_prepare(law, plan->separation, damper->effective_mass,
-                                                 damper->effective_mass, &numbers);
-        damper->stops[side] = (PlanStop){stop.parameters.restitution, stop.parameters.stiffness,
-                                         stop.parameters.damping, stop};
+        damper->stops[side].restitution = restitution;
+        damper->stops[side].stiffness = identified.stiffness;
+        damper->stops[side].damping = identified.damping;
     }
 }

@@ -171,9 +171,8 @@ static Plan *shaken_frame(size_t dampers, bool is_impulse, double split) {
         const Identified whole =
             identify_measured(effective_mass(10, 0.8), 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
         for (int side = 0; side < 2; side++) {
-            PlanStop *stop = &plan->dampers[d].stops[side];
-            stop->stiffness = stop->contact.parameters.stiffness = whole.stiffness / split;
-            stop->damping = stop->contact.parameters.damping = whole.damping / split;
+            plan->dampers[d].stops[side].stiffness = whole.stiffness / split;
+            plan->dampers[d].stops[side].damping = whole.damping / split;
         }
     }
     for (size_t j = 0; j < 4; j++)
