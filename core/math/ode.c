@@ -217,30 +217,33 @@ static bool falls(Ode *ode, size_t i, double t0, double t1, double *t) {
     return true;
 }
 
-// Takes the step from `t0` anew, to end where function i is zero.
+// Takes the step from `t0` anew, to end where function i is zero: by Newton's method, or where no
+// slope is known by secants.
 static bool settle(Ode *ode, size_t i, double t0, double t1, double guess) {
     const OdeSystem *system = &ode->system;
-    double t = guess;
+    double t = guess, other = t1, value = ode->ahead[i];
     for (int retake = 0; retake < ODE_RETAKES; retake++) {
         double reached = t0;
         memcpy(data(ode->y), data(ode->from), system->size * sizeof(double));
-        if (t > t0) {
-            if (!place(ode, t0, ode->from, t - t0) || ERKStepSetStopTime(ode->stepper, t) != 0 ||
-                ERKStepEvolve(ode->stepper, t, ode->y, &reached, ARK_NORMAL) < 0)
-                return false;
-        }
+        if (t > t0 &&
+            (!place(ode, t0, ode->from, t - t0) || ERKStepSetStopTime(ode->stepper, t) != 0 ||
+             ERKStepEvolve(ode->stepper, t, ode->y, &reached, ARK_NORMAL) < 0))
+            return false;
         ode->t = t;
         system->watch(system->context, t, data(ode->y), ode->value, ode->slope);
-        const double off = ode->value[i] / ode->slope[i];
-        if (!isfinite(off) || fabs(off) <= 1e-9 * (t1 - t0)) {
-            // What is left is its own square's rounding.
-            if (isfinite(off)) {
-                system->rate(system->context, t, data(ode->y), data(ode->within));
-                N_VLinearSum(1, ode->y, -off, ode->within, ode->y);
-                ode->t = t - off;
-            }
+        const double slope =
+            isnan(ode->slope[i]) ? (ode->value[i] - value) / (t - other) : ode->slope[i];
+        const double off = ode->value[i] / slope;
+        if (!isfinite(off))
+            break;
+        if (fabs(off) <= 1e-9 * (t1 - t0)) { // what is left is its own square's rounding
+            system->rate(system->context, t, data(ode->y), data(ode->within));
+            N_VLinearSum(1, ode->y, -off, ode->within, ode->y);
+            ode->t = t - off;
             break;
         }
+        other = t;
+        value = ode->value[i];
         t = fmin(fmax(t - off, t0), t1);
     }
     return true;

@@ -252,7 +252,8 @@ Status frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOde
     double to;
     memcpy(ode->before, ode->y, size_of(frame) * sizeof *ode->y);
     TRY(ode_step(ode->ode, from + length, &to, ode->y, &root, problem));
-    step->length = to - from;
+    // The integration's own clock may be coarser than the frame's.
+    step->length = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     ode->at = to;
     take(ode, step);
     if (root != ODE_NO_ROOT) {
