@@ -168,8 +168,10 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     TRY(decide_contact(scene, plan));
     TRY(plan_modes(structure, plan, problem));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
-                      strcmp(asked, solver) == 0
-                          ? "the scene asks for it"
+                      strcmp(asked, solver) == 0 ? "the scene asks for it"
+                      : plan->form == CONTACT_POWER
+                          ? "flight is linear, so its motion is known exactly; contacts under a "
+                            "power law are integrated to rounding's edge"
                           : "every contact state is linear, so its motion is known exactly"));
     plan->report.contact_model = strdup(plan->damper_count > 0 ? plan->law->kind.name : "none");
     plan->report.solver = strdup(solver);
