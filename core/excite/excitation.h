@@ -35,12 +35,20 @@ typedef struct ExcitationKind {
     // `watch` says so.
     Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,
                    Problem *problem);
+    // Adds what is allowed but hardly meant to `doubts`, below `pointer`. NULL: nothing to doubt.
+    void (*doubt)(const Excitation *excitation, const Span *span, const char *pointer,
+                  Problem *doubts);
 } ExcitationKind;
 
 extern const ExcitationKind *const excitations[]; // NULL-terminated; "free" first
 extern const KindTable excitation_kinds;
 extern const Field excitation_fields[]; // the rows that every kind has
-extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record;
+extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record,
+    excitation_chirp, excitation_half_sine, excitation_triangular;
+
+// A doubt at pointer/name where the output's samples cannot show motion of this frequency.
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts);
 
 static inline const ExcitationKind *excitation_kind(const Excitation *excitation) {
     return (const ExcitationKind *)(const void *)excitation->variant.kind;

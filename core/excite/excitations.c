@@ -1,4 +1,4 @@
-// All excitations, the default first, and the rows that each of them begins with.
+// All excitations, the default first, and what several of them share.
 #include "core/excite/excitation.h"
 
 enum { START_NUMBERS = 200 }; // as many as storeys, at most
@@ -11,11 +11,26 @@ const Field excitation_fields[] = {
 };
 // clang-format on
 
-const ExcitationKind *const excitations[] = {&excitation_free, &excitation_random, &excitation_sine,
-                                             &excitation_record, NULL};
+const ExcitationKind *const excitations[] = {
+    &excitation_free,  &excitation_random,    &excitation_sine,       &excitation_record,
+    &excitation_chirp, &excitation_half_sine, &excitation_triangular, NULL,
+};
 
 static const Kind *excitation_at(size_t index) {
     return index < COUNT(excitations) - 1 ? &excitations[index]->kind : NULL;
 }
 
 const KindTable excitation_kinds = {"kind", excitation_at};
+
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts) {
+    if (!(frequency > span->sample_rate / 2))
+        return;
+    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
+    pointer_join(place, sizeof place, pointer, name);
+    (void)problem_add(
+        doubts, STATUS_INVALID, place,
+        "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
+        "the motion",
+        text_real(is, frequency), text_real(limit, span->sample_rate / 2));
+}

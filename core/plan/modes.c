@@ -57,6 +57,9 @@ static Status make(Modes *modes, size_t storeys, const double *mass, const doubl
     const size_t n = storeys;
     long double *values = work, *vectors = work + n;
     TRY(linear_eigen(n, mass, stiffness, values, vectors));
+    // omega and its square are to be doubles.
+    if (!isfinite((double)values[n - 1]))
+        return STATUS_INVALID;
     const long double nothing = 4 * DBL_EPSILON * fabsl(values[n - 1]);
     for (size_t k = 0; k < n; k++) {
         if (values[k] < -nothing * (long double)n)

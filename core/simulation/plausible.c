@@ -124,9 +124,25 @@ static Status warn_masses(const Scene *scene, Warnings *warnings) {
     return STATUS_OK;
 }
 
+// What the excitation's kind alone can judge.
+static Status warn_excitation(const Scene *scene, Warnings *warnings) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    if (kind->doubt == NULL || warnings == NULL)
+        return STATUS_OK;
+    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
+    Problem doubts;
+    problem_clear(&doubts);
+    kind->doubt(excitation, &span, "/excitation", &doubts);
+    for (size_t i = 0; i < doubts.count && i < PROBLEM_FAULTS; i++)
+        TRY(warnings_add(warnings, doubts.faults[i].pointer, "%s", doubts.faults[i].detail));
+    return STATUS_OK;
+}
+
 Status plausible_warn(const Simulation *simulation, Warnings *warnings) {
     const Scene *scene = &simulation->scene;
     TRY(warn_rows(simulation_fields, simulation, "", warnings));
     TRY(warn_times(scene, warnings));
+    TRY(warn_excitation(scene, warnings));
     return warn_masses(scene, warnings);
 }

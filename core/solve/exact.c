@@ -223,8 +223,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
-    flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
-                exact->interval);
+    flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,

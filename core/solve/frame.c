@@ -182,7 +182,7 @@ static bool fly(Engine *engine) {
     Frame *frame = &engine->frame;
     Slice slice;
     FrameWork work;
-    if (engine->flight.block == NULL || !base_cursor_interval(&frame->base, frame->sample, &slice))
+    if (engine->flight.length == 0 || !base_cursor_interval(&frame->base, frame->sample, &slice))
         return false;
     for (size_t d = 0; d < frame->dampers; d++)
         if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)

@@ -11,7 +11,22 @@
 
 #include "core/math/exponential.h"
 
-enum { Q, P, A, B, SUM, FALL, SIZE };
+enum { Q, P, A, B, SIZE };
+enum { VALUE, SLOPE, SUM, FALL, GROUND };
+
+static void make_ground(FrameFlight *flight, const Base *base) {
+    const bool is_sine = base->form == BASE_SINE;
+    long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
+    system[VALUE * GROUND + SLOPE] = is_sine ? base->omega : 1;
+    system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)base->omega : 0;
+    system[SUM * GROUND + VALUE] = 1;
+    system[FALL * GROUND + SUM] = 1;
+    exponential_increment(system, GROUND, flight->length, gain);
+    for (int column = 0; column < 2; column++) {
+        flight->ground[column] = (double)gain[SUM * GROUND + column];
+        flight->fall[column] = (double)gain[FALL * GROUND + column];
+    }
+}
 
 static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     const long double share = frame->modes->participation[i], damping = frame->diagonal[i];
@@ -24,17 +39,11 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     system[P * SIZE + A] = -share;
     system[A * SIZE + B] = is_sine ? omega : 1;
     system[B * SIZE + A] = is_sine ? -(long double)omega : 0;
-    system[SUM * SIZE + A] = 1;
-    system[FALL * SIZE + SUM] = 1;
     long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
     exponential_increment(system, SIZE, flight->length, gain);
     for (int column = 0; column < 4; column++) {
         flight->q[column][i] = (double)gain[Q * SIZE + column];
         flight->p[column][i] = (double)gain[P * SIZE + column];
-    }
-    for (int column = 0; column < 2; column++) {
-        flight->ground[column] = (double)gain[SUM * SIZE + A + column];
-        flight->fall[column] = (double)gain[FALL * SIZE + A + column];
     }
     const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
     const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
@@ -59,35 +68,61 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
 Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem) {
     const size_t n = frame->storeys;
     memset(flight, 0, sizeof *flight);
-    if (frame->diagonal == NULL)
-        return STATUS_OK;
-    double **const arrays[] = {&flight->q[0],     &flight->q[1],     &flight->q[2],
-                               &flight->q[3],     &flight->p[0],     &flight->p[1],
-                               &flight->p[2],     &flight->p[3],     &flight->loss[0],
-                               &flight->loss[1],  &flight->loss[2],  &flight->loss[3],
-                               &flight->loss[4],  &flight->loss[5],  &flight->loss[6],
-                               &flight->input[0], &flight->input[1], &flight->input[2],
-                               &flight->input[3], &flight->gain_q,   &flight->gain_p};
-    const size_t count = sizeof arrays / sizeof *arrays;
-    flight->block = calloc(n, count * sizeof *flight->block);
+    if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
+        return STATUS_OK; // a_g has its kinks inside the intervals
+    if (frame->diagonal == NULL) {
+        TRY(frame_dense_make(&flight->dense, frame, problem));
+        if (flight->dense.block == NULL)
+            return STATUS_OK;
+    }
+    double **const arrays[] = {
+        &flight->q[0],     &flight->q[1],     &flight->q[2],     &flight->q[3],    &flight->p[0],
+        &flight->p[1],     &flight->p[2],     &flight->p[3],     &flight->loss[0], &flight->loss[1],
+        &flight->loss[2],  &flight->loss[3],  &flight->loss[4],  &flight->loss[5], &flight->loss[6],
+        &flight->input[0], &flight->input[1], &flight->input[2], &flight->input[3]};
+    const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
+    flight->block = calloc((count + 4) * n + 2, sizeof *flight->block);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    flight->gain_q = flight->block;
+    flight->gain_p = flight->block + n;
+    flight->start = flight->block + 2 * n;
     for (size_t i = 0; i < count; i++)
-        *arrays[i] = flight->block + i * n;
+        *arrays[i] = flight->block + (i + 4) * n + 2;
     flight->length = frame->interval;
-    for (size_t i = 0; i < n; i++)
+    make_ground(flight, frame->run->base);
+    for (size_t i = 0; i < n && count > 0; i++)
         make_mode(flight, frame, i);
     return STATUS_OK;
 }
 
 void frame_flight_clear(FrameFlight *flight) {
+    frame_dense_clear(&flight->dense);
     free(flight->block);
+}
+
+// out += matrix y, column after column.
+static void add_columns(const double *matrix, size_t rows, const double *y, size_t size,
+                        double *out) {
+    for (size_t j = 0; j < size; j++)
+        for (size_t i = 0; i < rows; i++)
+            out[i] += matrix[j * rows + i] * y[j];
 }
 
 static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
     const double a = slice->value, b = slice->slope, *q = frame->q, *p = frame->p;
+    const size_t n = frame->storeys;
+    if (flight->dense.block != NULL) {
+        memcpy(flight->start, q, n * sizeof *q);
+        memcpy(flight->start + n, p, n * sizeof *p);
+        flight->start[2 * n] = a;
+        flight->start[2 * n + 1] = b;
+        memset(flight->gain_q, 0, 2 * n * sizeof *flight->gain_q); // and gain_p
+        add_columns(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
+        return;
+    }
     double *const *const row = flight->q, *const *const speed = flight->p;
-    for (size_t i = 0; i < frame->storeys; i++) {
+    for (size_t i = 0; i < n; i++) {
         flight->gain_q[i] = row[0][i] * q[i] + row[1][i] * p[i] + (row[2][i] * a + row[3][i] * b);
         flight->gain_p[i] =
             speed[0][i] * q[i] + speed[1][i] * p[i] + (speed[2][i] * a + speed[3][i] * b);
@@ -111,6 +146,16 @@ static bool is_clear(const FrameDamper *damper, double gained, double bend, doub
     const double least = sag - frame_room(damper, SIDE_LEFT);
     const double end = damper->r + gained;
     return damper->r < most && end < most && damper->r > least && end > least;
+}
+
+static void add_dense_work(const FrameFlight *flight, const Slice *slice, FrameWork *work) {
+    const FrameDense *dense = &flight->dense;
+    work->damping = 0;
+    for (size_t j = 0; j < dense->size; j++)
+        work->damping +=
+            flight->start[j] * frame_dot(dense->loss + j * dense->size, flight->start, dense->size);
+    work->input = -(slice->value * frame_dot(dense->input[0], flight->start, dense->size) +
+                    slice->slope * frame_dot(dense->input[1], flight->start, dense->size));
 }
 
 static void add_work(const FrameFlight *flight, const Frame *frame, const Slice *slice,
@@ -156,7 +201,10 @@ bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, Fr
                       length))
             return false;
     }
-    add_work(flight, frame, slice, work);
+    if (flight->dense.block != NULL)
+        add_dense_work(flight, slice, work);
+    else
+        add_work(flight, frame, slice, work);
     work->ground = speed;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];

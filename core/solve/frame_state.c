@@ -5,6 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/linear.h"
+
+static const double NEARLY = 1e-12;
+
 double frame_time(const Frame *frame) {
     return (double)frame->sample / frame->plan->sample_rate + frame->offset;
 }
@@ -208,7 +212,7 @@ static void make_damper(Frame *frame, size_t d) {
 static void make_damping(Frame *frame) {
     const size_t n = frame->storeys;
     frame->damping = frame->modes->damping;
-    double rows = 0, squares = 0, lowest = 0;
+    double rows = 0, squares = 0, lowest = 0, largest = 0;
     for (size_t i = 0; i < n; i++) {
         const double own = frame->damping[i * n + i];
         double sum = 0;
@@ -218,10 +222,13 @@ static void make_damping(Frame *frame) {
         }
         rows = fmax(rows, sum);
         lowest = fmin(lowest, own - (sum - fabs(own))); // Gershgorin
+        largest = fmax(largest, own);
         frame->diagonal[i] = own;
     }
     frame->viscous = fmin(rows, sqrt(squares));
-    frame->growth = -lowest;
+    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
+    frame->growth =
+        linear_find_indefinite(n, frame->damping, NEARLY) == 0 ? NEARLY * largest : -lowest;
     if (!frame->modes->is_classical)
         frame->diagonal = NULL;
 }

@@ -54,6 +54,21 @@ static void decision_print(const Decision *decision) {
     putchar('\n');
 }
 
+enum { MODES_SHOWN = 12 };
+
+static void modes_print(const PlanModes *modes) {
+    puts("\nModes");
+    for (size_t i = 0; i < modes->count && i < MODES_SHOWN; i++) {
+        printf("  %zu: %.6g Hz", i + 1, modes->at[i].frequency);
+        if (!isnan(modes->at[i].damping_ratio))
+            printf(", damping ratio %.4g", modes->at[i].damping_ratio);
+        putchar('\n');
+    }
+    if (modes->count > MODES_SHOWN)
+        printf("  and %zu more, to %.6g Hz\n", modes->count - MODES_SHOWN,
+               modes->at[modes->count - 1].frequency);
+}
+
 static void plan_print(const char *path, const DryRun *run) {
     const Scene *scene = &run->simulation.scene;
     char duration[32], rate[32];
@@ -70,6 +85,8 @@ static void plan_print(const char *path, const DryRun *run) {
         puts("\nDecisions");
     for (size_t i = 0; i < run->plan.decisions.count; i++)
         decision_print(&run->plan.decisions.at[i]);
+    if (run->plan.modes.count > 0)
+        modes_print(&run->plan.modes);
     if (run->plan.derived.count > 0)
         puts("\nStops");
     for (size_t i = 0; i < run->plan.derived.count; i++)

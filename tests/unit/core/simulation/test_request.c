@@ -400,6 +400,19 @@ static void implausible_values_get_a_warning_each(void **state) {
     simulation_clear(&simulation);
 }
 
+static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_choose(&simulation.scene.excitation, &excitation_kinds, "half_sine");
+    *(double *)variant_member(simulation.scene.excitation, "amplitude") = 1;
+    *(double *)variant_member(simulation.scene.excitation, "length") = 1e-3;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(warnings.count, 1);
+    assert_begins(warning_at("/excitation/length"), "is 0.001 s, less than two samples");
+    simulation_clear(&simulation);
+}
+
 static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) {
     (void)state;
     Simulation simulation;
@@ -442,6 +455,7 @@ int main(void) {
         cmocka_unit_test(titles_and_labels_have_their_limits),
         cmocka_unit_test(sixty_four_dampers_are_the_most),
         cmocka_unit_test(implausible_values_get_a_warning_each),
+        cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),
         cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
         cmocka_unit_test(accuracy_is_chosen_by_its_solver),
     };
