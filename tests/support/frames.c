@@ -50,9 +50,11 @@ void frames_uniform(Plan *plan, double mass, double stiffness, double damping_ra
     for (size_t i = 0; i < n; i++) {
         values[i] = mass;
         values[n + i] = stiffness;
-        values[2 * n + i] = 2 * damping_ratio / first * stiffness;
+        values[2 * n + i] = 2 * damping_ratio / (11 * first) * stiffness;
     }
     frames_shear(plan, values, values + n, values + 2 * n);
+    for (size_t i = 0; i < n; i++)
+        plan->damping[i * n + i] += 2 * damping_ratio * 10 * first / 11 * mass;
     free(values);
 }
 

@@ -11,7 +11,8 @@ Plan *frames_new(size_t storeys, size_t dampers, double duration, double sample_
 // Storey 1 at the ground, storey j on a spring k_j and a dashpot c_j.
 void frames_shear(Plan *plan, const double *mass, const double *stiffness, const double *damping);
 
-// Equal storeys, damped by xi in the first mode and the more the faster a mode is.
+// Equal storeys with Rayleigh damping, of this ratio in the first mode and at ten times its
+// frequency.
 void frames_uniform(Plan *plan, double mass, double stiffness, double damping_ratio);
 
 // A damper whose two buffers are alike; effective_mass is for a diagonal mass matrix. A contact

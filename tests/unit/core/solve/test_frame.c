@@ -144,7 +144,7 @@ static void free_vibration_without_dampers_is_the_closed_form(void **state) {
         const double first = 2 * sqrt(2000 / 3.0) * sin(half);
         const double angle = (double)(2 * k + 1) * half;
         const double omega = 2 * sqrt(2000 / 3.0) * sin(angle);
-        const double decay = 0.01 / first * omega * omega;
+        const double decay = 0.01 * (10 * first + omega * omega / first) / 11;
         const double turn = sqrt(omega * omega - decay * decay);
         double shape[6];
         for (size_t j = 0; j < n; j++)
