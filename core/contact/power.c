@@ -69,16 +69,32 @@ static long double by_reach(long double S, long double D) {
     return end_side(S) - (D - log1pl(D));
 }
 
-static long double end_of(double D) {
-    return bisect(by_reach, D, 0, 1 + (long double)D);
+// A(x) / x^2
+static long double half_rest(long double x) {
+    return 0.5L - x * cubic_rest(x);
+}
+
+// e and S of a contact; S by itself cancels where D is small.
+static void reach(double D, double *e, double *S) {
+    if (D > 0.1) {
+        const long double end = bisect(by_reach, D, 0, 1 + (long double)D);
+        *S = (double)end;
+        *e = (double)(-expm1l(-end) / D);
+        return;
+    }
+    // e^2 A(-D e) / (D e)^2 = A(D) / D^2, each time D / 3 nearer.
+    long double found = 1;
+    for (int i = 0; i < 24; i++)
+        found = sqrtl(half_rest(D) / half_rest(-found * D));
+    *e = (double)found;
+    *S = (double)-log1pl(-found * D);
 }
 
 double power_reached(double D, double exponent) {
+    double e, S;
     (void)exponent;
-    // Below this 1 - e = (2/3) D to rounding.
-    if (D < 1e-8)
-        return 1 - 2 * D / 3;
-    return (double)(-expm1l(-end_of(D)) / D);
+    reach(D, &e, &S);
+    return e;
 }
 
 typedef struct Half {
@@ -121,9 +137,9 @@ static double moment(const void *context, double u, double rest) {
 }
 
 double power_duration(double D, double exponent) {
-    const double e = power_reached(D, exponent);
+    double e, S;
+    reach(D, &e, &S);
     const bool is_damped = D > 0;
-    const double S = !is_damped ? 0 : D < 1e-8 ? -log1p(-e * D) : (double)end_of(D);
     Half half = {.n = exponent, .D = D, .e = e, .b = exp(-S), .end = S};
     half.length = is_damped ? log1p(D) / D : 1;
     const double coming = quadrature_unit(moment, &half);

@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -195,6 +196,103 @@ static void losses_are_those_of_the_speeds(void **state) {
     }
 }
 
+// Each impact of a run keeps to the table at its own approach speed: two free bodies meet again and
+// again, slower each time.
+static void impacts_keep_to_the_table_at_their_speed(void **state) {
+    (void)state;
+    static const char *const models[] = {"spring_damper", "hunt_crossley", "impulse"};
+    for (size_t i = 0; i < COUNT(models); i++) {
+        const Pair pair = {models[i], 0, 0.5, NAN, NAN, NAN, NAN, 1, NAN};
+        Simulation simulation;
+        pair_scene(&simulation, &pair);
+        Buffer *buffer = &simulation.scene.dampers.at[0].buffer;
+        buffer->table.count = 3;
+        buffer->table.at = calloc(3, sizeof *buffer->table.at);
+        assert_non_null(buffer->table.at);
+        buffer->table.at[0] = (ContactRow){0.1, 0.9, 0.001};
+        buffer->table.at[1] = (ContactRow){0.4, 0.7, 0.003};
+        buffer->table.at[2] = (ContactRow){0.8, 0.5, 0.002};
+        Response response = {0};
+        Plan *plan;
+        run(&simulation, &response, &plan);
+        assert_false(plan_is_single(plan));
+        assert_true(response.impacts.count > 5);
+        for (size_t k = 0; k < response.impacts.count; k++) {
+            const Impact *impact = &response.impacts.at[k];
+            const ContactRow row = contact_row(&buffer->table, impact->approach_speed);
+            if (isnan(impact->duration))
+                continue;
+            assert_near(&pair, "restitution", impact->restitution, row.restitution, 1e-10);
+            if (plan->form != CONTACT_IMPULSIVE)
+                assert_near(&pair, "duration", impact->duration, row.contact_time, 1e-10);
+        }
+        plan_free(plan);
+        response_clear(&response);
+        simulation_clear(&simulation);
+    }
+}
+
+static void a_rigs_contact_is_that_of_its_masses(void **state) {
+    (void)state;
+    for (int rule = 0; rule < 2; rule++) {
+        const Pair pair = {"spring_damper", rule, 0.082, 0.61, 0.025, NAN, NAN, 0.3, 0.3};
+        Derived derived;
+        double residual;
+        const Impact impact = meet(&pair, &derived, &residual);
+        const Identified there = identify_measured(0.3, 0.61, 0.025, (Separation)rule);
+        assert_true(derived.stiffness == there.stiffness && derived.damping == there.damping);
+        assert_true(derived.identified_mass == 0.3 && derived.restitution == 0.61);
+        // A lighter pair is damped more.
+        assert_true(derived.reached_restitution < 0.5 && derived.reached_contact_time < 0.02);
+        assert_near(&pair, "restitution", impact.restitution, derived.reached_restitution, 1e-12);
+        assert_near(&pair, "duration", impact.duration, derived.reached_contact_time, 1e-12);
+    }
+    for (size_t law = 0; contacts[law] != NULL; law++) {
+        if (contacts[law]->form != CONTACT_POWER || contacts[law]->factor == NULL)
+            continue;
+        const Pair pair = {contacts[law]->kind.name, 0, 0.082, 0.61, 0.025, NAN, NAN, 0.3, 0.3};
+        Derived derived;
+        double residual;
+        const Impact impact = meet(&pair, &derived, &residual);
+        assert_near(&pair, "restitution", impact.restitution, derived.reached_restitution, 1e-9);
+        assert_near(&pair, "duration", impact.duration, derived.reached_contact_time, 1e-9);
+    }
+}
+
+// Hertz with n = 1 is a spring without damping, whose motion the single engine knows exactly.
+static void a_linear_power_law_moves_as_a_spring(void **state) {
+    (void)state;
+    Response responses[2];
+    memset(responses, 0, sizeof responses);
+    for (int power = 0; power < 2; power++) {
+        Simulation simulation;
+        Plan *plan;
+        scene_with_damper(&simulation, NAN, NAN);
+        simulation.scene.duration = 1.5;
+        scene_choose(&simulation.scene.contact, &contact_kinds, power ? "hertz" : "spring_damper");
+        Buffer *buffer = &simulation.scene.dampers.at[0].buffer;
+        buffer->stiffness = 3e3;
+        if (power)
+            buffer->exponent = 1;
+        else
+            buffer->damping = 0;
+        run(&simulation, &responses[power], &plan);
+        assert_true(responses[power].energy.residual < 1e-11);
+        plan_free(plan);
+        simulation_clear(&simulation);
+    }
+    const Impacts *spring = &responses[0].impacts, *hertz = &responses[1].impacts;
+    assert_true(spring->count > 5);
+    assert_int_equal(spring->count, hertz->count);
+    for (size_t k = 0; k < spring->count; k++) {
+        assert_true(fabs(spring->at[k].start - hertz->at[k].start) < 1e-10);
+        assert_true(fabs(spring->at[k].peak_force / hertz->at[k].peak_force - 1) < 1e-8);
+        assert_true(fabs(spring->at[k].impulse / hertz->at[k].impulse - 1) < 1e-8);
+    }
+    response_clear(&responses[0]);
+    response_clear(&responses[1]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(linear_contacts_come_back_under_both_rules),
@@ -202,6 +300,9 @@ int main(void) {
         cmocka_unit_test(hunt_and_crossleys_exact_factor_gives_the_restitution_asked_for),
         cmocka_unit_test(hertz_meets_its_closed_forms),
         cmocka_unit_test(losses_are_those_of_the_speeds),
+        cmocka_unit_test(impacts_keep_to_the_table_at_their_speed),
+        cmocka_unit_test(a_rigs_contact_is_that_of_its_masses),
+        cmocka_unit_test(a_linear_power_law_moves_as_a_spring),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
