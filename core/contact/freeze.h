@@ -53,6 +53,6 @@ ContactRow contact_row(const ContactRows *rows, double approach_speed);
 // take no less than CONTACT_SPEED_LEAST.
 ContactParameters contact_freeze(const ContactStop *stop, double approach_speed);
 
-#define CONTACT_SPEED_LEAST 1e-9 // [m/s]
+#define CONTACT_SPEED_LEAST 1e-6 // [m/s]
 
 #endif

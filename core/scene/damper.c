@@ -98,6 +98,20 @@ static Status check_position(const Damper *damper, const char *pointer, Problem 
                             is);
 }
 
+// A power law's parameters are those of an approach speed; between stops that always touch there is
+// none.
+static Status check_clearance(const Damper *damper, const ContactLaw *law, const char *pointer,
+                              Problem *problem) {
+    if (law->form != CONTACT_POWER || damper->clearance != 0)
+        return STATUS_OK;
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, "clearance");
+    return problem_add_real(problem, STATUS_INVALID, place, 0, "m",
+                            "must be above 0 m for the contact model %s, is 0: its parameters are "
+                            "those of an approach speed (spring_damper and impulse allow 0)",
+                            law->kind.name);
+}
+
 // A sum of finite numbers may not be finite.
 static Status check_stops(const Damper *damper, const char *pointer, Problem *problem) {
     const double furthest = fabs(damper->offset) + damper->clearance;
@@ -186,6 +200,7 @@ Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, co
     const Status faults[] = {
         check_position(damper, pointer, problem),
         check_stops(damper, pointer, problem),
+        check_clearance(damper, law, pointer, problem),
         check_storey(damper, storeys, pointer, problem),
         check_buffers(damper, law, pointer, problem),
         check_rig(damper, law, pointer, problem),

@@ -16,7 +16,7 @@
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
-enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64 };
+enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
 
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
 
@@ -135,6 +135,7 @@ static Status press(Engine *engine, const Slice *slice, double length) {
     frame_record_note(frame);
     if (step.is_event)
         TRY(happen(engine, &step.event));
+    frame->run->steps += PRESS_STEPS; // it takes as long as so many arcs
     return count_step(engine, PRESS_WORK);
 }
 
