@@ -37,7 +37,7 @@ void arc_base_series(double *base, size_t degree, const Slice *slice, double len
 void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
               double length) {
     arc->length = length;
-    arc->rho = length * motion->rate;
+    arc->rho = length * fmax(motion->rate, slice->omega);
     arc->degree = arc_degree(arc->rho);
     arc_base_series(arc->base, arc->degree, slice, length);
     const double square = length * length;

@@ -28,7 +28,7 @@ typedef struct Motion {
     double contact_omega2;  // k / m_e [1/s^2], 0 in flight
     double contact_damping; // c / m_e [1/s]
     bool is_resting;
-    double rate; // no eigenvalue of the system, base included, is larger [1/s]
+    double rate; // no eigenvalue of the system, without the base, is larger [1/s]
 } Motion;
 
 // The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope
@@ -42,7 +42,7 @@ typedef struct Slice {
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct Arc {
     double length; // [s]
-    double rho;    // length * rate, at most 1
+    double rho;    // length * rate, the base's included, at most 1
     size_t degree; // of x and r; push and force have one less
     double x[ROOT_DEGREE + 1], r[ROOT_DEGREE + 1];
     double push[ROOT_DEGREE + 1];  // s length^2
@@ -57,7 +57,7 @@ typedef struct ArcIntegrals {
     double a;      // of a_g [m/s]
 } ArcIntegrals;
 
-// length * motion->rate must be at most 1.
+// length * motion->rate and length * slice->omega must be at most 1.
 void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
               double length);
 

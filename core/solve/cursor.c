@@ -40,16 +40,19 @@ static double piece_slice(const BaseCursor *cursor, size_t n, double offset, Sli
     const Base *base = cursor->base;
     const double sample = (double)n / cursor->sample_rate;
     const double clock = 8 * DBL_EPSILON * (sample + offset); // nearer is as good as there
-    *slice = (Slice){0, 0, base->omega};
+    *slice = (Slice){0, 0, 0};
     for (size_t i = 0; i < base->piece_count; i++) {
         const BasePiece *piece = &base->pieces[i];
         const double since = sample - piece->time + offset;
         if (since < -clock)
             return -since;
         const double t = fmax(since, 0), cosine = cos(base->omega * t), sine = sin(base->omega * t);
-        *slice = base->omega > 0 ? (Slice){piece->value * cosine + piece->slope * sine,
-                                           piece->slope * cosine - piece->value * sine, base->omega}
-                                 : (Slice){piece->value + piece->slope * t, piece->slope, 0};
+        const bool is_still = piece->value == 0 && piece->slope == 0;
+        *slice = is_still ? (Slice){0, 0, 0}
+                 : base->omega > 0
+                     ? (Slice){piece->value * cosine + piece->slope * sine,
+                               piece->slope * cosine - piece->value * sine, base->omega}
+                     : (Slice){piece->value + piece->slope * t, piece->slope, 0};
     }
     return INFINITY;
 }

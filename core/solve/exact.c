@@ -81,7 +81,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     if (held == NULL) {
         if ((held = exact->holds[exact->side] = calloc(1, sizeof *held)) == NULL)
             return false;
-        hold_make(held, &exact->touching[exact->side], slice->omega, exact->interval);
+        hold_make(held, &exact->touching[exact->side], exact->run->base->omega, exact->interval);
     }
     const double mass = exact_effective_mass(exact);
     State end;
@@ -110,7 +110,7 @@ static Status advance(Exact *exact, double length) {
     if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
         hold(exact, &slice, length))
         return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
-    length = fmin(length, 1 / system->rate);
+    length = fmin(length, 1 / fmax(system->rate, slice.omega));
     Arc arc;
     arc_make(&arc, system, &exact->state, &slice, length);
     double s;
@@ -205,7 +205,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
                      .damping = plan->damping[0] / plan->mass[0],
                      .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
-    flying.rate = fmax(fmax(own, run->base->omega), 1e-300);
+    flying.rate = fmax(own, 1e-300);
     exact->flying = exact->resting = flying;
     exact->resting.is_resting = true;
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->damper_count > 0; side++) {
@@ -243,7 +243,7 @@ static Status settle(Exact *exact) {
         Side side;
         (void)base_cursor_slice(&exact->base, 0, 0, &slice);
         arc_make(&arc, exact_motion(exact), &exact->state, &slice,
-                 fmin(exact->interval, 1 / exact_motion(exact)->rate));
+                 fmin(exact->interval, 1 / fmax(exact_motion(exact)->rate, slice.omega)));
         is_event = exact->phase == FLIGHT && exact_find_event(exact, &arc, &s, &side) && s == 0;
         if (is_event)
             exact_touch(exact, side);

@@ -214,7 +214,7 @@ static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *p
     Work work = {.frame = frame,
                  .n = n,
                  .size = size,
-                 .is_sine = frame->run->base->form == BASE_SINE,
+                 .is_sine = frame->run->base->omega > 0,
                  .omega = frame->run->base->omega,
                  .h = frame->interval};
     work.T = room;
@@ -242,7 +242,7 @@ static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *p
 Status frame_dense_make(FrameDense *dense, const Frame *frame, Problem *problem) {
     const size_t n = frame->storeys, size = 2 * n + 2, square = size * size;
     memset(dense, 0, sizeof *dense);
-    if (frame->plan->count < WORTH * n)
+    if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
         return STATUS_OK;
     Real *room =
         malloc((3 * square + 2 * size + (1 + TERMS) * n + NODES * size * n) * sizeof *room);

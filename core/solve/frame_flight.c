@@ -15,7 +15,7 @@ enum { Q, P, A, B, SIZE };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
 static void make_ground(FrameFlight *flight, const Base *base) {
-    const bool is_sine = base->form == BASE_SINE;
+    const bool is_sine = base->omega > 0;
     long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
     system[VALUE * GROUND + SLOPE] = is_sine ? base->omega : 1;
     system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)base->omega : 0;
@@ -31,7 +31,7 @@ static void make_ground(FrameFlight *flight, const Base *base) {
 static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     const long double share = frame->modes->participation[i], damping = frame->diagonal[i];
     const double omega = frame->run->base->omega;
-    const bool is_sine = frame->run->base->form == BASE_SINE;
+    const bool is_sine = frame->run->base->omega > 0;
     long double system[SIZE * SIZE] = {0};
     system[Q * SIZE + P] = 1;
     system[P * SIZE + Q] = -(long double)frame->omega2[i];

@@ -186,13 +186,17 @@ void frame_hold_make(Frame *frame) {
     }
 }
 
-// (M^-1)_jk from the modes.
+// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a mass
+// that rests on another.
 static double mobility(const Modes *modes, size_t j, size_t k) {
-    long double sum = 0;
-    for (size_t i = 0; i < modes->count; i++)
-        sum +=
-            (long double)modes->shapes[j * modes->count + i] * modes->shapes[k * modes->count + i];
-    return (double)sum;
+    const double *a = modes->shapes + j * modes->count, *b = modes->shapes + k * modes->count;
+    long double sum = 0, size = 0;
+    for (size_t i = 0; i < modes->count; i++) {
+        const long double term = (long double)a[i] * b[i];
+        sum += term;
+        size += fabsl(term);
+    }
+    return fabsl(sum) <= 4 * DBL_EPSILON * size ? 0 : (double)sum;
 }
 
 static void make_damper(Frame *frame, size_t d) {

@@ -280,6 +280,23 @@ static void a_later_pulse_gives_the_same_motion_later(void **state) {
         }
 }
 
+// 1 ns of the area of a release speed; it must not make the contacts after it any dearer.
+static void a_pulse_far_shorter_than_all_else_is_a_release(void **state) {
+    (void)state;
+    Simulation simulation;
+    record_scene(&simulation, false, false, 1000);
+    pulse(&simulation, "half_sine", (double)(PI / 2 * 0.3e9L), 0, 1e-9);
+    Outcome *one = run(&simulation);
+    record_scene(&simulation, false, false, 1000);
+    scene_start(&simulation, 0, -0.3);
+    Outcome *other = run(&simulation);
+    assert_true(one->summary.impacts > 3 && one->summary.impacts == other->summary.impacts);
+    assert_true(one->summary.energy_residual < 1e-12);
+    assert_true(parted(one, other, 1, 0) < 1e-6);
+    outcome_drop(one);
+    outcome_drop(other);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pulses_between_the_samples_are_met_to_rounding),
@@ -288,6 +305,7 @@ int main(void) {
         cmocka_unit_test(a_record_on_another_grid_gives_the_same_motion),
         cmocka_unit_test(the_balance_closes_under_a_base_far_faster_than_the_structure),
         cmocka_unit_test(pulses_are_what_other_kinds_make_of_them),
+        cmocka_unit_test(a_pulse_far_shorter_than_all_else_is_a_release),
         cmocka_unit_test(a_later_pulse_gives_the_same_motion_later),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

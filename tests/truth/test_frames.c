@@ -16,11 +16,11 @@
 #include "tests/support/frames.h"
 #include "tests/truth/frame_reference.h"
 
-static size_t scenes = 24;
+static size_t scenes = 16;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 
-static const double STEPS_MOST = 30000;
+static const double STEPS_MOST = 15000;
 static const double FLOOR = 1e-11;   // what is always allowed
 static const double FACTOR = 100;    // of what one last digit changes
 static const double CHAOTIC = 1e-11; // a scene that a last digit changes more is not judged

@@ -44,7 +44,7 @@ static Status check(const Matrix *matrix) {
 static void rows_are_copied_deeply_and_cleared(void **state) {
     (void)state;
     double first[] = {1, 2}, second[] = {3};
-    Matrix copy, matrix = matrix_of(3, (Reals[]){{first, 2}, {NULL, 0}, {second, 1}});
+    Matrix copy, matrix = matrix_of(3, (Reals[]){{first, 2}, {first, 0}, {second, 1}});
     assert_int_equal(fields_copy(fields, &matrix, &copy), STATUS_OK);
     matrix.entries.at[0].at[1] = 5;
     assert_true(copy.entries.count == 3 && copy.entries.at[0].at[1] == 2);
@@ -91,7 +91,7 @@ static void the_canonical_form_tells_rows_apart(void **state) {
     double numbers[] = {1, 2, 3};
     const Reals shapes[3][3] = {{{numbers, 2}, {numbers + 2, 1}},
                                 {{numbers, 1}, {numbers + 1, 2}},
-                                {{numbers, 3}, {NULL, 0}}};
+                                {{numbers, 3}, {numbers, 0}}};
     Gathered forms[3] = {0};
     for (size_t i = 0; i < 3; i++) {
         Matrix matrix = matrix_of(2, shapes[i]);

@@ -133,6 +133,25 @@ static void the_start_is_a_list_of_each_storey(void **state) {
                     "/excitation/velocity", "must have 1 number, one per storey, has 2");
 }
 
+static void rates_are_near_the_first_and_the_last_frequency(void **state) {
+    (void)state;
+    // Equal storeys swing at 2 sqrt(k / m) sin((2 k - 1) pi / (2 (2 n + 1))).
+    Simulation simulation;
+    document_pass(&simulation, "\"structure\": {\"kind\": \"frame\", \"masses\": [2, 2, 2, 2, 2], "
+                               "\"stiffnesses\": [800, 800, 800, 800, 800]}");
+    StructureRates rates;
+    const Structure *structure = scene_structure(&simulation.scene);
+    assert_int_equal(structure_rates(structure, &rates), STATUS_OK);
+    const double half = acos(-1) / 22;
+    assert_true(fabs(rates.slowest / (40 * sin(half)) - 1) < 0.01);
+    assert_true(rates.fastest >= 40 * sin(9 * half) && rates.fastest < 41);
+    simulation_clear(&simulation);
+    document_pass(&simulation, FRAME("\"stiffnesses\": [0, 20, 30], \"damping_ratio\": 50"));
+    assert_int_equal(structure_rates(scene_structure(&simulation.scene), &rates), STATUS_OK);
+    assert_true(rates.slowest == 0 && rates.fastest > 100);
+    simulation_clear(&simulation);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(matrices_follow_the_storeys_from_the_ground_up),
@@ -142,6 +161,7 @@ int main(void) {
         cmocka_unit_test(two_hundred_storeys_are_the_most),
         cmocka_unit_test(a_damper_stands_on_a_storey_there_is),
         cmocka_unit_test(the_start_is_a_list_of_each_storey),
+        cmocka_unit_test(rates_are_near_the_first_and_the_last_frequency),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
