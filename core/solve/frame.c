@@ -32,11 +32,12 @@ typedef struct Engine {
 static Status keep_going(Engine *engine) {
     const Frame *frame = &engine->frame;
     engine->work = 0;
-    double sum = 0;
+    const EnergyState energy = frame_energy(frame);
+    double sum = energy.kinetic + energy.strain;
     for (size_t i = 0; i < frame->storeys; i++)
-        sum += fabs(frame->q[i]) + fabs(frame->p[i]);
+        sum += fabs(frame->q[i]);
     for (size_t d = 0; d < frame->dampers; d++)
-        sum += fabs(frame->damper[d].r) + fabs(frame->damper[d].w);
+        sum += fabs(frame->damper[d].r);
     if (!isfinite(sum))
         return problem_set(frame->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",

@@ -162,6 +162,36 @@ static void free_vibration_without_dampers_is_the_closed_form(void **state) {
     }
 }
 
+// Few samples go by arcs, many by whole intervals made beforehand.
+static void whole_intervals_are_as_exact_as_arcs(void **state) {
+    (void)state;
+    double values[30];
+    for (size_t i = 0; i < 30; i++)
+        values[i] = sin((double)(i * i));
+    const Base bases[] = {still,
+                          {.form = BASE_SAMPLED, .values = values, .count = 30, .interval = 0.02},
+                          {.form = BASE_SINE, .amplitude = 1, .omega = 40}};
+    for (size_t b = 0; b < 3; b++) {
+        Plan *plan = frames_new(5, 0, 10, 100);
+        frames_uniform(plan, 3, 2000, 0.02);
+        plan->damping[0] *= 7; // couples the modes
+        plan->displacement[4] = 0.01;
+        Answer many = run(frame_run, plan, &bases[b]);
+        plan->count = 100;
+        plan->duration = 0.99;
+        Answer few = run(frame_run, plan, &bases[b]);
+        for (size_t j = 0; j < 5; j++)
+            for (int channel = 0; channel < 3; channel++)
+                assert_true(difference(of_storey(&many, channel, j), of_storey(&few, channel, j),
+                                       100) < 1e-13);
+        assert_true(many.response.energy.residual < 1e-13);
+        assert_true(few.response.energy.residual < 1e-13);
+        answer_clear(&many);
+        answer_clear(&few);
+        plan_free(plan);
+    }
+}
+
 static Plan *shaken_frame(size_t dampers, bool is_impulse, double split) {
     Plan *plan = frames_new(4, dampers, 6, 500);
     frames_uniform(plan, 10, 8000, 0.02);
@@ -333,6 +363,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_papers_scenes_are_those_of_the_single_engine),
         cmocka_unit_test(free_vibration_without_dampers_is_the_closed_form),
+        cmocka_unit_test(whole_intervals_are_as_exact_as_arcs),
         cmocka_unit_test(two_halves_of_a_damper_move_as_the_whole),
         cmocka_unit_test(a_mirrored_scene_has_the_mirrored_answer),
         cmocka_unit_test(a_storey_on_an_unmoved_one_is_a_structure_by_itself),
