@@ -13,7 +13,7 @@ static void report_parameters(const ContactStop *stop, double mass, Derived *der
     derived->contact_time = stop->numbers.contact_time;
     derived->stiffness =
         stop->law->form == CONTACT_POWER ? stop->numbers.stiffness : own->stiffness;
-    derived->damping = own->damping;
+    derived->damping = stop->law->form == CONTACT_POWER ? (double)NAN : own->damping;
     derived->exponent = own->exponent;
     derived->damping_ratio = derived->factor = (double)NAN;
     derived->reached_restitution = derived->reached_contact_time = (double)NAN;
