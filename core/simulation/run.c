@@ -141,8 +141,18 @@ static void summarize(Outcome *outcome) {
                   .impacts = impacts,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
-                  .error_estimate = NAN,
-                  .trust_horizon = NAN};
+                  .error_estimate = response->has_trust ? response->error_estimate : NAN,
+                  .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
+}
+
+static Status warn_of_horizon(Outcome *outcome, Problem *problem) {
+    if (isnan(outcome->summary.trust_horizon) ||
+        warnings_add(&outcome->warnings, "/duration",
+                     "the run goes on beyond t = %.6g s: there rounding has moved the displacement "
+                     "by %g of its largest value, and from there on only statistics hold",
+                     outcome->summary.trust_horizon, RESPONSE_PARTING) == STATUS_OK)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
 }
 
 // Finite inputs can still be too large for their products.
@@ -188,6 +198,7 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     summarize(outcome);
     TRY(check_finite(outcome, problem));
+    TRY(warn_of_horizon(outcome, problem));
     TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
@@ -229,6 +240,7 @@ void outcome_drop(Outcome *outcome) {
     fields_clear(plan_report_fields, &outcome->plan);
     response_clear(&outcome->response);
     spectrum_clear(&outcome->spectrum);
+    warnings_clear(&outcome->warnings);
     free(outcome);
 }
 
@@ -241,13 +253,17 @@ size_t outcome_bytes(const Outcome *outcome) {
 }
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
-// shows that the stops are out of reach.
-static double flight_arcs(const Scene *scene, double structure) {
+// shows that the stops are out of reach, and coupled modes have no closed form for a whole
+// interval.
+static double flight_arcs(const Scene *scene, double fastest) {
     const Excitation *excitation = scene_excitation(scene);
-    double rate = structure;
+    double rate = fastest;
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
+    const Structure *structure = scene_structure(scene);
+    const bool is_by_arcs = scene->dampers.count > 0 ||
+                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
+    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
 }
 
 // A frame's sample is a step for each mode and each damper, or a product with a matrix where

@@ -75,10 +75,12 @@ struct Outcome {
     Response response; // response.series holds output.channels in that order
     Spectrum spectrum; // of output.psd; empty where none was asked for
     Summary summary;
+    Warnings warnings; // what only the run could tell
 };
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
-// at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold. The Outcome
+// at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
+// comes out of nothing. The Outcome
 // is the caller's one hold on it, freed by the last outcome_drop.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Watch *watch, Outcome **outcome, Problem *problem);

@@ -12,6 +12,7 @@
 // contacts keep their digits late in a run.
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -193,7 +194,7 @@ static Status cross(Exact *exact, double length) {
 
 static Status prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
     const Plan *plan = run->plan;
-    memset(exact, 0, sizeof *exact);
+    memset(exact, 0, offsetof(Exact, trust));
     exact->run = run;
     exact->plan = plan;
     exact->damper = plan->dampers;
@@ -228,8 +229,11 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
                            exact->damper->velocity};
+    trust_start(&exact->trust, &exact->flying, exact->touching, &exact->resting, &exact->state,
+                exact->damper->clearance, run->base->form == BASE_SINE, plan->duration);
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
+    exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
     return STATUS_OK;
 }
@@ -279,6 +283,8 @@ static Status solve(Exact *exact) {
     // The duration may end between samples.
     TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
     exact_note(exact);
+    exact_end_phase(exact);
+    trust_tell(&exact->trust, exact->ledger.response);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
     return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);

@@ -12,4 +12,7 @@ void exact_touch(Exact *exact, Side side); // flight ends
 void exact_release(Exact *exact);          // contact or rest ends
 void exact_note(Exact *exact);             // takes peaks and the energy balance at this instant
 
+// Tells the estimate of what rounding does that the present phase ends, or the run.
+void exact_end_phase(Exact *exact);
+
 #endif

@@ -2,6 +2,9 @@
 // where bounds on the gaps' curvature prove that no stop can be reached (frame_flight.h);
 // everything else goes by arcs (frame_arc.h), whose polynomials locate events to rounding. Time is
 // a sample's number and an offset from it, so that short contacts keep their digits late in a run.
+//
+// How far the run can be trusted is told by a neighbour: the same run a few roundings away, sample
+// by sample beside it until the two have parted.
 #include "core/solve/frame.h"
 
 #include <float.h>
@@ -17,6 +20,10 @@
 #include "core/solve/frame_state.h"
 
 enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
+
+enum { NUDGE_SAMPLES = 16 };
+static const double NUDGE = 4 * DBL_EPSILON, POWER_NUDGE = 1e-12; // an integrated contact's error
+static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
 
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
 
@@ -227,20 +234,133 @@ static void take_sample(Engine *engine) {
     }
 }
 
-static Status solve(Engine *engine) {
+static Status step(Engine *engine) {
+    Frame *frame = &engine->frame;
+    if (fly(engine))
+        TRY(count_step(engine, FLIGHT_WORK));
+    else
+        TRY(cross(engine, frame->interval));
+    frame->sample++;
+    frame->offset = 0;
+    take_sample(engine);
+    return STATUS_OK;
+}
+
+static Status prepare(Engine *engine, Run *run, Response *response, Problem *problem) {
+    Frame *frame = &engine->frame;
+    TRY(frame_make(frame, run, problem));
+    TRY(frame_arc_room(&engine->arc, frame, problem));
+    TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, problem));
+    TRY(frame_record_start(&engine->record, frame, response, problem));
+    const EnergyState energy = frame_energy(frame);
+    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    frame->ledger.gain_most = LEDGER_GAIN_EXACT;
+    return STATUS_OK;
+}
+
+typedef struct Neighbour {
+    Engine engine;
+    Run run;
+    Response response;
+    bool is_spent;         // parted, or failed: nothing is left to follow
+    bool is_known;         // never failed
+    double largest, worst; // displacement, and difference of displacements, so far [m]
+    double horizon;        // [s]; NAN: not reached
+} Neighbour;
+
+static double nudge_of(const Frame *frame) {
+    return frame->plan->form == CONTACT_POWER ? POWER_NUDGE : NUDGE;
+}
+
+// Some roundings more, of either sign.
+static void nudge(Frame *frame) {
+    const double by = nudge_of(frame);
+    for (size_t i = 0; i < frame->storeys; i++) {
+        const double sign = (frame->sample / NUDGE_SAMPLES + i) % 2 == 0 ? 1 : -1;
+        frame->q[i] *= 1 + sign * by;
+        frame->p[i] *= 1 - sign * by;
+    }
+}
+
+static void compare(Neighbour *neighbour, const Frame *frame) {
+    double difference = 0;
+    for (size_t i = 0; i < frame->storeys; i++) {
+        neighbour->largest = fmax(neighbour->largest, fabs(frame->x[i]));
+        difference = fmax(difference, fabs(frame->x[i] - neighbour->engine.frame.x[i]));
+    }
+    neighbour->worst = fmax(neighbour->worst, difference);
+    if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
+        neighbour->horizon = (double)(frame->sample - 1) / frame->plan->sample_rate;
+    neighbour->is_spent = difference > PARTED * neighbour->largest;
+}
+
+static void step_neighbour(Neighbour *neighbour, const Frame *frame) {
+    if (neighbour->is_spent)
+        return;
+    if (frame->sample % NUDGE_SAMPLES == 0)
+        nudge(&neighbour->engine.frame);
+    if (step(&neighbour->engine) == STATUS_OK)
+        compare(neighbour, frame);
+    else
+        neighbour->is_spent = true, neighbour->is_known = false;
+}
+
+static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
+    memset(neighbour, 0, sizeof *neighbour);
+    neighbour->horizon = NAN;
+    neighbour->is_known = neighbour->is_spent = true;
+    if (frame->dampers == 0)
+        return;
+    neighbour->run = (Run){.plan = frame->plan,
+                           .base = frame->run->base,
+                           .impacts_most = frame->run->impacts_most,
+                           .steps_most = frame->run->steps_most};
+    Frame *own = &neighbour->engine.frame;
+    neighbour->is_known =
+        prepare(&neighbour->engine, &neighbour->run, &neighbour->response, NULL) == STATUS_OK;
+    if (!neighbour->is_known)
+        return;
+    own->ledger.gain_most = 0; // a nudge is a gain
+    nudge(own);
+    for (size_t d = 0; d < own->dampers; d++)
+        own->damper[d].r +=
+            (own->damper[d].r > 0 ? -1 : 1) * nudge_of(own) * own->damper[d].plan->clearance;
+    neighbour->is_known = settle(&neighbour->engine) == STATUS_OK;
+    neighbour->is_spent = !neighbour->is_known;
+    if (neighbour->is_known)
+        take_sample(&neighbour->engine);
+}
+
+static void tell(const Neighbour *neighbour, const Frame *frame, Response *response) {
+    const double size = fmax(neighbour->largest, response->peaks.displacement);
+    // A frequency's own rounding turns the phase.
+    const double drift = DBL_EPSILON * (1 + frame->rate * frame->plan->duration);
+    const double error = size > 0 ? fmax(neighbour->worst / size, drift) : 0;
+    response->has_trust = neighbour->is_known;
+    response->error_estimate = error < PARTED ? error : 1;
+    response->trust_horizon = neighbour->horizon;
+}
+
+static void clear(Engine *engine) {
+    frame_record_clear(&engine->record);
+    frame_flight_clear(&engine->flight);
+    frame_ode_clear(&engine->ode);
+    frame_arc_clear(&engine->arc);
+    frame_clear(&engine->frame);
+}
+
+static Status solve(Engine *engine, Neighbour *neighbour) {
     Frame *frame = &engine->frame;
     const Plan *plan = frame->plan;
     TRY(settle(engine));
     take_sample(engine);
+    start_neighbour(neighbour, frame);
     while (frame->sample + 1 < plan->count) {
-        if (fly(engine))
-            TRY(count_step(engine, FLIGHT_WORK));
-        else
-            TRY(cross(engine, frame->interval));
-        frame->sample++;
-        frame->offset = 0;
-        take_sample(engine);
+        TRY(step(engine));
+        step_neighbour(neighbour, frame);
     }
+    tell(neighbour, frame, frame->ledger.response);
     // The duration may end between samples.
     TRY(cross(engine, plan->duration - (double)frame->sample / plan->sample_rate));
     frame_record_note(frame);
@@ -257,30 +377,20 @@ static Status solve(Engine *engine) {
     return status;
 }
 
-static Status prepare(Engine *engine, Run *run, Response *response, Problem *problem) {
-    Frame *frame = &engine->frame;
-    TRY(frame_make(frame, run, problem));
-    TRY(frame_arc_room(&engine->arc, frame, problem));
-    TRY(frame_flight_make(&engine->flight, frame, problem));
-    TRY(frame_ode_make(&engine->ode, frame, problem));
-    TRY(frame_record_start(&engine->record, frame, response, problem));
-    const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
-    return STATUS_OK;
-}
-
 Status frame_run(Run *run, Response *response, Problem *problem) {
     Engine engine;
+    Neighbour *neighbour = calloc(1, sizeof *neighbour);
+    if (neighbour == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
     Status status = prepare(&engine, run, response, problem);
     if (status == STATUS_OK)
-        status = solve(&engine);
+        status = solve(&engine, neighbour);
     if (engine.record.block != NULL)
         frame_record_finish(&engine.record, &engine.frame, response);
-    frame_record_clear(&engine.record);
-    frame_flight_clear(&engine.flight);
-    frame_ode_clear(&engine.ode);
-    frame_arc_clear(&engine.arc);
-    frame_clear(&engine.frame);
+    clear(&engine);
+    clear(&neighbour->engine);
+    response_clear(&neighbour->response);
+    free(neighbour);
     return status;
 }

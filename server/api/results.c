@@ -11,6 +11,7 @@
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/http/reply.h"
+#include "server/jobs/documents.h"
 
 // The scene as it was run, read back from its canonical JSON. Cleared by simulation_clear in any
 // case.
@@ -92,9 +93,9 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     }
     bytes_text(bytes, "], \"sample_rate\": ");
     bytes_real(bytes, row->sample_rate);
-    bytes_format(bytes,
-                 ", \"count\": %llu, \"warnings\": %s, \"links\": ", (unsigned long long)row->count,
-                 json_or(row->warnings, "[]"));
+    bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
+    document_join(bytes, row->warnings, row->notes);
+    bytes_text(bytes, ", \"links\": ");
     write_links(bytes, row->id);
     bytes_text(bytes, "}\n");
 }

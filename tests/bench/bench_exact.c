@@ -10,7 +10,7 @@
 
 // CPU of simulation_run as a whole [us]; 0, and a line printed, if it fails.
 static double scene_us(bool is_random, bool has_channels, double duration) {
-    enum { RUNS = 200 };
+    enum { RUNS = 50 };
     Simulation simulation;
     Problem problem;
     problem_clear(&problem);

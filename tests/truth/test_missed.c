@@ -20,6 +20,7 @@ static uint64_t seed = 1;
 static void short_scene(ReferenceScene *scene, size_t i) {
     Draws draws = {seed * 7919 + i};
     drawn_scene(scene, seed * 1000003 + i, draws_uniform(&draws, 0.5, 2));
+    drawn_zero_force(scene, seed * 1000003 + i);
 }
 
 static void no_impact_is_missed(void **state) {
