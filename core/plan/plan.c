@@ -3,43 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Identified identify(const Plan *plan, double mass, const Buffer *buffer) {
-    if (plan->form == CONTACT_LINEAR)
-        return isnan(buffer->stiffness)
-                   ? identify_measured(mass, buffer->restitution, buffer->contact_time)
-                   : identify_given(mass, buffer->stiffness,
-                                    isnan(buffer->damping) ? 0 : buffer->damping);
-    return (Identified){.effective_mass = mass,
-                        .restitution = buffer->restitution,
-                        .contact_time = NAN,
-                        .stiffness = NAN,
-                        .damping = NAN,
-                        .damping_ratio = NAN};
-}
-
-// The stops' parameters of one damper, into the plan and its report.
-static Status derive(Plan *plan, size_t index, const Damper *damper) {
-    DerivedList *list = &plan->report.derived;
-    PlanDamper *planned = &plan->dampers[index];
-    for (int side = 0; side < 2; side++) {
-        const Buffer *buffer = damper_buffer(damper, (Side)side);
-        const Identified identified = identify(plan, planned->effective_mass, buffer);
-        planned->stops[side] =
-            (PlanStop){identified.restitution, identified.stiffness, identified.damping};
-        Derived *derived = &list->at[list->count++];
-        *derived = (Derived){.damper = index + 1,
-                             .side = side,
-                             .restitution = identified.restitution,
-                             .contact_time = identified.contact_time,
-                             .effective_mass = identified.effective_mass,
-                             .stiffness = identified.stiffness,
-                             .damping = identified.damping,
-                             .damping_ratio = identified.damping_ratio};
-        if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
-            return STATUS_NO_MEMORY;
-    }
-    return STATUS_OK;
-}
+#include "core/plan/stops.h"
 
 static Status decide_contact(const Scene *scene, Plan *plan) {
     Decisions *decisions = &plan->report.decisions;
@@ -56,6 +20,9 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
                              "only restitution is known, no contact time");
     for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
         const Buffer *buffer = damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2));
+        if (buffer->table.count > 0)
+            return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
+                                 "contact times over approach speed are known");
         if (!isnan(buffer->contact_time))
             return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time,
                                  "s", "a contact time is known");
@@ -82,8 +49,9 @@ static Status plan_room(Plan *plan, size_t storeys, size_t dampers) {
     return STATUS_OK;
 }
 
-static Status plan_damper(const Structure *structure, Plan *plan, size_t index,
-                          const Damper *damper) {
+static Status plan_damper(const Scene *scene, Plan *plan, size_t index) {
+    const Structure *structure = scene_structure(scene);
+    const Damper *damper = &scene->dampers.at[index];
     const size_t storey = (size_t)damper->storey - 1;
     double moved;
     TRY(structure_kind(structure)->moved_mass(structure, storey, &moved));
@@ -97,7 +65,7 @@ static Status plan_damper(const Structure *structure, Plan *plan, size_t index,
         .velocity = damper->velocity,
     };
     plan->damper_count = index + 1;
-    return derive(plan, index, damper);
+    return stops_make(scene, plan, index);
 }
 
 static void start(const Reals *given, double *start) {
@@ -107,7 +75,8 @@ static void start(const Reals *given, double *start) {
 
 bool plan_is_single(const Plan *plan) {
     return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1 &&
-           (plan->form == CONTACT_LINEAR || plan->form == CONTACT_IMPULSIVE);
+           plan->separation == SEPARATION_ZERO_PENETRATION &&
+           (plan->damper_count == 0 || !stops_vary(&plan->dampers[0]));
 }
 
 // The same ratio in every mode is C = M (sum of 2 xi omega_k phi_k phi_k') M.
@@ -192,13 +161,17 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
     plan->count = scene_sample_count(scene);
     plan->law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     plan->form = plan->law->form;
+    plan->separation = plan->form == CONTACT_LINEAR ? (Separation)scene_contact(scene)->separation
+                                                    : SEPARATION_ZERO_PENETRATION;
     for (size_t i = 0; i < scene->dampers.count; i++)
-        TRY(plan_damper(structure, plan, i, &scene->dampers.at[i]));
+        TRY(plan_damper(scene, plan, i));
     TRY(decide_contact(scene, plan));
     TRY(plan_modes(structure, plan, problem));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
-                      strcmp(asked, solver) == 0
-                          ? "the scene asks for it"
+                      strcmp(asked, solver) == 0 ? "the scene asks for it"
+                      : plan->form == CONTACT_POWER
+                          ? "flight is linear, so its motion is known exactly; contacts under a "
+                            "power law are integrated to rounding's edge"
                           : "every contact state is linear, so its motion is known exactly"));
     plan->report.contact_model = strdup(plan->damper_count > 0 ? plan->law->kind.name : "none");
     plan->report.solver = strdup(solver);
@@ -223,6 +196,7 @@ void plan_free(Plan *plan) {
     if (plan == NULL)
         return;
     fields_clear(plan_report_fields, &plan->report);
+    stops_clear(plan);
     modes_clear(&plan->modes);
     free(plan->mass);
     free(plan->dampers);

@@ -4,6 +4,7 @@
 #define CORE_PLAN_PLAN_H
 
 #include "core/base/field.h"
+#include "core/contact/freeze.h"
 #include "core/contact/identify.h"
 #include "core/plan/modes.h"
 #include "core/scene/scene.h"
@@ -25,6 +26,11 @@ typedef struct Derived {
     int side;        // Side
     char *material;  // "sponge@1"; NULL if numbers were given
     double restitution, contact_time, effective_mass, stiffness, damping, damping_ratio;
+    // What an isolated contact of this pair comes to, where that may be another: under a power law,
+    // or with parameters carried over from a rig.
+    double reached_restitution, reached_contact_time;
+    double identified_mass; // of the rig; NAN without one
+    double exponent, factor;
 } Derived;
 typedef struct DerivedList {
     Derived *at;
@@ -61,11 +67,14 @@ typedef struct PlanReport {
 extern const Field plan_report_fields[], derived_fields[], decision_fields[], mode_fields[],
     warning_fields[];
 
-// One stop's contact parameters, ready for a solver.
+// One stop's contact parameters, ready for a solver. The first three are those of every impact;
+// where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)
+// tells.
 typedef struct PlanStop {
     double restitution; // e, under CONTACT_IMPULSIVE
     double stiffness;   // k_b [N/m], under CONTACT_LINEAR
     double damping;     // c_b [N s/m]
+    ContactStop contact;
 } PlanStop;
 
 // One free mass.

@@ -29,6 +29,11 @@ const Field derived_fields[] = {
     FIELD_REAL(Derived, stiffness, "N/m", ANY, OPTIONAL, "contact stiffness k_b"),
     FIELD_REAL(Derived, damping, "N s/m", ANY, OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Derived, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio Z of the contact"),
+    FIELD_REAL(Derived, reached_restitution, NULL, ANY, OPTIONAL, "restitution that an isolated contact really reaches under a power law, or with what was carried over from a rig"),
+    FIELD_REAL(Derived, reached_contact_time, "s", ANY, OPTIONAL, "contact time that it really has"),
+    FIELD_REAL(Derived, identified_mass, "kg", ANY, OPTIONAL, "effective mass of the rig"),
+    FIELD_REAL(Derived, exponent, NULL, ANY, OPTIONAL, "exponent n of a power law"),
+    FIELD_REAL(Derived, factor, NULL, ANY, OPTIONAL, "a power law's dissipation factor: D, or xi"),
     FIELD_END
 };
 

@@ -48,10 +48,54 @@ static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
                             duration, rate, count, most);
 }
 
-// e and T_c that each are in range may still come to a stiffness that no double holds.
+// Whether numbers that each are in range come to parameters that doubles can hold: of a power law
+// between a slow impact and a fast one, an isolated contact lasting 1 to 1e3 of its own units.
+static bool is_sound(const ContactLaw *law, int separation, double mass,
+                     const ContactNumbers *numbers) {
+    if (law->form == CONTACT_POWER) {
+        const double n = numbers->exponent, T_c = numbers->contact_time;
+        return is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
+               is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_LEAST, 1 - n));
+    }
+    const Identified found = identify_measured(mass, numbers->restitution, numbers->contact_time,
+                                               (Separation)separation);
+    return is_positive(found.stiffness) && isfinite(found.damping);
+}
+
+static Status check_contact(const Scene *scene, const ContactLaw *law, size_t index, Side side,
+                            double own_mass, Problem *problem) {
+    const Damper *damper = &scene->dampers.at[index];
+    const Buffer *buffer = damper_buffer(damper, side);
+    const double mass = damper_identified_mass(damper, own_mass);
+    const int separation = scene_contact(scene)->separation;
+    ContactNumbers numbers = buffer_numbers(buffer);
+    const ContactRows rows = numbers.rows;
+    numbers.rows = (ContactRows){NULL, 0};
+    for (size_t i = 0; i < (rows.count > 0 ? rows.count : 1); i++) {
+        char place[sizeof((Fault){0}.pointer)], row[64] = "";
+        if (rows.count > 0) {
+            numbers.restitution = rows.at[i].restitution;
+            numbers.contact_time = rows.at[i].contact_time;
+            snprintf(row, sizeof row, "/table/%zu", i);
+        }
+        if (isnan(numbers.contact_time) || is_sound(law, separation, mass, &numbers))
+            continue;
+        snprintf(place, sizeof place, "/dampers/%zu/%s%s/contact_time", index,
+                 buffer == &damper->buffer        ? "buffer"
+                 : buffer == &damper->left_buffer ? "left_buffer"
+                                                  : "right_buffer",
+                 row);
+        return problem_add_real(problem, STATUS_INVALID, place, numbers.contact_time, "s",
+                                "must give a stiffness (m_e (pi^2 + ln(e)^2) / T_c^2 or its like) "
+                                "that numbers can hold");
+    }
+    return STATUS_OK;
+}
+
 static Status check_contacts(const Scene *scene, Problem *problem) {
     const Structure *structure = scene_structure(scene);
-    for (size_t i = 0; i < scene->dampers.count; i++) {
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
         const Damper *damper = &scene->dampers.at[i];
         if (damper->storey < 1 || damper->storey > structure_storeys(structure))
             continue; // told by the rows
@@ -60,23 +104,10 @@ static Status check_contacts(const Scene *scene, Problem *problem) {
             structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
         if (known == STATUS_NO_MEMORY)
             return problem_set(problem, known, "no memory for a scene");
-        const double m_e = effective_mass(moved, damper->mass);
-        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
-            const Buffer *buffer = damper_buffer(damper, (Side)side);
-            if (isnan(buffer->contact_time))
-                continue;
-            const Identified found =
-                identify_measured(m_e, buffer->restitution, buffer->contact_time);
-            char place[sizeof((Fault){0}.pointer)];
-            snprintf(place, sizeof place, "/dampers/%zu/%s/contact_time", i,
-                     buffer == &damper->buffer        ? "buffer"
-                     : buffer == &damper->left_buffer ? "left_buffer"
-                                                      : "right_buffer");
-            if (!is_positive(found.stiffness) || !isfinite(found.damping))
-                return problem_add_real(problem, STATUS_INVALID, place, buffer->contact_time, "s",
-                                        "must give a stiffness m_e (pi^2 + ln(e)^2) / T_c^2 that "
-                                        "numbers can hold");
-        }
+        const double mass = effective_mass(moved, damper->mass);
+        TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
+        if (damper_buffer(damper, SIDE_RIGHT) != damper_buffer(damper, SIDE_LEFT))
+            TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
     }
     return STATUS_OK;
 }
@@ -92,7 +123,7 @@ static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
             status = STATUS_INVALID;
     }
     Contact *contact = (Contact *)(void *)scene->contact;
-    if (law->form == CONTACT_IMPULSIVE)
+    if (law->form != CONTACT_LINEAR)
         contact->separation = CHOICE_ABSENT;
     else if (contact->separation == CHOICE_ABSENT)
         contact->separation = SEPARATION_ZERO_PENETRATION;

@@ -15,13 +15,14 @@
 #include "core/solve/frame_arc.h"
 #include "core/solve/frame_events.h"
 #include "core/solve/frame_flight.h"
+#include "core/solve/frame_ode.h"
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
-enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8 };
+enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
 
 enum { NUDGE_SAMPLES = 16 };
-static const double NUDGE = 4 * DBL_EPSILON;
+static const double NUDGE = 4 * DBL_EPSILON, POWER_NUDGE = 1e-12; // an integrated contact's error
 static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
 
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
@@ -30,6 +31,7 @@ typedef struct Engine {
     Frame frame;
     FrameArc arc;
     FrameFlight flight;
+    FrameOde ode;
     FrameRecord record;
     double work; // since the watch was asked
 } Engine;
@@ -129,6 +131,23 @@ static Status happen(Frame *frame, const FrameEvent *event) {
     return ledger_status(&frame->ledger, frame->problem);
 }
 
+// One step of contact under a power law, at most `length` long.
+static Status press(Engine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameOdeStep step;
+    TRY(frame_ode_step(&engine->ode, slice, length, &step, frame->problem));
+    ledger_work(&frame->ledger, step.input, step.damping);
+    engine->record.base_speed += step.ground;
+    frame->offset += step.length;
+    frame->ground = slice_at(slice, step.length);
+    frame->still_events = 0;
+    frame_record_note(frame);
+    if (step.is_event)
+        TRY(happen(frame, &step.event));
+    frame->run->steps += PRESS_STEPS; // it takes as long as so many arcs
+    return count_step(engine, PRESS_WORK);
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(Engine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -136,6 +155,8 @@ static Status advance(Engine *engine, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &slice);
     frame->ground = slice.value;
+    if (frame_ode_serves(&engine->ode))
+        return press(engine, &slice, fmin(length, knot));
     frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), 1 / frame_rate(frame)));
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
@@ -230,6 +251,7 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, problem));
     TRY(frame_record_start(&engine->record, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
@@ -247,12 +269,17 @@ typedef struct Neighbour {
     double horizon;        // [s]; NAN: not reached
 } Neighbour;
 
+static double nudge_of(const Frame *frame) {
+    return frame->plan->form == CONTACT_POWER ? POWER_NUDGE : NUDGE;
+}
+
 // Some roundings more, of either sign.
 static void nudge(Frame *frame) {
+    const double by = nudge_of(frame);
     for (size_t i = 0; i < frame->storeys; i++) {
         const double sign = (frame->sample / NUDGE_SAMPLES + i) % 2 == 0 ? 1 : -1;
-        frame->q[i] *= 1 + sign * NUDGE;
-        frame->p[i] *= 1 - sign * NUDGE;
+        frame->q[i] *= 1 + sign * by;
+        frame->p[i] *= 1 - sign * by;
     }
 }
 
@@ -298,7 +325,7 @@ static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
     nudge(own);
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
-            (own->damper[d].r > 0 ? -NUDGE : NUDGE) * own->damper[d].plan->clearance;
+            (own->damper[d].r > 0 ? -1 : 1) * nudge_of(own) * own->damper[d].plan->clearance;
     neighbour->is_known = settle(&neighbour->engine) == STATUS_OK;
     neighbour->is_spent = !neighbour->is_known;
     if (neighbour->is_known)
@@ -318,6 +345,7 @@ static void tell(const Neighbour *neighbour, const Frame *frame, Response *respo
 static void clear(Engine *engine) {
     frame_record_clear(&engine->record);
     frame_flight_clear(&engine->flight);
+    frame_ode_clear(&engine->ode);
     frame_arc_clear(&engine->arc);
     frame_clear(&engine->frame);
 }

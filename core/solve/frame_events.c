@@ -18,17 +18,11 @@
 #include <float.h>
 #include <math.h>
 
+#include "core/plan/stops.h"
 #include "core/solve/frame_collide.h"
 #include "core/solve/frame_record.h"
 
 enum { STILL_BOUNCES = 64 };
-
-// The parameters of one contact with a closing speed.
-static FrameContact contact_of(const FrameDamper *damper, Side side) {
-    const PlanStop *stop = &damper->plan->stops[side];
-    return (FrameContact){
-        .stiffness = stop->stiffness, .damping = stop->damping, .restitution = stop->restitution};
-}
 
 static void begin_contact(Frame *frame, size_t d, Side side) {
     FrameDamper *damper = &frame->damper[d];
@@ -38,7 +32,7 @@ static void begin_contact(Frame *frame, size_t d, Side side) {
     damper->origin = (FrameOrigin)side;
     damper->r = 0;
     damper->is_fresh = true;
-    damper->contact = contact_of(damper, side);
+    damper->contact = stops_freeze(&damper->plan->stops[side], speed);
     ledger_open(&damper->row, IMPACT_IMPACT, frame_time(frame), d, side, speed);
     ledger_force(&frame->ledger, &damper->row, damper->contact.damping * speed);
 }
@@ -168,7 +162,7 @@ static void bounce(Frame *frame, size_t d, Side side) {
         damper->origin = (FrameOrigin)at;
         damper->r = 0;
         damper->closing = fmax(frame_sign(at) * damper->w, 0);
-        damper->contact = contact_of(damper, at);
+        damper->contact = stops_freeze(&damper->plan->stops[at], damper->closing);
         damper->parting =
             frame->still_events > STILL_BOUNCES ? 0 : damper->contact.restitution * damper->closing;
     }
@@ -204,7 +198,7 @@ static void rest_bounced(Frame *frame) {
 
 static void touch(Frame *frame, size_t d, Side side) {
     frame->damper[d].leaving = 0;
-    if (frame->plan->form == CONTACT_LINEAR) {
+    if (frame->plan->form != CONTACT_IMPULSIVE) {
         begin_contact(frame, d, side);
     } else if (frame->damper[d].plan->clearance == 0) {
         begin_rest(frame, d, side);

@@ -46,12 +46,20 @@ void frame_elastic(const Frame *frame, const double *q, const double *p, double 
     }
 }
 
+// What a power law says of the present contact.
+static ContactForce power_now(const Frame *frame, const FrameDamper *damper) {
+    const double sign = frame_sign(damper->side);
+    return frame->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
+}
+
 void frame_feel(Frame *frame) {
     frame_elastic(frame, frame->q, frame->p, frame->elastic);
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->force = 0;
-        if (damper->phase == FRAME_CONTACT)
+        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
+            damper->force = frame_sign(damper->side) * power_now(frame, damper).value;
+        else if (damper->phase == FRAME_CONTACT)
             damper->force =
                 damper->contact.stiffness * damper->r + damper->contact.damping * damper->w;
         if (damper->phase != FRAME_RESTING)
@@ -120,7 +128,9 @@ EnergyState frame_energy(const Frame *frame) {
         const FrameDamper *damper = &frame->damper[d];
         const double z = frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
         energy.kinetic += 0.5 * damper->plan->mass * z * z;
-        if (damper->phase == FRAME_CONTACT)
+        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
+            energy.strain += power_now(frame, damper).strain;
+        else if (damper->phase == FRAME_CONTACT)
             energy.strain += 0.5 * damper->contact.stiffness * damper->r * damper->r;
     }
     return energy;

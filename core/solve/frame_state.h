@@ -17,12 +17,6 @@ typedef enum FrameOrigin {
     FRAME_FROM_MIDDLE
 } FrameOrigin;
 
-// One stop's parameters, frozen at the touch.
-typedef struct FrameContact {
-    double stiffness, damping; // k [N/m], c [N s/m], under CONTACT_LINEAR
-    double restitution;        // e, under CONTACT_IMPULSIVE
-} FrameContact;
-
 typedef struct FrameDamper {
     const PlanDamper *plan;
     const double *shape;   // of its storey, mode after mode
@@ -35,11 +29,11 @@ typedef struct FrameDamper {
     FrameOrigin origin; // what r is counted from
     int leaving; // terms of the gap, from the constant one on, that are exactly 0: it was released
                  // from rest a moment ago
-    bool is_fresh; // the present phase has lasted for no time yet
-    double r, w;   // displacement and speed relative to the storey [m], [m/s]
-    double force;  // N on the structure as of the last frame_look [N]
-    FrameContact contact;
-    LedgerRow row; // of the present contact or rest
+    bool is_fresh;             // the present phase has lasted for no time yet
+    double r, w;               // displacement and speed relative to the storey [m], [m/s]
+    double force;              // N on the structure as of the last frame_look [N]
+    ContactParameters contact; // frozen at the touch
+    LedgerRow row;             // of the present contact or rest
 
     // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
     double storey_speed, gained;

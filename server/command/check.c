@@ -39,6 +39,9 @@ static void derived_print(const Derived *derived) {
     real_print("k_b", derived->stiffness, "N/m");
     real_print("c_b", derived->damping, "N s/m");
     real_print("Z", derived->damping_ratio, NULL);
+    real_print("n", derived->exponent, NULL);
+    real_print("reached e", derived->reached_restitution, NULL);
+    real_print("reached T_c", derived->reached_contact_time, "s");
     putchar('\n');
 }
 

@@ -34,6 +34,8 @@ FOREIGN = {
     "jansson.h": ["server/codec/"],
     "fftw3.h": ["core/math/fourier.c"],
     "lapacke.h": ["core/math/linear.c"],
+    "arkode/": ["core/math/ode.c"],
+    "nvector/": ["core/math/ode.c"],
     "gnutls/": ["server/base/digest.c"],
     "dragonbox/": ["server/base/shortest.cpp"],
 }

@@ -246,10 +246,11 @@ static void parameters_are_as_sensitive_as_published(void **state) {
     (void)state;
     const double m = 0.1, e = 0.61, T = 0.025, small = 1e-6, loss = log(e);
     const double pi2 = 9.869604401089358;
-    const Identified low_e = identify_measured(m, e * (1 - small), T),
-                     high_e = identify_measured(m, e * (1 + small), T),
-                     low_T = identify_measured(m, e, T * (1 - small)),
-                     high_T = identify_measured(m, e, T * (1 + small));
+    const Separation rule = SEPARATION_ZERO_PENETRATION;
+    const Identified low_e = identify_measured(m, e * (1 - small), T, rule),
+                     high_e = identify_measured(m, e * (1 + small), T, rule),
+                     low_T = identify_measured(m, e, T * (1 - small), rule),
+                     high_T = identify_measured(m, e, T * (1 + small), rule);
     const double found[] = {
         log(high_e.stiffness / low_e.stiffness), log(high_T.stiffness / low_T.stiffness),
         log(high_e.damping / low_e.damping), log(high_T.damping / low_T.damping)};
