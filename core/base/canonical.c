@@ -52,6 +52,12 @@ static void put_name(Writer *writer, const char *name) {
     put(writer, name, strlen(name) + 1);
 }
 
+static void put_reals(Writer *writer, const Reals *reals) {
+    put_count(writer, reals->count);
+    for (size_t i = 0; i < reals->count; i++)
+        put_real(writer, reals->at[i]);
+}
+
 static void put_rows(Writer *writer, const Field *fields, const void *item);
 
 static void put_value(Writer *writer, const Field *field, const void *member) {
@@ -71,11 +77,14 @@ static void put_value(Writer *writer, const Field *field, const void *member) {
     case FIELD_KIND_CHOICE:
         put_text(writer, field->choices[*(const int *)member]);
         break;
-    case FIELD_KIND_REALS: {
-        const Reals *reals = member;
-        put_count(writer, reals->count);
-        for (size_t i = 0; i < reals->count; i++)
-            put_real(writer, reals->at[i]);
+    case FIELD_KIND_REALS:
+        put_reals(writer, member);
+        break;
+    case FIELD_KIND_ROWS: {
+        const Rows *rows = member;
+        put_count(writer, rows->count);
+        for (size_t i = 0; i < rows->count; i++)
+            put_reals(writer, &rows->at[i]);
         break;
     }
     case FIELD_KIND_TEXTS: {

@@ -42,6 +42,9 @@ static void absent_all(const Field *fields, void *item) {
         case FIELD_KIND_REALS:
             *(Reals *)member = (Reals){NULL, 0};
             break;
+        case FIELD_KIND_ROWS:
+            *(Rows *)member = (Rows){NULL, 0};
+            break;
         case FIELD_KIND_TEXTS:
             *(Texts *)member = (Texts){NULL, 0};
             break;
@@ -71,6 +74,13 @@ static void free_all(const Field *fields, void *item) {
         case FIELD_KIND_REALS:
             free(((Reals *)member)->at);
             break;
+        case FIELD_KIND_ROWS: {
+            const Rows *rows = member;
+            for (size_t i = 0; i < rows->count; i++)
+                free(rows->at[i].at);
+            free(rows->at);
+            break;
+        }
         case FIELD_KIND_TEXTS: {
             const Texts *texts = member;
             for (size_t i = 0; i < texts->count; i++)
@@ -117,6 +127,17 @@ static Status texts_copy(const char *const *source, size_t count, Texts *target)
             return STATUS_NO_MEMORY;
         target->at[target->count] = text;
     }
+    return STATUS_OK;
+}
+
+static Status reals_copy(const Reals *source, Reals *target) {
+    if (source->count == 0)
+        return STATUS_OK;
+    double *at = malloc(source->count * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    memcpy(at, source->at, source->count * sizeof *at);
+    *target = (Reals){at, source->count};
     return STATUS_OK;
 }
 
@@ -193,15 +214,16 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
                 return STATUS_NO_MEMORY;
             break;
         }
-        case FIELD_KIND_REALS: {
-            const Reals *reals = from;
-            if (reals->count == 0)
-                break;
-            double *at = malloc(reals->count * sizeof *at);
-            if (at == NULL)
+        case FIELD_KIND_REALS:
+            TRY(reals_copy(from, to));
+            break;
+        case FIELD_KIND_ROWS: {
+            const Rows *rows = from;
+            Rows *copy = to;
+            if (rows->count > 0 && (copy->at = calloc(rows->count, sizeof *copy->at)) == NULL)
                 return STATUS_NO_MEMORY;
-            memcpy(at, reals->at, reals->count * sizeof *at);
-            *(Reals *)to = (Reals){at, reals->count};
+            for (; copy->count < rows->count; copy->count++)
+                TRY(reals_copy(&rows->at[copy->count], &copy->at[copy->count]));
             break;
         }
         case FIELD_KIND_TEXTS: {
@@ -272,6 +294,8 @@ static bool is_empty(const Field *field, const void *member) {
         return *(const int *)member == CHOICE_ABSENT;
     case FIELD_KIND_REALS:
         return ((const Reals *)member)->count == 0;
+    case FIELD_KIND_ROWS:
+        return ((const Rows *)member)->count == 0;
     case FIELD_KIND_TEXTS:
         return ((const Texts *)member)->count == 0;
     case FIELD_KIND_LIST:
@@ -301,6 +325,7 @@ bool field_is_absent(const Field *field, const void *item) {
     case FIELD_KIND_BASE:
         return false;
     case FIELD_KIND_REALS:
+    case FIELD_KIND_ROWS:
     case FIELD_KIND_TEXTS:
     case FIELD_KIND_LIST:
     case FIELD_KIND_ITEM:

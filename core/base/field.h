@@ -19,6 +19,7 @@ typedef enum FieldKind {
     FIELD_KIND_TEXT,    // char *, owned; absent is NULL
     FIELD_KIND_CHOICE,  // int, an index into `choices`; absent is CHOICE_ABSENT
     FIELD_KIND_REALS,   // Reals
+    FIELD_KIND_ROWS,    // Rows
     FIELD_KIND_TEXTS,   // Texts
     FIELD_KIND_ITEM,    // a nested struct with rows of its own
     FIELD_KIND_LIST,    // List of such structs
@@ -36,6 +37,10 @@ typedef struct Reals {
     double *at;
     size_t count;
 } Reals;
+typedef struct Rows {
+    Reals *at;
+    size_t count;
+} Rows;
 typedef struct Texts {
     char **at;
     size_t count;
@@ -67,7 +72,7 @@ typedef struct KindTable {
     const Kind *(*at)(size_t index);
 } KindTable;
 
-// Bounds of a number; for REALS of each number.
+// Bounds of a number; for REALS and ROWS of each number.
 typedef struct Range {
     double least, most;
     bool is_open_below; // `least` itself is refused
@@ -96,6 +101,10 @@ enum {
     FIELD_NULL_IS_EMPTY = 2,
     // TEXTS: a JSON object of strings is allowed too and kept as "key=value".
     FIELD_PAIRS = 4,
+    // REALS: a JSON number is allowed too, and stands for a list of one; that is written so.
+    FIELD_LONE = 8,
+    // TEXTS: a text allowed may carry a number from 1: "displacement_2".
+    FIELD_NUMBERED = 16,
 };
 
 struct Field {
@@ -103,15 +112,16 @@ struct Field {
     FieldKind kind;
     size_t offset;
     const char *unit; // NULL: none
-    Range range;      // REAL, COUNT, REALS: the value; TEXT, TEXTS, LIST: nothing
+    Range range;      // REAL, COUNT, REALS, ROWS: the value; TEXT, TEXTS, LIST: nothing
     Presence presence;
     double initial;             // REAL, COUNT, FLAG, CHOICE under PRESENCE_DEFAULT
     const char *const *choices; // CHOICE: NULL-terminated; TEXTS: NULL, or the texts allowed
     const char *const
-        *initial_texts;     // TEXTS under PRESENCE_DEFAULT: NULL-terminated, or NULL for none
-    const Field *fields;    // ITEM, LIST, BASE
-    size_t size;            // ITEM, LIST, BASE: of one
-    size_t most;            // TEXT: bytes, REALS, TEXTS, LIST: elements; 0: no bound of its own
+        *initial_texts;  // TEXTS under PRESENCE_DEFAULT: NULL-terminated, or NULL for none
+    const Field *fields; // ITEM, LIST, BASE
+    size_t size;         // ITEM, LIST, BASE: of one
+    // TEXT: bytes; REALS, TEXTS, LIST: elements; ROWS: rows, and numbers in each; 0: no bound
+    size_t most;
     const KindTable *kinds; // VARIANT
     const char
         *shorthand; // ITEM: a JSON string in place of the object sets this TEXT row; NULL: none
@@ -162,6 +172,12 @@ struct Field {
      .choices = choices_, .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
 #define FIELD_REALS(Type, member, unit_, range_, most_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
+     .range = range_, .most = most_, .presence = presence_, .doc = doc_}
+#define FIELD_LONE_REALS(Type, member, unit_, range_, most_, presence_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
+     .range = range_, .most = most_, .presence = presence_, .flags = FIELD_LONE, .doc = doc_}
+#define FIELD_ROWS(Type, member, unit_, range_, most_, presence_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_ROWS, .offset = FIELD_AT(Type, member, Rows), .unit = unit_, \
      .range = range_, .most = most_, .presence = presence_, .doc = doc_}
 #define FIELD_TEXTS(Type, member, choices_, initial_, most_, presence_, flags_, doc_) \
     {.name = #member, .kind = FIELD_KIND_TEXTS, .offset = FIELD_AT(Type, member, Texts), \
@@ -227,6 +243,10 @@ const char *texts_nearest(const char *const *texts, const char *name);
 // STATUS_INVALID.
 Status texts_refuse(const char *const *texts, const char *text, const char *pointer,
                     Problem *problem);
+
+// The number from 1 that a name like "displacement_2" carries, 0 if it carries none; *length is the
+// name's without it.
+size_t name_number(const char *name, size_t *length);
 
 // "pointer/name" with ~ and / escaped, cut at size.
 void pointer_join(char *target, size_t size, const char *pointer, const char *name);

@@ -43,8 +43,8 @@ static Status check_length(size_t most, size_t has, const char *what, const char
 }
 
 static Status check_missing(const Field *field, const char *pointer, Problem *problem) {
-    const bool is_many = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_TEXTS ||
-                         field->kind == FIELD_KIND_LIST;
+    const bool is_many = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
+                         field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
     const char *unit = field->unit != NULL ? field->unit : "";
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
@@ -57,8 +57,9 @@ static Status check_missing(const Field *field, const char *pointer, Problem *pr
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
-Status texts_refuse(const char *const *texts, const char *text, const char *pointer,
-                    Problem *problem) {
+// `suffix` is what the suggestion ends with.
+static Status refuse(const char *const *texts, const char *text, const char *near,
+                     const char *suffix, const char *pointer, Problem *problem) {
     Fault fault = {0};
     char list[2 * sizeof fault.detail] = "must be one of ";
     size_t length = strlen(list);
@@ -68,9 +69,29 @@ Status texts_refuse(const char *const *texts, const char *text, const char *poin
     text_fit(fault.detail, sizeof fault.detail, list);
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, text);
-    const char *near = texts_nearest(texts, text);
-    text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near != NULL ? near : "");
+    if (near != NULL)
+        snprintf(fault.did_you_mean, sizeof fault.did_you_mean, "%s%s", near, suffix);
     return problem_put(problem, STATUS_INVALID, &fault);
+}
+
+Status texts_refuse(const char *const *texts, const char *text, const char *pointer,
+                    Problem *problem) {
+    return refuse(texts, text, texts_nearest(texts, text), "", pointer, problem);
+}
+
+size_t name_number(const char *name, size_t *length) {
+    *length = strlen(name);
+    const char *mark = strrchr(name, '_');
+    if (mark == NULL || mark[1] < '1' || mark[1] > '9')
+        return 0;
+    size_t number = 0;
+    for (const char *digit = mark + 1; *digit != '\0'; digit++) {
+        if (*digit < '0' || *digit > '9' || number > 99999999)
+            return 0;
+        number = 10 * number + (size_t)(*digit - '0');
+    }
+    *length = (size_t)(mark - name);
+    return number;
 }
 
 static bool texts_have(const char *const *texts, const char *text) {
@@ -78,6 +99,22 @@ static bool texts_have(const char *const *texts, const char *text) {
         if (strcmp(*texts, text) == 0)
             return true;
     return false;
+}
+
+// A text that is none of the choices, or one of them with a number.
+static Status check_numbered(const char *const *texts, const char *text, const char *pointer,
+                             Problem *problem) {
+    char stem[64], suffix[64];
+    size_t length;
+    (void)name_number(text, &length);
+    if (length >= sizeof stem)
+        return texts_refuse(texts, text, pointer, problem);
+    memcpy(stem, text, length);
+    stem[length] = '\0';
+    text_fit(suffix, sizeof suffix, text + length);
+    return texts_have(texts, stem)
+               ? STATUS_OK
+               : refuse(texts, text, texts_nearest(texts, stem), suffix, pointer, problem);
 }
 
 static Status check_texts(const Field *field, const Texts *texts, const char *pointer,
@@ -90,7 +127,26 @@ static Status check_texts(const Field *field, const Texts *texts, const char *po
             continue;
         char place[POINTER_SIZE];
         pointer_index(place, sizeof place, pointer, i);
-        status = texts_refuse(field->choices, texts->at[i], place, problem);
+        const Status found = (field->flags & FIELD_NUMBERED) != 0
+                                 ? check_numbered(field->choices, texts->at[i], place, problem)
+                                 : texts_refuse(field->choices, texts->at[i], place, problem);
+        status = found != STATUS_OK ? found : status;
+    }
+    return status;
+}
+
+static Status check_reals(const Field *field, const Reals *reals, const char *pointer,
+                          Problem *problem) {
+    Status status = check_length(field->most, reals->count, "numbers", pointer, problem);
+    if (status != STATUS_OK)
+        return status;
+    for (size_t i = 0; i < reals->count; i++) {
+        const double value = reals->at[i];
+        if (isfinite(value) && range_holds(&field->range, value))
+            continue;
+        char place[POINTER_SIZE];
+        pointer_index(place, sizeof place, pointer, i);
+        status = check_number(field, value, place, problem);
     }
     return status;
 }
@@ -119,17 +175,17 @@ static Status check_member(const Field *field, const void *item, const char *poi
             return problem_add(problem, STATUS_INVALID, pointer, "is none of the choices");
         return STATUS_OK;
     }
-    case FIELD_KIND_REALS: {
-        const Reals *reals = member;
-        status = check_length(field->most, reals->count, "numbers", pointer, problem);
+    case FIELD_KIND_REALS:
+        return check_reals(field, member, pointer, problem);
+    case FIELD_KIND_ROWS: {
+        const Rows *rows = member;
+        status = check_length(field->most, rows->count, "rows", pointer, problem);
         if (status != STATUS_OK)
             return status;
-        for (size_t i = 0; i < reals->count; i++) {
-            const double value = reals->at[i];
-            if (isfinite(value) && range_holds(&field->range, value))
-                continue;
+        for (size_t i = 0; i < rows->count; i++) {
             pointer_index(place, sizeof place, pointer, i);
-            status = check_number(field, value, place, problem);
+            if (check_reals(field, &rows->at[i], place, problem) != STATUS_OK)
+                status = STATUS_INVALID;
         }
         return status;
     }

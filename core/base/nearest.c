@@ -1,7 +1,6 @@
 // "Did you mean": the least number of letters put in, taken out, changed or swapped with their
 // neighbour (optimal string alignment), whatever their case. And the pointers that say where a
 // fault is.
-#include <stdio.h>
 #include <string.h>
 
 #include "core/base/field.h"
@@ -87,27 +86,31 @@ const char *texts_nearest(const char *const *texts, const char *name) {
     return nearest.name;
 }
 
+// Every member of every scene is judged at its pointer, so these are plain loops, not printf.
 void pointer_join(char *target, size_t size, const char *pointer, const char *name) {
-    // Twice the name's size is enough for its escapes; a name too long for that is cut anyway.
-    char text[2 * sizeof((Fault){0}.pointer)];
-    size_t length = 0;
-    text[length++] = '/';
-    for (; *name != '\0' && length + 3 < sizeof text; name++) {
+    // Room for a pointer as long as any, and a name too long is cut all the same.
+    char whole[3 * sizeof((Fault){0}.pointer)];
+    const size_t room = sizeof whole - 3, own = strlen(pointer);
+    size_t length = own < room / 2 ? own : room / 2;
+    memcpy(whole, pointer, length);
+    whole[length++] = '/';
+    for (; *name != '\0' && length < room; name++) {
         if (*name == '~' || *name == '/') {
-            text[length++] = '~';
-            text[length++] = *name == '~' ? '0' : '1';
+            whole[length++] = '~';
+            whole[length++] = *name == '~' ? '0' : '1';
         } else {
-            text[length++] = *name;
+            whole[length++] = *name;
         }
     }
-    text[length] = '\0';
-    char whole[3 * sizeof((Fault){0}.pointer)];
-    snprintf(whole, sizeof whole, "%s%s", pointer, text);
+    whole[length] = '\0';
     text_fit(target, size, whole);
 }
 
 void pointer_index(char *target, size_t size, const char *pointer, size_t index) {
-    char name[24];
-    snprintf(name, sizeof name, "%zu", index);
+    char digits[24], *name = digits + sizeof digits - 1;
+    *name = '\0';
+    do
+        *--name = (char)('0' + index % 10);
+    while ((index /= 10) > 0);
     pointer_join(target, size, pointer, name);
 }

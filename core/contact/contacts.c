@@ -1,7 +1,9 @@
 // All contact laws, the default first.
 #include "core/contact/contact.h"
 
-const char *const separation_names[] = {[SEPARATION_ZERO_PENETRATION] = "zero_penetration", NULL};
+const char *const separation_names[] = {[SEPARATION_ZERO_PENETRATION] = "zero_penetration",
+                                        [SEPARATION_ZERO_FORCE] = "zero_force",
+                                        NULL};
 
 // clang-format off
 const Field contact_fields[] = {
@@ -16,8 +18,18 @@ const ContactLaw contact_auto = {
     .form = CONTACT_CHOSEN,
 };
 
-const ContactLaw *const contacts[] = {&contact_auto, &contact_impulse, &contact_spring_damper,
-                                      NULL};
+const ContactLaw *const contacts[] = {
+    &contact_auto,
+    &contact_impulse,
+    &contact_spring_damper,
+    &contact_hertz,
+    &contact_hunt_crossley,
+    &contact_hunt_crossley_textbook,
+    &contact_lankarani_nikravesh,
+    &contact_flores,
+    &contact_jankowski,
+    NULL,
+};
 
 static const Kind *contact_at(size_t index) {
     return index < COUNT(contacts) - 1 ? &contacts[index]->kind : NULL;

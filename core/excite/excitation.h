@@ -7,19 +7,21 @@
 #include "core/base/field.h"
 #include "core/base/watch.h"
 #include "core/excite/base.h"
+#include "core/math/fourier.h"
 
 // First member of every excitation's struct.
 typedef struct Excitation {
-    Variant variant;     // kind is an ExcitationKind's
-    double displacement; // of the structure at t = 0, relative to the base [m]
-    double velocity;     // [m/s]
+    Variant variant;    // kind is an ExcitationKind's
+    Reals displacement; // of each storey at t = 0, relative to the base; none: 0 [m]
+    Reals velocity;     // [m/s]
 } Excitation;
 
 // What an excitation needs to know of the run it serves.
 typedef struct Span {
-    double duration;    // [s]
-    double sample_rate; // [Hz]
-    size_t most;        // samples at most, 0: no limit
+    double duration;          // [s]
+    double sample_rate;       // [Hz]
+    size_t most;              // samples at most, 0: no limit
+    FourierStock *transforms; // may be NULL
 } Span;
 
 typedef struct ExcitationKind {
@@ -35,12 +37,20 @@ typedef struct ExcitationKind {
     // `watch` says so.
     Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,
                    Problem *problem);
+    // Adds what is allowed but hardly meant to `doubts`, below `pointer`. NULL: nothing to doubt.
+    void (*doubt)(const Excitation *excitation, const Span *span, const char *pointer,
+                  Problem *doubts);
 } ExcitationKind;
 
 extern const ExcitationKind *const excitations[]; // NULL-terminated; "free" first
 extern const KindTable excitation_kinds;
 extern const Field excitation_fields[]; // the rows that every kind has
-extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record;
+extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record,
+    excitation_chirp, excitation_half_sine, excitation_triangular;
+
+// A doubt at pointer/name where the output's samples cannot show motion of this frequency.
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts);
 
 static inline const ExcitationKind *excitation_kind(const Excitation *excitation) {
     return (const ExcitationKind *)(const void *)excitation->variant.kind;

@@ -65,10 +65,17 @@ static double sine_fastest(const Excitation *excitation) {
     return omega_of((const ExcitationSine *)(const void *)excitation);
 }
 
+static void sine_doubt(const Excitation *excitation, const Span *span, const char *pointer,
+                       Problem *doubts) {
+    excitation_doubt_frequency(((const ExcitationSine *)(const void *)excitation)->frequency, span,
+                               pointer, "frequency", doubts);
+}
+
 const ExcitationKind excitation_sine = {
     .kind = {"sine", "a sine of the base's acceleration or displacement", sine_fields,
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .fastest = sine_fastest,
     .make = sine_make,
+    .doubt = sine_doubt,
 };

@@ -8,8 +8,8 @@
 
 #include "core/base/status.h"
 
-// In modal coordinates x = shapes q:  q'' + damping q' + omega^2 q = -participation a_g + shapes' N.
-// All zero is empty.
+// In modal coordinates x = shapes q:  q'' + damping q' + omega^2 q = -participation a_g + shapes'
+// N. All zero is empty.
 typedef struct Modes {
     size_t count;          // as many as storeys
     double *omega;         // rising; 0 for a rigid-body motion [rad/s]

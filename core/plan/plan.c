@@ -3,43 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Identified identify(const Plan *plan, double mass, const Buffer *buffer) {
-    if (plan->form == CONTACT_LINEAR)
-        return isnan(buffer->stiffness)
-                   ? identify_measured(mass, buffer->restitution, buffer->contact_time)
-                   : identify_given(mass, buffer->stiffness,
-                                    isnan(buffer->damping) ? 0 : buffer->damping);
-    return (Identified){.effective_mass = mass,
-                        .restitution = buffer->restitution,
-                        .contact_time = NAN,
-                        .stiffness = NAN,
-                        .damping = NAN,
-                        .damping_ratio = NAN};
-}
-
-// The stops' parameters of one damper, into the plan and its report.
-static Status derive(Plan *plan, size_t index, const Damper *damper) {
-    DerivedList *list = &plan->report.derived;
-    PlanDamper *planned = &plan->dampers[index];
-    for (int side = 0; side < 2; side++) {
-        const Buffer *buffer = damper_buffer(damper, (Side)side);
-        const Identified identified = identify(plan, planned->effective_mass, buffer);
-        planned->stops[side] =
-            (PlanStop){identified.restitution, identified.stiffness, identified.damping};
-        Derived *derived = &list->at[list->count++];
-        *derived = (Derived){.damper = index + 1,
-                             .side = side,
-                             .restitution = identified.restitution,
-                             .contact_time = identified.contact_time,
-                             .effective_mass = identified.effective_mass,
-                             .stiffness = identified.stiffness,
-                             .damping = identified.damping,
-                             .damping_ratio = identified.damping_ratio};
-        if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
-            return STATUS_NO_MEMORY;
-    }
-    return STATUS_OK;
-}
+#include "core/plan/stops.h"
 
 static Status decide_contact(const Scene *scene, Plan *plan) {
     Decisions *decisions = &plan->report.decisions;
@@ -54,8 +18,11 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
     if (law->form == CONTACT_IMPULSIVE)
         return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
                              "only restitution is known, no contact time");
-    for (int side = 0; side < 2; side++) {
-        const Buffer *buffer = damper_buffer(&scene->dampers.at[0], (Side)side);
+    for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
+        const Buffer *buffer = damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2));
+        if (buffer->table.count > 0)
+            return decisions_add(decisions, "contact_model", law->kind.name, NAN, NULL,
+                                 "contact times over approach speed are known");
         if (!isnan(buffer->contact_time))
             return decisions_add(decisions, "contact_model", law->kind.name, buffer->contact_time,
                                  "s", "a contact time is known");
@@ -82,42 +49,129 @@ static Status plan_room(Plan *plan, size_t storeys, size_t dampers) {
     return STATUS_OK;
 }
 
-static Status plan_damper(Plan *plan, size_t index, const Damper *damper) {
+static Status plan_damper(const Scene *scene, Plan *plan, size_t index) {
+    const Structure *structure = scene_structure(scene);
+    const Damper *damper = &scene->dampers.at[index];
     const size_t storey = (size_t)damper->storey - 1;
+    double moved;
+    TRY(structure_kind(structure)->moved_mass(structure, storey, &moved));
     plan->dampers[index] = (PlanDamper){
         .storey = storey,
         .mass = damper->mass,
-        .effective_mass = effective_mass(plan->mass[storey * plan->storeys + storey], damper->mass),
+        .effective_mass = effective_mass(moved, damper->mass),
         .clearance = damper->clearance,
         .offset = damper->offset,
         .position = damper->position,
         .velocity = damper->velocity,
     };
     plan->damper_count = index + 1;
-    return derive(plan, index, damper);
+    return stops_make(scene, plan, index);
 }
 
-static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan) {
-    const StructureSdof *structure = (const StructureSdof *)(const void *)scene_structure(scene);
+static void start(const Reals *given, double *start) {
+    for (size_t i = 0; i < given->count; i++)
+        start[i] = given->at[i];
+}
+
+bool plan_is_single(const Plan *plan) {
+    return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1 &&
+           plan->separation == SEPARATION_ZERO_PENETRATION &&
+           (plan->damper_count == 0 || !stops_vary(&plan->dampers[0]));
+}
+
+// The same ratio in every mode is C = M (sum of 2 xi omega_k phi_k phi_k') M.
+static Status damp_modes(Plan *plan, double ratio, Problem *problem) {
+    Modes *modes = &plan->modes;
+    const size_t n = plan->storeys;
+    // The columns of M Phi, in place of the damping's rows until those are known.
+    double *moved = modes->damping;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < n; k++) {
+            double sum = 0;
+            for (size_t j = 0; j < n; j++)
+                sum += plan->mass[i * n + j] * modes->shapes[j * n + k];
+            moved[i * n + k] = sum;
+        }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j <= i; j++) {
+            double sum = 0;
+            for (size_t k = 0; k < n; k++)
+                sum += 2 * ratio * modes->omega[k] * moved[i * n + k] * moved[j * n + k];
+            plan->damping[i * n + j] = plan->damping[j * n + i] = sum;
+            if (!isfinite(sum))
+                return problem_set(problem, STATUS_UNSTABLE,
+                                   "a damping_ratio of %g gives a damping that double precision "
+                                   "cannot hold",
+                                   ratio);
+        }
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < n; k++)
+            modes->damping[i * n + k] = i == k ? 2 * ratio * modes->omega[k] : 0;
+    modes->is_classical = true;
+    return STATUS_OK;
+}
+
+static Status decide_damping(Plan *plan, bool is_ratio) {
+    return decisions_add(&plan->report.decisions, "damping",
+                         plan->modes.is_classical ? "modal" : "coupled", NAN, NULL, "%s",
+                         is_ratio ? "the scene gives one damping ratio for every mode"
+                         : plan->modes.is_classical
+                             ? "the damping matrix does not couple the structure's modes"
+                             : "the damping matrix couples the structure's modes");
+}
+
+static PlanMode mode_of(double omega, double damping) {
+    return (PlanMode){omega / (2 * 3.14159265358979323846),
+                      omega > 0 ? damping / (2 * omega) : (double)NAN};
+}
+
+static Status plan_modes(const Structure *structure, Plan *plan, Problem *problem) {
+    const size_t n = plan->storeys;
+    const double ratio = structure->damping_ratio;
+    PlanModes *report = &plan->report.modes;
+    report->at = calloc(n, sizeof *report->at);
+    if (report->at == NULL)
+        return STATUS_NO_MEMORY;
+    report->count = n;
+    if (plan_is_single(plan)) {
+        report->at[0] =
+            mode_of(sqrt(plan->stiffness[0] / plan->mass[0]), plan->damping[0] / plan->mass[0]);
+        return STATUS_OK;
+    }
+    TRY(modes_make(&plan->modes, n, plan->mass, plan->stiffness, plan->damping, plan->influence,
+                   problem));
+    if (!isnan(ratio) && n > 1)
+        TRY(damp_modes(plan, ratio, problem));
+    for (size_t k = 0; k < n; k++)
+        report->at[k] = mode_of(plan->modes.omega[k], plan->modes.damping[k * n + k]);
+    return n > 1 ? decide_damping(plan, !isnan(ratio)) : STATUS_OK;
+}
+
+static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan,
+                        Problem *problem) {
+    const Structure *structure = scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
-    TRY(plan_room(plan, 1, scene->dampers.count));
-    plan->mass[0] = structure->mass;
-    plan->stiffness[0] = structure->stiffness;
-    plan->damping[0] = structure_damping(structure);
-    plan->influence[0] = 1;
-    plan->displacement[0] = excitation->displacement;
-    plan->velocity[0] = excitation->velocity;
+    TRY(plan_room(plan, structure_storeys(structure), scene->dampers.count));
+    structure_fill(structure,
+                   &(const Matrices){plan->mass, plan->stiffness, plan->damping, plan->influence});
+    start(&excitation->displacement, plan->displacement);
+    start(&excitation->velocity, plan->velocity);
     plan->duration = scene->duration;
     plan->sample_rate = scene->sample_rate;
     plan->count = scene_sample_count(scene);
     plan->law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     plan->form = plan->law->form;
+    plan->separation = plan->form == CONTACT_LINEAR ? (Separation)scene_contact(scene)->separation
+                                                    : SEPARATION_ZERO_PENETRATION;
     for (size_t i = 0; i < scene->dampers.count; i++)
-        TRY(plan_damper(plan, i, &scene->dampers.at[i]));
+        TRY(plan_damper(scene, plan, i));
     TRY(decide_contact(scene, plan));
-    TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL, "%s",
-                      strcmp(asked, solver) == 0
-                          ? "the scene asks for it"
+    TRY(plan_modes(structure, plan, problem));
+    TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
+                      strcmp(asked, solver) == 0 ? "the scene asks for it"
+                      : plan->form == CONTACT_POWER
+                          ? "flight is linear, so its motion is known exactly; contacts under a "
+                            "power law are integrated to rounding's edge"
                           : "every contact state is linear, so its motion is known exactly"));
     plan->report.contact_model = strdup(plan->damper_count > 0 ? plan->law->kind.name : "none");
     plan->report.solver = strdup(solver);
@@ -128,18 +182,22 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem) {
     *plan = calloc(1, sizeof **plan);
-    const Status status = *plan == NULL ? STATUS_NO_MEMORY : plan_fill(scene, asked, solver, *plan);
+    const Status status =
+        *plan == NULL ? STATUS_NO_MEMORY : plan_fill(scene, asked, solver, *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
     *plan = NULL;
-    return problem_set(problem, status, "no memory for the plan");
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the plan")
+                                      : status;
 }
 
 void plan_free(Plan *plan) {
     if (plan == NULL)
         return;
     fields_clear(plan_report_fields, &plan->report);
+    stops_clear(plan);
+    modes_clear(&plan->modes);
     free(plan->mass);
     free(plan->dampers);
     free(plan);

@@ -4,7 +4,9 @@
 #define CORE_PLAN_PLAN_H
 
 #include "core/base/field.h"
+#include "core/contact/freeze.h"
 #include "core/contact/identify.h"
+#include "core/plan/modes.h"
 #include "core/scene/scene.h"
 
 // One choice of the planner, for people. Texts are static or live as long as the Decisions.
@@ -24,11 +26,26 @@ typedef struct Derived {
     int side;        // Side
     char *material;  // "sponge@1"; NULL if numbers were given
     double restitution, contact_time, effective_mass, stiffness, damping, damping_ratio;
+    // What an isolated contact of this pair comes to, where that may be another: under a power law,
+    // or with parameters carried over from a rig.
+    double reached_restitution, reached_contact_time;
+    double identified_mass; // of the rig; NAN without one
+    double exponent, factor;
 } Derived;
 typedef struct DerivedList {
     Derived *at;
     size_t count;
 } DerivedList;
+
+// One natural mode of the structure, as people know it.
+typedef struct PlanMode {
+    double frequency;     // [Hz]
+    double damping_ratio; // of the mode by itself; NAN where it does not swing
+} PlanMode;
+typedef struct PlanModes {
+    PlanMode *at;
+    size_t count;
+} PlanModes;
 
 typedef struct Warning {
     char *pointer, *detail;
@@ -44,15 +61,20 @@ typedef struct PlanReport {
     char *solver;
     Decisions decisions;
     DerivedList derived;
+    PlanModes modes;
 } PlanReport;
 
-extern const Field plan_report_fields[], derived_fields[], decision_fields[], warning_fields[];
+extern const Field plan_report_fields[], derived_fields[], decision_fields[], mode_fields[],
+    warning_fields[];
 
-// One stop's contact parameters, ready for a solver.
+// One stop's contact parameters, ready for a solver. The first three are those of every impact;
+// where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)
+// tells.
 typedef struct PlanStop {
     double restitution; // e, under CONTACT_IMPULSIVE
     double stiffness;   // k_b [N/m], under CONTACT_LINEAR
     double damping;     // c_b [N s/m]
+    ContactStop contact;
 } PlanStop;
 
 // One free mass.
@@ -71,10 +93,12 @@ typedef struct Plan {
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
+    Modes modes;                        // empty where plan_is_single
     PlanDamper *dampers;
     size_t damper_count;
     const ContactLaw *law;
     ContactForm form; // the law's: never CONTACT_CHOSEN
+    Separation separation;
     double duration, sample_rate;
     size_t count; // samples
     PlanReport report;
@@ -85,6 +109,10 @@ typedef struct Plan {
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
 void plan_free(Plan *plan);
+
+// Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
+// and a law whose contact phases are linear or instantaneous.
+bool plan_is_single(const Plan *plan);
 
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.

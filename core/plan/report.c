@@ -29,6 +29,17 @@ const Field derived_fields[] = {
     FIELD_REAL(Derived, stiffness, "N/m", ANY, OPTIONAL, "contact stiffness k_b"),
     FIELD_REAL(Derived, damping, "N s/m", ANY, OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Derived, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio Z of the contact"),
+    FIELD_REAL(Derived, reached_restitution, NULL, ANY, OPTIONAL, "restitution that an isolated contact really reaches under a power law, or with what was carried over from a rig"),
+    FIELD_REAL(Derived, reached_contact_time, "s", ANY, OPTIONAL, "contact time that it really has"),
+    FIELD_REAL(Derived, identified_mass, "kg", ANY, OPTIONAL, "effective mass of the rig"),
+    FIELD_REAL(Derived, exponent, NULL, ANY, OPTIONAL, "exponent n of a power law"),
+    FIELD_REAL(Derived, factor, NULL, ANY, OPTIONAL, "a power law's dissipation factor: D, or xi"),
+    FIELD_END
+};
+
+const Field mode_fields[] = {
+    FIELD_REAL(PlanMode, frequency, "Hz", ANY, OPTIONAL, "natural frequency without damping"),
+    FIELD_REAL(PlanMode, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio xi of the mode by itself; unknown where it does not swing"),
     FIELD_END
 };
 
@@ -43,12 +54,15 @@ const Field plan_report_fields[] = {
     FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
     FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
     FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
+    FIELD_LIST(PlanReport, modes, mode_fields, 0, PRESENCE_DEFAULT, "natural modes of the structure, the slowest first"),
     FIELD_END
 };
 // clang-format on
 
 // The text of a format, owned by the caller; NULL without memory.
 static char *text_of(const char *format, va_list arguments) {
+    if (strchr(format, '%') == NULL)
+        return strdup(format);
     char text[1024], cut[512];
     vsnprintf(text, sizeof text, format, arguments);
     text_fit(cut, sizeof cut, text);

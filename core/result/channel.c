@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include <stddef.h>
+#include "core/base/field.h"
 
 // clang-format off
 const Channel channels[CHANNEL_COUNT] = {
@@ -18,23 +18,26 @@ const Channel channels[CHANNEL_COUNT] = {
     [CHANNEL_BASE_ACCELERATION]   = {"base_acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the base", CHANNEL_OF_BASE},
 };
 
-const char *const channel_names[] = {
-    [CHANNEL_DISPLACEMENT]        = "displacement",
-    [CHANNEL_VELOCITY]            = "velocity",
-    [CHANNEL_ACCELERATION]        = "acceleration",
-    [CHANNEL_MEAN_ACCELERATION]   = "mean_acceleration",
-    [CHANNEL_DAMPER_DISPLACEMENT] = "damper_displacement",
-    [CHANNEL_DAMPER_VELOCITY]     = "damper_velocity",
-    [CHANNEL_PENETRATION]         = "penetration",
-    [CHANNEL_CONTACT_FORCE]       = "contact_force",
-    [CHANNEL_BASE_ACCELERATION]   = "base_acceleration",
-    [CHANNEL_COUNT]               = NULL,
+const char *const channel_requests[] = {
+    CHANNEL_USUAL,
+    [1 + CHANNEL_DISPLACEMENT       ] = "displacement",
+    [1 + CHANNEL_VELOCITY           ] = "velocity",
+    [1 + CHANNEL_ACCELERATION       ] = "acceleration",
+    [1 + CHANNEL_MEAN_ACCELERATION  ] = "mean_acceleration",
+    [1 + CHANNEL_DAMPER_DISPLACEMENT] = "damper_displacement",
+    [1 + CHANNEL_DAMPER_VELOCITY    ] = "damper_velocity",
+    [1 + CHANNEL_PENETRATION        ] = "penetration",
+    [1 + CHANNEL_CONTACT_FORCE      ] = "contact_force",
+    [1 + CHANNEL_BASE_ACCELERATION  ] = "base_acceleration",
+    [1 + CHANNEL_COUNT              ] = NULL,
 };
 // clang-format on
 
-const Channel *channel_find(const char *name) {
+const Channel *channel_find(const char *name, size_t *number) {
+    size_t length;
+    *number = name_number(name, &length);
     for (size_t i = 0; i < CHANNEL_COUNT; i++)
-        if (strcmp(channels[i].name, name) == 0)
+        if (strlen(channels[i].name) == length && memcmp(channels[i].name, name, length) == 0)
             return &channels[i];
     return NULL;
 }

@@ -3,6 +3,8 @@
 #ifndef CORE_RESULT_CHANNEL_H
 #define CORE_RESULT_CHANNEL_H
 
+#include <stddef.h>
+
 typedef enum ChannelId {
     CHANNEL_DISPLACEMENT,
     CHANNEL_VELOCITY,
@@ -24,9 +26,13 @@ typedef struct Channel {
 } Channel;
 
 extern const Channel channels[CHANNEL_COUNT];
-extern const char *const channel_names[]; // NULL-terminated
+// What may be asked for: CHANNEL_USUAL, which stands for what is sampled if nothing is said, then
+// all names. NULL-terminated.
+extern const char *const channel_requests[];
+#define CHANNEL_USUAL "usual"
 
-// The channel of that name, NULL if there is none.
-const Channel *channel_find(const char *name);
+// The channel of a name like "displacement" or "displacement_2", NULL if there is none; *number is
+// what it carries, from 1, or 0.
+const Channel *channel_find(const char *name, size_t *number);
 
 #endif

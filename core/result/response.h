@@ -4,6 +4,7 @@
 #ifndef CORE_RESULT_RESPONSE_H
 #define CORE_RESULT_RESPONSE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "core/base/columns.h"
@@ -44,7 +45,8 @@ typedef struct Energy {
     double residual;           // [-]
 } Energy;
 
-// Peaks over samples and event instants, whether or not the channel was asked for.
+// Peaks over samples and event instants, whether or not the channel was asked for; of several
+// storeys or dampers the largest.
 typedef struct Peaks {
     double displacement, velocity, acceleration, damper_displacement, contact_force;
 } Peaks;
@@ -56,10 +58,15 @@ typedef struct Response {
     Impacts impacts;
     Energy energy;
     Peaks peaks;
-    double sum_squares_displacement,
-        sum_squares_acceleration; // over samples from statistics_from on
+    // Over samples from statistics_from on; of several storeys the largest.
+    double sum_squares_displacement, sum_squares_acceleration;
     size_t statistics_count;
+    bool has_trust;        // did the solver estimate what follows?
+    double error_estimate; // largest error of displacement over the largest displacement, at most 1
+    double trust_horizon;  // that error passes RESPONSE_PARTING here [s]; NAN: not within the run
 } Response;
+
+#define RESPONSE_PARTING 1e-6
 
 extern const char *const impact_kind_names[];
 extern const Field impact_fields[];

@@ -1,17 +1,28 @@
-// A buffer is given in exactly one way: e with T_c, e alone, or k_b with c_b. Which of them do
-// depends on the law.
+// A buffer is given in exactly one way: e with T_c, once or as a table, e alone, k_b with c_b, or e
+// with the k of a power law. Which of them do depends on the law.
 #include "core/scene/buffer.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/contact/power.h"
+
 // clang-format off
+static const Field row_fields[] = {
+    FIELD_REAL(ContactRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
+    FIELD_REAL(ContactRow, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
+    FIELD_REAL(ContactRow, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
+    FIELD_END
+};
+
 const Field buffer_fields[] = {
     FIELD_TEXT(Buffer, material, 128, PRESENCE_OPTIONAL, 0, "a material, slug or slug@revision; beside numbers, where they come from"),
     FIELD_REAL(Buffer, restitution, NULL, WITHIN(0, 1), OPTIONAL, "coefficient of restitution e"),
     FIELD_REAL(Buffer, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
-    FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b"),
+    FIELD_LIST(Buffer, table, row_fields, BUFFER_ROWS, PRESENCE_OPTIONAL, "restitution and contact time over approach speed, linear between the rows and constant beyond them"),
+    FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b; k in N/m^n beside a restitution under a power law"),
     FIELD_REAL(Buffer, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"),
+    FIELD_REAL(Buffer, exponent, NULL, WITHIN(1, 10), OPTIONAL, "exponent n of a power law, 1.5 if not given"),
     FIELD_END
 };
 // clang-format on
@@ -20,8 +31,12 @@ static bool has(double value) {
     return !isnan(value);
 }
 
+bool buffer_is_measured(const Buffer *buffer) {
+    return buffer->table.count > 0 || has(buffer->contact_time);
+}
+
 static bool has_numbers(const Buffer *buffer) {
-    return has(buffer->restitution) || buffer_has_contact(buffer);
+    return has(buffer->restitution) || buffer_has_contact(buffer) || buffer->table.count > 0;
 }
 
 bool buffer_is_given(const Buffer *buffer) {
@@ -29,11 +44,25 @@ bool buffer_is_given(const Buffer *buffer) {
 }
 
 bool buffer_has_contact(const Buffer *buffer) {
+    for (size_t i = 0; i < buffer->table.count; i++)
+        if (has(buffer->table.at[i].contact_time))
+            return true;
     return has(buffer->contact_time) || has(buffer->stiffness) || has(buffer->damping);
 }
 
 static bool is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
+}
+
+static bool is_same_table(const ContactRows *a, const ContactRows *b) {
+    if (a->count != b->count)
+        return false;
+    for (size_t i = 0; i < a->count; i++)
+        if (!is_same(a->at[i].approach_speed, b->at[i].approach_speed) ||
+            !is_same(a->at[i].restitution, b->at[i].restitution) ||
+            !is_same(a->at[i].contact_time, b->at[i].contact_time))
+            return false;
+    return true;
 }
 
 bool buffer_equals(const Buffer *a, const Buffer *b) {
@@ -42,75 +71,187 @@ bool buffer_equals(const Buffer *a, const Buffer *b) {
                                       : strcmp(a->material, b->material) == 0;
     return is_same_material && is_same(a->restitution, b->restitution) &&
            is_same(a->contact_time, b->contact_time) && is_same(a->stiffness, b->stiffness) &&
-           is_same(a->damping, b->damping);
+           is_same(a->damping, b->damping) && is_same(a->exponent, b->exponent) &&
+           is_same_table(&a->table, &b->table);
 }
 
 void buffer_move(Buffer *target, Buffer *source) {
     fields_clear(buffer_fields, target);
     *target = *source;
     source->material = NULL;
+    source->table = (ContactRows){NULL, 0};
     fields_clear(buffer_fields, source);
 }
 
-static Status missing(const char *pointer, const char *name, const char *sentence,
-                      Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    pointer_join(place, sizeof place, pointer, name);
-    return problem_add(problem, STATUS_INVALID, place, "%s", sentence);
+ContactNumbers buffer_numbers(const Buffer *buffer) {
+    return (ContactNumbers){buffer->restitution, buffer->contact_time, buffer->stiffness,
+                            buffer->damping,     buffer->exponent,     buffer->table};
 }
 
-// Whether the numbers make one of the three ways, whatever the law.
-static Status check_way(const Buffer *buffer, const char *pointer, Problem *problem) {
+static Status missing(const char *pointer, const char *name, const char *model,
+                      const char *sentence, Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_add(problem, STATUS_INVALID, place, sentence, model);
+}
+
+// Whether the numbers make one of the ways, whatever the law.
+static Status check_way(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                        Problem *problem) {
     if (!has_numbers(buffer)) {
         char material[64];
         text_quote(material, sizeof material, buffer->material);
         return problem_add(problem, STATUS_INVALID, pointer,
                            "material %s is not resolved to its numbers", material);
     }
-    const bool is_measured = has(buffer->restitution) || has(buffer->contact_time);
+    const bool has_table = buffer->table.count > 0;
     const bool is_known = has(buffer->stiffness) || has(buffer->damping);
+    if (has_table && (has(buffer->restitution) || has(buffer->contact_time) || is_known))
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "must be given in one way: a table stands in place of restitution, "
+                           "contact_time, stiffness and damping");
+    if (law->form == CONTACT_POWER || has_table)
+        return STATUS_OK;
+    // A power law's way; under impulse all but the restitution is left out.
+    if (law->form == CONTACT_IMPULSIVE && has(buffer->restitution) && has(buffer->stiffness) &&
+        !has(buffer->damping) && !has(buffer->contact_time))
+        return STATUS_OK;
+    const bool is_measured = has(buffer->restitution) || has(buffer->contact_time);
     if (is_measured && is_known)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "must be given in one way: restitution and contact_time, restitution "
-                           "alone, or stiffness and damping");
+                           "alone, or stiffness and damping (restitution and stiffness are for "
+                           "power laws such as hunt_crossley)");
     if (is_measured && !has(buffer->restitution))
-        return missing(pointer, "restitution",
-                       "is required beside contact_time: coefficient of restitution e", problem);
+        return missing(pointer, "restitution", "contact_time",
+                       "is required beside %s: coefficient of restitution e", problem);
     if (is_known && !has(buffer->stiffness))
-        return missing(pointer, "stiffness",
-                       "is required beside damping: contact stiffness k_b [N/m]", problem);
+        return missing(pointer, "stiffness", "damping",
+                       "is required beside %s: contact stiffness k_b [N/m]", problem);
     if (is_known && !has(buffer->damping))
-        return missing(pointer, "damping",
-                       "is required beside stiffness: contact damping c_b [N s/m]", problem);
+        return missing(pointer, "damping", "stiffness",
+                       "is required beside %s: contact damping c_b [N s/m]", problem);
     return STATUS_OK;
 }
 
-Status buffer_check(const Buffer *buffer, ContactForm form, const char *pointer, Problem *problem) {
-    if (problem_concerns(problem, pointer))
-        return STATUS_INVALID;
-    TRY(check_way(buffer, pointer, problem));
-    if (form == CONTACT_IMPULSIVE && !has(buffer->restitution))
-        return missing(pointer, "restitution",
-                       "is required by the contact model impulse, which takes no stiffness and "
-                       "damping: give a restitution, or choose spring_damper",
-                       problem);
-    if (form != CONTACT_LINEAR || has(buffer->stiffness))
-        return STATUS_OK;
-    if (buffer->restitution == 0) {
-        char place[sizeof((Fault){0}.pointer)];
-        pointer_join(place, sizeof place, pointer, "restitution");
+// Whether the law can have this restitution.
+static Status check_restitution(double restitution, const ContactLaw *law, const char *pointer,
+                                Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)], is[32], least[32];
+    pointer_join(place, sizeof place, pointer, "restitution");
+    text_real(is, restitution);
+    if (law->form == CONTACT_LINEAR && restitution == 0)
         return problem_add_real(problem, STATUS_INVALID, place, 0, NULL,
                                 "must be above 0 for the contact model spring_damper, is 0: its "
                                 "damping would be infinite (impulse allows 0)");
+    if (law->form != CONTACT_POWER || !(restitution < law->least_restitution))
+        return STATUS_OK;
+    if (law->least_restitution == 1)
+        return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
+                                "must be 1 or left out for the contact model %s, which gives all "
+                                "energy back, is %s",
+                                law->kind.name, is);
+    return problem_add_real(problem, STATUS_INVALID, place, restitution, NULL,
+                            "must be at least %s for the contact model %s, is %s: its damping "
+                            "grows beyond all bounds",
+                            text_real(least, law->least_restitution), law->kind.name, is);
+}
+
+static Status check_table(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                          Problem *problem) {
+    const ContactRows *rows = &buffer->table;
+    Status status = STATUS_OK;
+    char table[sizeof((Fault){0}.pointer)];
+    pointer_join(table, sizeof table, pointer, "table");
+    if (rows->count < 2)
+        return problem_add(problem, STATUS_INVALID, table,
+                           "must have at least two rows, has %zu: restitution and contact_time "
+                           "alone hold for every approach speed",
+                           rows->count);
+    for (size_t i = 0; i < rows->count; i++) {
+        char row[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
+        pointer_index(row, sizeof row, table, i);
+        if (check_restitution(rows->at[i].restitution, law, row, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+        if (law->form != CONTACT_IMPULSIVE && !has(rows->at[i].contact_time))
+            status = missing(row, "contact_time", law->kind.name,
+                             "is required by the contact model %s: contact time T_c of an "
+                             "isolated impact [s]",
+                             problem);
+        if (i == 0 || rows->at[i].approach_speed > rows->at[i - 1].approach_speed)
+            continue;
+        char is[32], than[32];
+        pointer_join(place, sizeof place, row, "approach_speed");
+        status = problem_add_real(problem, STATUS_INVALID, place, rows->at[i].approach_speed, "m/s",
+                                  "must be above the row before, %s m/s, is %s",
+                                  text_real(than, rows->at[i - 1].approach_speed),
+                                  text_real(is, rows->at[i].approach_speed));
     }
+    return status;
+}
+
+static Status check_power(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                          Problem *problem) {
+    const char *model = law->kind.name;
+    char place[sizeof((Fault){0}.pointer)];
+    if (has(buffer->damping)) {
+        pointer_join(place, sizeof place, pointer, "damping");
+        return problem_add_real(problem, STATUS_INVALID, place, buffer->damping, "N s/m",
+                                "is not for the contact model %s, whose damping follows from "
+                                "restitution: choose spring_damper, or give that instead",
+                                model);
+    }
+    if (has(buffer->stiffness) && has(buffer->contact_time))
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "must be given in one way: contact_time, from which the stiffness of "
+                           "each impact follows, or stiffness");
+    if (!has(buffer->stiffness) && !has(buffer->contact_time))
+        return missing(pointer, "contact_time", model,
+                       "is required by the contact model %s (or a stiffness in N/m^n): contact "
+                       "time T_c of an isolated impact [s]",
+                       problem);
+    if (law->factor != NULL && !has(buffer->restitution))
+        return missing(pointer, "restitution", model,
+                       "is required by the contact model %s: coefficient of restitution e",
+                       problem);
+    return check_restitution(buffer->restitution, law, pointer, problem);
+}
+
+Status buffer_check(const Buffer *buffer, const ContactLaw *law, const char *pointer,
+                    Problem *problem) {
+    if (problem_concerns(problem, pointer))
+        return STATUS_INVALID;
+    TRY(check_way(buffer, law, pointer, problem));
+    if (buffer->table.count > 0)
+        return check_table(buffer, law, pointer, problem);
+    if (law->form == CONTACT_POWER)
+        return check_power(buffer, law, pointer, problem);
+    if (law->form == CONTACT_IMPULSIVE && !has(buffer->restitution))
+        return missing(pointer, "restitution", law->kind.name,
+                       "is required by the contact model %s, which takes no stiffness and "
+                       "damping: give a restitution, or choose spring_damper",
+                       problem);
+    if (law->form != CONTACT_LINEAR || has(buffer->stiffness))
+        return STATUS_OK;
+    TRY(check_restitution(buffer->restitution, law, pointer, problem));
     if (!has(buffer->contact_time))
-        return missing(pointer, "contact_time",
-                       "is required by the contact model spring_damper: contact time T_c of an "
-                       "isolated impact [s]",
+        return missing(pointer, "contact_time", law->kind.name,
+                       "is required by the contact model %s: contact time T_c of an isolated "
+                       "impact [s]",
                        problem);
     return STATUS_OK;
 }
 
-void buffer_erase_contact(Buffer *buffer) {
-    buffer->contact_time = buffer->stiffness = buffer->damping = (double)NAN;
+void buffer_normalise(Buffer *buffer, const ContactLaw *law) {
+    if (law->form == CONTACT_IMPULSIVE) {
+        buffer->contact_time = buffer->stiffness = buffer->damping = (double)NAN;
+        for (size_t i = 0; i < buffer->table.count; i++)
+            buffer->table.at[i].contact_time = (double)NAN;
+    }
+    if (law->form != CONTACT_POWER)
+        buffer->exponent = (double)NAN;
+    else if (!has(buffer->exponent))
+        buffer->exponent = POWER_EXPONENT;
+    if (law->form == CONTACT_POWER && law->factor == NULL && buffer->table.count == 0)
+        buffer->restitution = 1;
 }

@@ -4,9 +4,18 @@
 
 #include <stdlib.h>
 
-static const char *const identified_for_names[] = {"scene", NULL};
+#include "core/contact/identify.h"
+
+static const char *const identified_for_names[] = {
+    [IDENTIFIED_FOR_SCENE] = "scene", [IDENTIFIED_FOR_RIG] = "rig", NULL};
 
 // clang-format off
+static const Field rig_fields[] = {
+    FIELD_REAL(Rig, impactor_mass, "kg", ABOVE(0), REQUIRED, "mass that struck the buffer in the test"),
+    FIELD_REAL(Rig, base_mass, "kg", ABOVE(0), OPTIONAL, "mass that it struck; a fixed base if not given"),
+    FIELD_END
+};
+
 const Field damper_fields[] = {
     FIELD_REAL(Damper, mass, "kg", ABOVE(0), REQUIRED, "free mass m"),
     FIELD_REAL(Damper, clearance, "m", AT_LEAST(0), REQUIRED, "total clearance d between the stops"),
@@ -18,6 +27,7 @@ const Field damper_fields[] = {
     FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
     FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
     FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
+    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured them, required by identified_for rig: what they come to there is carried over"),
     FIELD_END
 };
 // clang-format on
@@ -57,8 +67,7 @@ static Status check_buffers(Damper *damper, const ContactLaw *law, const char *p
     }
     Status status = STATUS_OK;
     for (size_t i = 0; i < BUFFERS; i++)
-        if (is_given[i] &&
-            buffer_check(buffer_at(damper, i), law->form, places[i], problem) != STATUS_OK)
+        if (is_given[i] && buffer_check(buffer_at(damper, i), law, places[i], problem) != STATUS_OK)
             status = STATUS_INVALID;
     // A buffer that could not be read may be the one that seems to be missing.
     if (is_told)
@@ -89,6 +98,20 @@ static Status check_position(const Damper *damper, const char *pointer, Problem 
                             is);
 }
 
+// A power law's parameters are those of an approach speed; between stops that always touch there is
+// none.
+static Status check_clearance(const Damper *damper, const ContactLaw *law, const char *pointer,
+                              Problem *problem) {
+    if (law->form != CONTACT_POWER || damper->clearance != 0)
+        return STATUS_OK;
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, "clearance");
+    return problem_add_real(problem, STATUS_INVALID, place, 0, "m",
+                            "must be above 0 m for the contact model %s, is 0: its parameters are "
+                            "those of an approach speed (spring_damper and impulse allow 0)",
+                            law->kind.name);
+}
+
 // A sum of finite numbers may not be finite.
 static Status check_stops(const Damper *damper, const char *pointer, Problem *problem) {
     const double furthest = fabs(damper->offset) + damper->clearance;
@@ -102,7 +125,7 @@ static Status check_stops(const Damper *damper, const char *pointer, Problem *pr
 
 static Status check_storey(const Damper *damper, size_t storeys, const char *pointer,
                            Problem *problem) {
-    if (damper->storey <= storeys)
+    if (storeys == 0 || damper->storey <= storeys)
         return STATUS_OK;
     char place[sizeof((Fault){0}.pointer)];
     pointer_join(place, sizeof place, pointer, "storey");
@@ -111,10 +134,50 @@ static Status check_storey(const Damper *damper, size_t storeys, const char *poi
                             (unsigned long long)damper->storey);
 }
 
+double damper_identified_mass(const Damper *damper, double own) {
+    if (damper->identified_for != IDENTIFIED_FOR_RIG)
+        return own;
+    return isnan(damper->rig.base_mass)
+               ? damper->rig.impactor_mass
+               : effective_mass(damper->rig.impactor_mass, damper->rig.base_mass);
+}
+
+// Restitution alone, and stiffness and damping, hold for any pair of masses.
+static bool is_carried(const Damper *damper, const ContactLaw *law) {
+    return law->form != CONTACT_IMPULSIVE &&
+           (buffer_is_measured(damper_buffer(damper, SIDE_LEFT)) ||
+            buffer_is_measured(damper_buffer(damper, SIDE_RIGHT)));
+}
+
+static Status check_rig(const Damper *damper, const ContactLaw *law, const char *pointer,
+                        Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, "rig");
+    const bool is_given = !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
+    if (!is_carried(damper, law) || problem_concerns(problem, place) ||
+        is_given == (damper->identified_for == IDENTIFIED_FOR_RIG))
+        return STATUS_OK;
+    if (is_given)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "is used only with identified_for \"rig\": give that, or leave out the "
+                           "rig");
+    return problem_add(problem, STATUS_INVALID, place,
+                       "is required by identified_for \"rig\": the impactor_mass [kg] and, unless "
+                       "it was fixed, the base_mass of the test that measured restitution and "
+                       "contact time");
+}
+
+static void normalise_rig(Damper *damper, const ContactLaw *law) {
+    if (is_carried(damper, law))
+        return;
+    damper->identified_for = IDENTIFIED_FOR_SCENE;
+    fields_clear(rig_fields, &damper->rig);
+}
+
 static void normalise_buffers(Damper *damper, const ContactLaw *law) {
-    if (law->form == CONTACT_IMPULSIVE)
-        for (size_t i = 0; i < BUFFERS; i++)
-            buffer_erase_contact(buffer_at(damper, i));
+    for (size_t i = 0; i < BUFFERS; i++)
+        if (buffer_is_given(buffer_at(damper, i)))
+            buffer_normalise(buffer_at(damper, i), law);
     if (buffer_is_given(&damper->buffer)) {
         if (buffer_is_given(&damper->left_buffer))
             buffer_move(&damper->right_buffer, &damper->buffer);
@@ -130,18 +193,21 @@ static void normalise_buffers(Damper *damper, const ContactLaw *law) {
 
 Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, const char *pointer,
                        Problem *problem) {
-    if (damper->storey == COUNT_ABSENT)
+    if (damper->storey == COUNT_ABSENT && storeys > 0)
         damper->storey = storeys;
     if (damper->identified_for == CHOICE_ABSENT)
-        damper->identified_for = 0;
+        damper->identified_for = IDENTIFIED_FOR_SCENE;
     const Status faults[] = {
         check_position(damper, pointer, problem),
         check_stops(damper, pointer, problem),
+        check_clearance(damper, law, pointer, problem),
         check_storey(damper, storeys, pointer, problem),
         check_buffers(damper, law, pointer, problem),
+        check_rig(damper, law, pointer, problem),
     };
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
     normalise_buffers(damper, law);
+    normalise_rig(damper, law);
     return STATUS_OK;
 }

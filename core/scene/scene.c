@@ -6,12 +6,10 @@
 
 #include "core/contact/identify.h"
 
-enum { STOREYS = 1, DAMPERS = 1 };
-
 // clang-format off
 const Field scene_fields[] = {
     FIELD_VARIANT(Scene, structure, &structure_kinds, PRESENCE_REQUIRED, "the primary structure"),
-    FIELD_LIST(Scene, dampers, damper_fields, DAMPERS, PRESENCE_DEFAULT, "impact dampers"),
+    FIELD_LIST(Scene, dampers, damper_fields, SCENE_DAMPERS, PRESENCE_DEFAULT, "impact dampers"),
     FIELD_VARIANT(Scene, contact, &contact_kinds, PRESENCE_DEFAULT, "how a free mass and a stop meet"),
     FIELD_VARIANT(Scene, excitation, &excitation_kinds, PRESENCE_DEFAULT, "motion of the base, and the initial state"),
     FIELD_REAL(Scene, duration, "s", ABOVE(0), REQUIRED, "simulated time"),
@@ -50,44 +48,82 @@ static Status check_samples(const Scene *scene, size_t most, Problem *problem) {
                             duration, rate, count, most);
 }
 
-// e and T_c that each are in range may still come to a stiffness that no double holds.
-static Status check_contacts(const Scene *scene, Problem *problem) {
-    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
-    for (size_t i = 0; i < scene->dampers.count; i++) {
-        const Damper *damper = &scene->dampers.at[i];
-        const double m_e = effective_mass(sdof->mass, damper->mass);
-        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
-            const Buffer *buffer = damper_buffer(damper, (Side)side);
-            if (isnan(buffer->contact_time))
-                continue;
-            const Identified found =
-                identify_measured(m_e, buffer->restitution, buffer->contact_time);
-            char place[sizeof((Fault){0}.pointer)];
-            snprintf(place, sizeof place, "/dampers/%zu/%s/contact_time", i,
-                     buffer == &damper->buffer        ? "buffer"
-                     : buffer == &damper->left_buffer ? "left_buffer"
-                                                      : "right_buffer");
-            if (!is_positive(found.stiffness) || !isfinite(found.damping))
-                return problem_add_real(problem, STATUS_INVALID, place, buffer->contact_time, "s",
-                                        "must give a stiffness m_e (pi^2 + ln(e)^2) / T_c^2 that "
-                                        "numbers can hold");
+// Whether numbers that each are in range come to parameters that doubles can hold: of a power law
+// between a slow impact and a fast one, an isolated contact lasting 1 to 1e3 of its own units.
+static bool is_sound(const ContactLaw *law, int separation, double mass,
+                     const ContactNumbers *numbers) {
+    if (law->form == CONTACT_POWER) {
+        const double n = numbers->exponent, T_c = numbers->contact_time;
+        return is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
+               is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_LEAST, 1 - n));
+    }
+    const Identified found = identify_measured(mass, numbers->restitution, numbers->contact_time,
+                                               (Separation)separation);
+    return is_positive(found.stiffness) && isfinite(found.damping);
+}
+
+static Status check_contact(const Scene *scene, const ContactLaw *law, size_t index, Side side,
+                            double own_mass, Problem *problem) {
+    const Damper *damper = &scene->dampers.at[index];
+    const Buffer *buffer = damper_buffer(damper, side);
+    const double mass = damper_identified_mass(damper, own_mass);
+    const int separation = scene_contact(scene)->separation;
+    ContactNumbers numbers = buffer_numbers(buffer);
+    const ContactRows rows = numbers.rows;
+    numbers.rows = (ContactRows){NULL, 0};
+    for (size_t i = 0; i < (rows.count > 0 ? rows.count : 1); i++) {
+        char place[sizeof((Fault){0}.pointer)], row[64] = "";
+        if (rows.count > 0) {
+            numbers.restitution = rows.at[i].restitution;
+            numbers.contact_time = rows.at[i].contact_time;
+            snprintf(row, sizeof row, "/table/%zu", i);
         }
+        if (isnan(numbers.contact_time) || is_sound(law, separation, mass, &numbers))
+            continue;
+        snprintf(place, sizeof place, "/dampers/%zu/%s%s/contact_time", index,
+                 buffer == &damper->buffer        ? "buffer"
+                 : buffer == &damper->left_buffer ? "left_buffer"
+                                                  : "right_buffer",
+                 row);
+        return problem_add_real(problem, STATUS_INVALID, place, numbers.contact_time, "s",
+                                "must give a stiffness (m_e (pi^2 + ln(e)^2) / T_c^2 or its like) "
+                                "that numbers can hold");
     }
     return STATUS_OK;
 }
 
-static Status complete_dampers(Scene *scene, Problem *problem) {
+static Status check_contacts(const Scene *scene, Problem *problem) {
+    const Structure *structure = scene_structure(scene);
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    for (size_t i = 0; law->form != CONTACT_IMPULSIVE && i < scene->dampers.count; i++) {
+        const Damper *damper = &scene->dampers.at[i];
+        if (damper->storey < 1 || damper->storey > structure_storeys(structure))
+            continue; // told by the rows
+        double moved;
+        const Status known =
+            structure_kind(structure)->moved_mass(structure, (size_t)damper->storey - 1, &moved);
+        if (known == STATUS_NO_MEMORY)
+            return problem_set(problem, known, "no memory for a scene");
+        const double mass = effective_mass(moved, damper->mass);
+        TRY(check_contact(scene, law, i, SIDE_LEFT, mass, problem));
+        if (damper_buffer(damper, SIDE_RIGHT) != damper_buffer(damper, SIDE_LEFT))
+            TRY(check_contact(scene, law, i, SIDE_RIGHT, mass, problem));
+    }
+    return STATUS_OK;
+}
+
+static Status complete_dampers(Scene *scene, size_t storeys, Problem *problem) {
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     Status status = STATUS_OK;
     // More than the rows allow were told by the rows.
-    for (size_t i = 0; i < scene->dampers.count && i < DAMPERS; i++) {
+    for (size_t i = 0; i < scene->dampers.count && i < SCENE_DAMPERS; i++) {
         char place[sizeof((Fault){0}.pointer)];
         pointer_index(place, sizeof place, "/dampers", i);
-        if (damper_complete(&scene->dampers.at[i], law, STOREYS, place, problem) != STATUS_OK)
+        if (damper_complete(&scene->dampers.at[i], law, storeys, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     Contact *contact = (Contact *)(void *)scene->contact;
-    if (law->form == CONTACT_IMPULSIVE)
+    if (law->form != CONTACT_LINEAR)
         contact->separation = CHOICE_ABSENT;
     else if (contact->separation == CHOICE_ABSENT)
         contact->separation = SEPARATION_ZERO_PENETRATION;
@@ -104,27 +140,61 @@ static Status reset_contact(Scene *scene, Problem *problem) {
     return STATUS_OK;
 }
 
+// The initial state has one number per storey; a lone 0 means rest whatever their number.
+static Status complete_start(Reals *start, const char *name, const char *unit, size_t storeys,
+                             Problem *problem) {
+    if (start->count == 0 || (start->count == 1 && start->at[0] == 0))
+        return structure_zeros(start, storeys, problem);
+    if (start->count != 1 || storeys == 1)
+        return structure_check_count(start, storeys, "/excitation", name, problem);
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, "/excitation", name);
+    return problem_add_real(problem, STATUS_INVALID, place, start->at[0], unit,
+                            "must be a list of %zu numbers, one per storey, or 0", storeys);
+}
+
+static Status complete_starts(Scene *scene, size_t storeys, Problem *problem) {
+    Excitation *excitation = (Excitation *)(void *)scene->excitation;
+    if (storeys == 0)
+        return STATUS_OK;
+    const Status displacement =
+        complete_start(&excitation->displacement, "displacement", "m", storeys, problem);
+    const Status velocity =
+        complete_start(&excitation->velocity, "velocity", "m/s", storeys, problem);
+    return displacement != STATUS_OK ? displacement : velocity;
+}
+
 static Status complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
     Excitation *excitation = (Excitation *)(void *)scene->excitation;
     const ExcitationKind *kind = excitation_kind(excitation);
     if (kind->complete == NULL || !is_positive(scene->duration) ||
         !is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
         return STATUS_OK;
-    const Span span = {scene->duration, scene->sample_rate, most_samples};
+    const Span span = {
+        .duration = scene->duration, .sample_rate = scene->sample_rate, .most = most_samples};
     return kind->complete(excitation, &span, "/excitation", problem);
 }
 
+size_t scene_storeys(const Scene *scene, const Problem *problem) {
+    return scene->structure == NULL || problem_concerns(problem, "/structure")
+               ? 0
+               : structure_storeys(scene_structure(scene));
+}
+
 Status scene_complete(Scene *scene, size_t most_samples, Problem *problem) {
-    Status faults[4] = {STATUS_OK};
+    Status faults[5] = {STATUS_OK};
     if (scene->structure != NULL)
         faults[0] =
             structure_complete((Structure *)(void *)scene->structure, "/structure", problem);
+    const size_t storeys = scene_storeys(scene, problem);
     if (scene->contact != NULL)
-        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, problem)
+        faults[1] = scene->dampers.count > 0 ? complete_dampers(scene, storeys, problem)
                                              : reset_contact(scene, problem);
     faults[2] = check_samples(scene, most_samples, problem);
-    if (scene->excitation != NULL)
+    if (scene->excitation != NULL) {
         faults[3] = complete_excitation(scene, most_samples, problem);
+        faults[4] = complete_starts(scene, storeys, problem);
+    }
     for (size_t i = 0; i < COUNT(faults); i++)
         TRY(faults[i]);
     if (problem_concerns(problem, "/structure") || problem_concerns(problem, "/dampers") ||

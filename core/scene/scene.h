@@ -11,6 +11,8 @@
 #include "core/scene/damper.h"
 #include "core/scene/structure.h"
 
+enum { SCENE_DAMPERS = 64 };
+
 typedef struct Scene {
     Variant *structure; // a Structure
     Dampers dampers;
@@ -34,6 +36,9 @@ static inline const Excitation *scene_excitation(const Scene *scene) {
 
 // Samples per channel: i = 0 ... floor(duration * sample_rate (1 + 1e-12)). Saturates at SIZE_MAX.
 size_t scene_sample_count(const Scene *scene);
+
+// Storeys of the structure; 0 where a fault among `problem`'s leaves them unknown.
+size_t scene_storeys(const Scene *scene, const Problem *problem);
 
 // Judges and completes: adds every fault that the rows alone cannot see (materials still
 // unresolved, parts that exclude each other, positions beyond a stop, more than `most_samples`

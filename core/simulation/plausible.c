@@ -40,6 +40,18 @@ static Status warn_real(const Field *field, double value, const char *pointer, W
                         space, unit, text_real(most, limit->most), space, unit, limit->hint);
 }
 
+static Status warn_reals(const Field *field, const Reals *reals, const char *pointer,
+                         Warnings *warnings) {
+    if (reals->count == 1)
+        return warn_real(field, reals->at[0], pointer, warnings);
+    for (size_t i = 0; i < reals->count && usual_find(field->name) != NULL; i++) {
+        char place[sizeof((Fault){0}.pointer)];
+        pointer_index(place, sizeof place, pointer, i);
+        TRY(warn_real(field, reals->at[i], place, warnings));
+    }
+    return STATUS_OK;
+}
+
 static Status warn_rows(const Field *fields, const void *item, const char *pointer,
                         Warnings *warnings) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
@@ -50,7 +62,9 @@ static Status warn_rows(const Field *fields, const void *item, const char *point
             continue;
         }
         pointer_join(place, sizeof place, pointer, field->name);
-        if (field->kind == FIELD_KIND_REAL) {
+        if (field->kind == FIELD_KIND_REALS) {
+            TRY(warn_reals(field, member, place, warnings));
+        } else if (field->kind == FIELD_KIND_REAL) {
             TRY(warn_real(field, *(const double *)member, place, warnings));
         } else if (field->kind == FIELD_KIND_ITEM) {
             TRY(warn_rows(field->fields, member, place, warnings));
@@ -72,11 +86,12 @@ static Status warn_rows(const Field *fields, const void *item, const char *point
     return STATUS_OK;
 }
 
-static Status warn_times(const Scene *scene, const StructureSdof *sdof, Warnings *warnings) {
-    if (sdof->stiffness <= 0)
+static Status warn_times(const Scene *scene, Warnings *warnings) {
+    StructureRates rates;
+    TRY(structure_rates(scene_structure(scene), &rates));
+    if (!(rates.slowest > 0))
         return STATUS_OK;
-    const double omega = sqrt(sdof->stiffness / sdof->mass);
-    const double frequency = omega / (2 * 3.14159265358979323846);
+    const double frequency = rates.slowest / (2 * 3.14159265358979323846);
     char is[32];
     if (scene->duration * frequency < 1)
         TRY(warnings_add(warnings, "/duration",
@@ -89,24 +104,45 @@ static Status warn_times(const Scene *scene, const StructureSdof *sdof, Warnings
     return STATUS_OK;
 }
 
-static Status warn_masses(const Scene *scene, const StructureSdof *sdof, Warnings *warnings) {
+// A damper outweighs what it stands on.
+static Status warn_masses(const Scene *scene, Warnings *warnings) {
+    const Structure *structure = scene_structure(scene);
     for (size_t i = 0; i < scene->dampers.count; i++) {
-        const double mass = scene->dampers.at[i].mass;
-        if (mass <= sdof->mass)
+        const Damper *on = &scene->dampers.at[i];
+        const double mass = on->mass;
+        double moved;
+        TRY(structure_kind(structure)->moved_mass(structure, (size_t)on->storey - 1, &moved));
+        if (mass <= moved)
             continue;
         char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
         pointer_index(damper, sizeof damper, "/dampers", i);
         pointer_join(place, sizeof place, damper, "mass");
-        TRY(warnings_add(warnings, place, "is %s kg, more than the structure's %s kg",
-                         text_real(is, mass), text_real(than, sdof->mass)));
+        TRY(warnings_add(warnings, place, "is %s kg, more than the %s's %s kg", text_real(is, mass),
+                         structure_storeys(structure) > 1 ? "storey" : "structure",
+                         text_real(than, moved)));
     }
+    return STATUS_OK;
+}
+
+// What the excitation's kind alone can judge.
+static Status warn_excitation(const Scene *scene, Warnings *warnings) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    if (kind->doubt == NULL || warnings == NULL)
+        return STATUS_OK;
+    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
+    Problem doubts;
+    problem_clear(&doubts);
+    kind->doubt(excitation, &span, "/excitation", &doubts);
+    for (size_t i = 0; i < doubts.count && i < PROBLEM_FAULTS; i++)
+        TRY(warnings_add(warnings, doubts.faults[i].pointer, "%s", doubts.faults[i].detail));
     return STATUS_OK;
 }
 
 Status plausible_warn(const Simulation *simulation, Warnings *warnings) {
     const Scene *scene = &simulation->scene;
     TRY(warn_rows(simulation_fields, simulation, "", warnings));
-    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene->structure;
-    TRY(warn_times(scene, sdof, warnings));
-    return warn_masses(scene, sdof, warnings);
+    TRY(warn_times(scene, warnings));
+    TRY(warn_excitation(scene, warnings));
+    return warn_masses(scene, warnings);
 }

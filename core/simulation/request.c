@@ -4,18 +4,20 @@
 #include <string.h>
 
 #include "core/simulation/plausible.h"
+#include "core/simulation/request_channels.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solvers.h"
 
 enum { LABELS = 32, TITLE_BYTES = 200, SEGMENT = 4096 };
 
-static const char *const usual_channels[] = {"displacement",        "velocity",      "acceleration",
-                                             "damper_displacement", "contact_force", NULL};
-static const char *const usual_psd_channels[] = {"mean_acceleration", NULL};
+// Every channel of 200 storeys and 64 dampers once, and the usual ones.
+enum { CHANNELS = 4 * STRUCTURE_STOREYS + 4 * SCENE_DAMPERS + 2 };
+
+static const char *const usual[] = {CHANNEL_USUAL, NULL};
 
 // clang-format off
 static const Field psd_fields[] = {
-    FIELD_TEXTS(SpectrumRequest, channels, channel_names, usual_psd_channels, CHANNEL_COUNT, PRESENCE_DEFAULT, 0, "channels of which a spectrum is wanted"),
+    FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels of which a spectrum is wanted; usual: mean_acceleration of the top storey"),
     FIELD_COUNT(SpectrumRequest, segment, "samples", AT_LEAST(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
     FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_LEAST(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
     FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
@@ -24,7 +26,7 @@ static const Field psd_fields[] = {
 };
 
 static const Field output_fields[] = {
-    FIELD_TEXTS(Output, channels, channel_names, usual_channels, CHANNEL_COUNT, PRESENCE_DEFAULT, 0, "channels that are sampled"),
+    FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels that are sampled; with several storeys or dampers each with its number from 1, displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
     FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
     FIELD_END
@@ -40,62 +42,21 @@ const Field simulation_fields[] = {
 };
 
 const Field summary_fields[] = {
-    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events"),
-    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples"),
-    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events"),
-    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples"),
+    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
+    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
     FIELD_COUNT(Summary, impacts, NULL, AT_LEAST(0), OPTIONAL, "number of impacts"),
-    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events"),
+    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
-    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated relative error"),
-    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "time to which the trajectory can be trusted"),
+    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond only statistics hold; null with an error_estimate: not within the run"),
     FIELD_END
 };
 // clang-format on
 
 void simulation_clear(Simulation *simulation) {
     fields_clear(simulation_fields, simulation);
-}
-
-static bool is_of_damper(const char *name) {
-    const Channel *channel = channel_find(name);
-    return channel != NULL && channel->owner == CHANNEL_OF_DAMPER;
-}
-
-static bool texts_are(const Texts *texts, const char *const *wanted) {
-    for (size_t i = 0; i < texts->count; i++)
-        if (wanted[i] == NULL || strcmp(texts->at[i], wanted[i]) != 0)
-            return false;
-    return wanted[texts->count] == NULL;
-}
-
-// Nobody asked for the usual channels one by one: those of a damper are there if a damper is.
-static void drop_damper_channels(Texts *texts) {
-    size_t kept = 0;
-    for (size_t i = 0; i < texts->count; i++)
-        if (is_of_damper(texts->at[i]))
-            free(texts->at[i]);
-        else
-            texts->at[kept++] = texts->at[i];
-    texts->count = kept;
-}
-
-static Status check_channels(const Texts *texts, size_t dampers, const char *pointer,
-                             Problem *problem) {
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < texts->count && i < CHANNEL_COUNT; i++) {
-        char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, i);
-        if (dampers == 0 && is_of_damper(texts->at[i]))
-            status = problem_add(problem, STATUS_INVALID, place,
-                                 "%s needs a damper, the scene has none", texts->at[i]);
-        for (size_t j = 0; j < i; j++)
-            if (strcmp(texts->at[i], texts->at[j]) == 0)
-                status = problem_add(problem, STATUS_INVALID, place,
-                                     "%.64s is asked for twice, first at %s/%zu", texts->at[i],
-                                     pointer, j);
-    }
-    return status;
 }
 
 static Status check_overlap(const SpectrumRequest *psd, Problem *problem) {
@@ -143,14 +104,11 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
                               Problem *problem) {
     const Scene *scene = &simulation->scene;
     Output *output = &simulation->output;
-    // Dampers that could not be read are no reason to refuse their channels.
-    const size_t dampers = problem_concerns(problem, "/dampers") ? 1 : scene->dampers.count;
-    if (dampers == 0 && texts_are(&output->channels, usual_channels))
-        drop_damper_channels(&output->channels);
-    Status status = check_channels(&output->channels, dampers, "/output/channels", problem);
-    if (check_channels(&output->psd.channels, dampers, "/output/psd/channels", problem) !=
-        STATUS_OK)
-        status = STATUS_INVALID;
+    const Status faults[] = {
+        request_channels(scene, &output->channels, false, "/output/channels", problem),
+        request_channels(scene, &output->psd.channels, true, "/output/psd/channels", problem),
+    };
+    Status status = faults[0] != STATUS_OK ? faults[0] : faults[1];
     // Statistics need a sample at least.
     const double last = count > 0 ? (double)(count - 1) / scene->sample_rate : scene->duration;
     if (scene->duration > 0 && output->statistics_from > last &&
@@ -179,6 +137,22 @@ static Status check_cost(const Simulation *simulation, const SimulationLimits *l
                             steps, limits->steps);
 }
 
+// Many channels may be more than one scene's share, though each of them has few samples.
+static Status check_values(const Simulation *simulation, const SimulationLimits *limits,
+                           Problem *problem) {
+    const Output *output = &simulation->output;
+    const double samples = (double)scene_sample_count(&simulation->scene);
+    const double columns = (double)(output->channels.count + output->psd.channels.count);
+    if (limits == NULL || limits->samples == 0 ||
+        samples * columns <= (double)limits->samples * (CHANNEL_COUNT + 1))
+        return STATUS_OK;
+    return problem_add_real(
+        problem, STATUS_INVALID, "/output/channels", (double)output->channels.count, NULL,
+        "%.0f channels of %.0f samples are %.3g values, must be at most %.3g: "
+        "ask for fewer channels or samples",
+        columns, samples, samples * columns, (double)limits->samples * (CHANNEL_COUNT + 1));
+}
+
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem) {
     const size_t most_samples = limits != NULL ? limits->samples : 0;
@@ -192,6 +166,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     TRY(scene);
     if (problem_concerns(problem, ""))
         return problem->status;
+    if (status == STATUS_OK)
+        status = check_values(simulation, limits, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)

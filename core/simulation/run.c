@@ -54,18 +54,33 @@ typedef struct Journey {
     const Simulation *simulation;
     const SimulationLimits *limits;
     const Watch *watch;
+    Workspace *workspace; // or NULL
     Plan *plan;
     Base base;
     Columns hidden;      // channels that only a spectrum wants
     Columns transformed; // borrowed values of the spectrum's channels
-    RunColumn wanted[CHANNEL_COUNT];
+    const char **units;  // of their densities
+    RunColumn *wanted;   // room for all names that ask for one
     size_t wanted_count;
     Outcome *outcome;
 } Journey;
 
-static RunColumn *find_column(Journey *journey, const Channel *channel) {
+static FourierStock *stock(const Journey *journey) {
+    return journey->workspace == NULL ? NULL : &journey->workspace->transforms;
+}
+
+// What a name asks for; a bare one is of the first storey or damper.
+static RunColumn column_of(const char *name) {
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    return (RunColumn){(ChannelId)(channel - channels), number > 0 ? number - 1 : 0, NULL};
+}
+
+static const RunColumn *find_column(const Journey *journey, const char *name) {
+    const RunColumn asked = column_of(name);
     for (size_t i = 0; i < journey->wanted_count; i++)
-        if (&channels[journey->wanted[i].channel] == channel)
+        if (journey->wanted[i].channel == asked.channel &&
+            journey->wanted[i].number == asked.number)
             return &journey->wanted[i];
     return NULL;
 }
@@ -73,40 +88,40 @@ static RunColumn *find_column(Journey *journey, const Channel *channel) {
 // Columns for `names` that no earlier request has, entered into the journey's list.
 static Status make_columns(Journey *journey, const Texts *names, Columns *columns,
                            Problem *problem) {
-    const size_t first = journey->wanted_count;
-    for (size_t i = 0; i < names->count; i++) {
-        const Channel *channel = channel_find(names->at[i]);
-        if (channel != NULL && find_column(journey, channel) == NULL)
-            journey->wanted[journey->wanted_count++] =
-                (RunColumn){.channel = (ChannelId)(channel - channels)};
-    }
-    const size_t count = journey->wanted_count - first;
+    size_t count = 0;
+    for (size_t i = 0; i < names->count; i++)
+        count += find_column(journey, names->at[i]) == NULL;
     if (count == 0)
         return STATUS_OK;
     TRY(columns_make(columns, count, journey->plan->count, 0, problem));
-    for (size_t i = 0; i < count; i++) {
-        RunColumn *wanted = &journey->wanted[first + i];
-        columns_name(columns, i, channels[wanted->channel].name, channels[wanted->channel].unit);
-        wanted->values = columns->at[i].values;
+    for (size_t i = 0, made = 0; i < names->count; i++) {
+        if (find_column(journey, names->at[i]) != NULL)
+            continue;
+        RunColumn *wanted = &journey->wanted[journey->wanted_count++];
+        *wanted = column_of(names->at[i]);
+        columns_name(columns, made, names->at[i], channels[wanted->channel].unit);
+        wanted->values = columns->at[made++].values;
     }
     return STATUS_OK;
 }
 
 static Status make_spectrum(Journey *journey, Problem *problem) {
     const SpectrumRequest *request = &journey->simulation->output.psd;
-    const char *units[CHANNEL_COUNT];
     if (request->channels.count == 0)
         return STATUS_OK;
     Columns *columns = &journey->transformed;
     columns->at = calloc(request->channels.count, sizeof *columns->at);
-    if (columns->at == NULL)
+    const char **units = calloc(request->channels.count, sizeof *units);
+    journey->units = units;
+    if (columns->at == NULL || units == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the spectra");
     columns->count = request->channels.count;
     columns->rows = journey->plan->count;
     for (size_t i = 0; i < columns->count; i++) {
-        const Channel *channel = channel_find(request->channels.at[i]);
-        columns_name(columns, i, channel->name, channel->unit);
-        columns->at[i].values = find_column(journey, channel)->values;
+        const RunColumn *wanted = find_column(journey, request->channels.at[i]);
+        const Channel *channel = &channels[wanted->channel];
+        columns_name(columns, i, request->channels.at[i], channel->unit);
+        columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
     Stage stage = {journey->watch, 0.9, 0.1};
@@ -114,7 +129,7 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
     return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
-                          &journey->outcome->spectrum, problem);
+                          stock(journey), &journey->outcome->spectrum, problem);
 }
 
 static void summarize(Outcome *outcome) {
@@ -131,8 +146,18 @@ static void summarize(Outcome *outcome) {
                   .impacts = impacts,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
-                  .error_estimate = NAN,
-                  .trust_horizon = NAN};
+                  .error_estimate = response->has_trust ? response->error_estimate : NAN,
+                  .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
+}
+
+static Status warn_of_horizon(Outcome *outcome, Problem *problem) {
+    if (isnan(outcome->summary.trust_horizon) ||
+        warnings_add(&outcome->warnings, "/duration",
+                     "the run goes on beyond t = %.6g s: there rounding has moved the displacement "
+                     "by %g of its largest value, and from there on only statistics hold",
+                     outcome->summary.trust_horizon, RESPONSE_PARTING) == STATUS_OK)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
 }
 
 // Finite inputs can still be too large for their products.
@@ -153,8 +178,10 @@ static Status travel(Journey *journey, Problem *problem) {
     const Scene *scene = &simulation->scene;
     Outcome *outcome = journey->outcome;
     TRY(make_plan(simulation, &journey->plan, problem));
-    const Span span = {scene->duration, scene->sample_rate,
-                       journey->limits == NULL ? 0 : journey->limits->samples};
+    const Span span = {.duration = scene->duration,
+                       .sample_rate = scene->sample_rate,
+                       .most = journey->limits == NULL ? 0 : journey->limits->samples,
+                       .transforms = stock(journey)};
     const Excitation *excitation = scene_excitation(scene);
     Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
@@ -166,6 +193,11 @@ static Status travel(Journey *journey, Problem *problem) {
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
+    journey->wanted =
+        calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,
+               sizeof *journey->wanted);
+    if (journey->wanted == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
     TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, problem));
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
     run.columns = journey->wanted;
@@ -173,6 +205,7 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     summarize(outcome);
     TRY(check_finite(outcome, problem));
+    TRY(warn_of_horizon(outcome, problem));
     TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
@@ -180,16 +213,22 @@ static Status travel(Journey *journey, Problem *problem) {
 }
 
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Outcome **outcome, Problem *problem) {
+                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      Problem *problem) {
     *outcome = NULL;
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
     atomic_init(&held->holds, 1);
-    Journey journey = {
-        .simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
+    Journey journey = {.simulation = simulation,
+                       .limits = limits,
+                       .watch = watch,
+                       .workspace = workspace,
+                       .outcome = &held->outcome};
     const Status status = travel(&journey, problem);
     free(journey.transformed.at); // its values are the other columns'
+    free(journey.units);
+    free(journey.wanted);
     columns_clear(&journey.hidden);
     base_clear(&journey.base);
     plan_free(journey.plan);
@@ -212,6 +251,7 @@ void outcome_drop(Outcome *outcome) {
     fields_clear(plan_report_fields, &outcome->plan);
     response_clear(&outcome->response);
     spectrum_clear(&outcome->spectrum);
+    warnings_clear(&outcome->warnings);
     free(outcome);
 }
 
@@ -224,14 +264,37 @@ size_t outcome_bytes(const Outcome *outcome) {
 }
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
-// shows that the stops are out of reach.
-static double flight_arcs(const Scene *scene) {
-    const StructureSdof *sdof = (const StructureSdof *)(const void *)scene_structure(scene);
+// shows that the stops are out of reach, and coupled modes have no closed form for a whole
+// interval.
+static double flight_arcs(const Scene *scene, double fastest) {
     const Excitation *excitation = scene_excitation(scene);
-    double rate = fmax(sqrt(sdof->stiffness / sdof->mass), structure_damping(sdof) / sdof->mass);
+    double rate = fastest;
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    return scene->dampers.count > 0 && rate > scene->sample_rate ? rate * scene->duration : 0;
+    const Structure *structure = scene_structure(scene);
+    const bool is_by_arcs = scene->dampers.count > 0 ||
+                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
+    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
+}
+
+// A frame's sample is a step for each mode and each damper, or a product with a matrix where
+// damping couples the modes; and finding the modes comes before.
+static double steps_a_sample(const Scene *scene, double *planning) {
+    const Structure *structure = scene_structure(scene);
+    const double storeys = (double)structure_storeys(structure);
+    *planning = 0;
+    if (storeys == 1 && scene->dampers.count <= 1)
+        return 1;
+    *planning = 2 * storeys * storeys * storeys;
+    const bool may_couple = storeys > 1 && isnan(structure->damping_ratio);
+    return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
+}
+
+// Contacts under a power law: some 6000 steps' worth each, at a guess seven a second.
+static double power_steps(const Scene *scene) {
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    return law->form == CONTACT_POWER ? 7 * 6000.0 * scene->duration * (double)scene->dampers.count
+                                      : 0;
 }
 
 Cost simulation_cost(const Simulation *simulation) {
@@ -240,7 +303,13 @@ Cost simulation_cost(const Simulation *simulation) {
     const bool has_damper = simulation->scene.dampers.count > 0;
     // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
     // transformed sample costs about a third of a step, and overlap transforms it several times.
-    double steps = samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene);
+    StructureRates rates;
+    if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
+        rates.fastest = 0; // a guess without memory: the run will tell
+    double planning, step = steps_a_sample(&simulation->scene, &planning);
+    double steps = planning + step * (samples * (has_damper ? 1.1 : 1) +
+                                      flight_arcs(&simulation->scene, rates.fastest));
+    steps += power_steps(&simulation->scene);
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /
                  (double)(psd->segment - psd->overlap) / 3;

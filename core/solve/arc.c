@@ -9,7 +9,7 @@
 
 // Smallest degree n with 3! rho^(n - 3) / n! below rounding, since a base's slope enters x at t^3
 // only; at least 5.
-static size_t degree_for(double rho) {
+size_t arc_degree(double rho) {
     size_t degree = 3;
     double term = 1;
     while ((term > 4e-18 || degree < 5) && degree < ROOT_DEGREE)
@@ -17,29 +17,29 @@ static size_t degree_for(double rho) {
     return degree;
 }
 
-static void base_series(Arc *arc, const Slice *slice, double length) {
-    for (size_t k = 0; k <= arc->degree; k++)
-        arc->base[k] = 0;
+void arc_base_series(double *base, size_t degree, const Slice *slice, double length) {
+    for (size_t k = 0; k <= degree; k++)
+        base[k] = 0;
     if (slice->omega > 0) {
         const double turn = slice->omega * length;
         const double cycle[4] = {slice->value, slice->slope, -slice->value, -slice->slope};
         double scale = 1;
-        for (size_t k = 0; k <= arc->degree; k++) {
-            arc->base[k] = cycle[k % 4] * scale;
+        for (size_t k = 0; k <= degree; k++) {
+            base[k] = cycle[k % 4] * scale;
             scale *= turn / (double)(k + 1);
         }
     } else {
-        arc->base[0] = slice->value;
-        arc->base[1] = slice->slope * length;
+        base[0] = slice->value;
+        base[1] = slice->slope * length;
     }
 }
 
 void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
               double length) {
     arc->length = length;
-    arc->rho = length * motion->rate;
-    arc->degree = degree_for(arc->rho);
-    base_series(arc, slice, length);
+    arc->rho = length * fmax(motion->rate, slice->omega);
+    arc->degree = arc_degree(arc->rho);
+    arc_base_series(arc->base, arc->degree, slice, length);
     const double square = length * length;
     const double omega2 = motion->omega2 * square, damping = motion->damping * length;
     const double contact2 = motion->contact_omega2 * square;
@@ -99,7 +99,7 @@ double arc_base(const Arc *arc, double s) {
     return root_value(arc->base, arc->degree, s);
 }
 
-static double integral(const double *c, size_t degree) {
+double arc_integral(const double *c, size_t degree) {
     double sum = 0;
     for (size_t k = degree + 1; k-- > 0;)
         sum += c[k] / (double)(k + 1);
@@ -107,20 +107,16 @@ static double integral(const double *c, size_t degree) {
 }
 
 double arc_impulse(const Arc *arc) {
-    return arc->length > 0 ? integral(arc->force, arc->degree - 1) / arc->length : 0;
+    return arc->length > 0 ? arc_integral(arc->force, arc->degree - 1) / arc->length : 0;
 }
 
-// Gauss-Legendre quadrature on [0, 1]; its error for products of two solutions is (2 rho)^(2 n)
-// times a constant that 3, 5 and 8 points keep below 1e-14.
-typedef struct Quadrature {
-    size_t count;
-    double node[8], weight[8];
-} Quadrature;
-
+// Its error for products of two solutions is (2 rho)^(2 n) times a constant that 4, 5 and 8 points
+// keep below 1e-14. Fewer points are not enough for small rho either: under a linear base v has an
+// s^2 of its own, and v^2 an s^6 with rho^2 alone.
 // clang-format off
 static const Quadrature quadratures[] = {
-    {3, {0.1127016653792583, 0.5, 0.8872983346207417},
-        {0.2777777777777778, 0.4444444444444444, 0.2777777777777778}},
+    {4, {0.06943184420297371, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263},
+        {0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269}},
     {5, {0.04691007703066800, 0.2307653449471585, 0.5, 0.7692346550528415, 0.9530899229693320},
         {0.1184634425280945, 0.2393143352496832, 0.2844444444444444, 0.2393143352496832, 0.1184634425280945}},
     {8, {0.01985507175123188, 0.1016667612931866, 0.2372337950418355, 0.4082826787521751,
@@ -130,11 +126,15 @@ static const Quadrature quadratures[] = {
 };
 // clang-format on
 
+const Quadrature *arc_quadrature(double rho) {
+    return &quadratures[rho <= 0.02 ? 0 : rho <= 0.3 ? 1 : 2];
+}
+
 ArcIntegrals arc_integrals(const Arc *arc) {
-    ArcIntegrals out = {0, 0, 0, 0, arc->length * integral(arc->base, arc->degree)};
+    ArcIntegrals out = {0, 0, 0, 0, arc->length * arc_integral(arc->base, arc->degree)};
     if (!(arc->length > 0))
         return out;
-    const Quadrature *rule = &quadratures[arc->rho <= 0.02 ? 0 : arc->rho <= 0.3 ? 1 : 2];
+    const Quadrature *rule = arc_quadrature(arc->rho);
     for (size_t i = 0; i < rule->count; i++) {
         const double s = rule->node[i], weight = rule->weight[i];
         const double v = root_slope(arc->x, arc->degree, s), w = root_slope(arc->r, arc->degree, s);
@@ -149,32 +149,40 @@ ArcIntegrals arc_integrals(const Arc *arc) {
     return out;
 }
 
-double arc_peak_force(const Arc *arc, double least, double *s) {
-    if (!(arc->length > 0))
-        return least;
-    const size_t degree = arc->degree - 1;
-    const double square = arc->length * arc->length;
+double arc_largest(const double *c, size_t degree, double least, double *s) {
     double bound = 0;
     for (size_t k = 0; k <= degree; k++)
-        bound += fabs(arc->force[k]);
-    if (bound / square <= least)
+        bound += fabs(c[k]);
+    if (bound <= least)
         return least;
-    // |n| is largest at an end or where its slope changes sign; an arc is too short for a second
-    // such place.
+    // The magnitude is largest at an end or where its slope changes sign; an arc is too short for a
+    // second such place.
     double slope[ROOT_DEGREE + 1], at[3] = {0, 1, 1};
-    const double sign = degree > 0 && arc->force[1] < 0 ? -1 : 1;
+    const double sign = degree > 0 && c[1] < 0 ? -1 : 1;
     for (size_t k = 0; k < degree; k++)
-        slope[k] = sign * (double)(k + 1) * arc->force[k + 1];
+        slope[k] = sign * (double)(k + 1) * c[k + 1];
     if (degree > 1)
         (void)root_first_crossing(slope, degree - 1, &at[2]);
     for (size_t i = 0; i < 3; i++) {
-        const double value = fabs(root_value(arc->force, degree, at[i])) / square;
+        const double value = fabs(root_value(c, degree, at[i]));
         if (value > least) {
             least = value;
             *s = at[i];
         }
     }
     return least;
+}
+
+double arc_peak_force(const Arc *arc, double least, double *s) {
+    if (!(arc->length > 0))
+        return least;
+    const double square = arc->length * arc->length;
+    double at = -1;
+    const double most = arc_largest(arc->force, arc->degree - 1, least * square, &at);
+    if (at < 0)
+        return least;
+    *s = at;
+    return most / square;
 }
 
 double slice_at(const Slice *slice, double time) {

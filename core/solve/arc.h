@@ -28,7 +28,7 @@ typedef struct Motion {
     double contact_omega2;  // k / m_e [1/s^2], 0 in flight
     double contact_damping; // c / m_e [1/s]
     bool is_resting;
-    double rate; // no eigenvalue of the system, base included, is larger [1/s]
+    double rate; // no eigenvalue of the system, without the base, is larger [1/s]
 } Motion;
 
 // The base over a stretch: a_g(t) = value + slope t, or, with omega > 0, value cos(omega t) + slope
@@ -42,7 +42,7 @@ typedef struct Slice {
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct Arc {
     double length; // [s]
-    double rho;    // length * rate, at most 1
+    double rho;    // length * rate, the base's included, at most 1
     size_t degree; // of x and r; push and force have one less
     double x[ROOT_DEGREE + 1], r[ROOT_DEGREE + 1];
     double push[ROOT_DEGREE + 1];  // s length^2
@@ -57,7 +57,7 @@ typedef struct ArcIntegrals {
     double a;      // of a_g [m/s]
 } ArcIntegrals;
 
-// length * motion->rate must be at most 1.
+// length * motion->rate and length * slice->omega must be at most 1.
 void arc_make(Arc *arc, const Motion *motion, const State *start, const Slice *slice,
               double length);
 
@@ -78,5 +78,20 @@ double arc_base(const Arc *arc, double s);
 State arc_at(const Arc *arc, double s);
 
 double slice_at(const Slice *slice, double time);
+
+// What other polynomials in s = t / length need as well: the degree that leaves only rounding where
+// coefficients fall like rho^k / k! (rho at most 1), a_g's coefficients, the integral over [0, 1],
+// and the largest |value| if it is above `least`, else `least`; *s is where, or untouched.
+size_t arc_degree(double rho);
+void arc_base_series(double *base, size_t degree, const Slice *slice, double length);
+double arc_integral(const double *c, size_t degree);
+double arc_largest(const double *c, size_t degree, double least, double *s);
+
+// Gauss-Legendre quadrature on [0, 1] that is exact but for rounding for products of two solutions.
+typedef struct Quadrature {
+    size_t count;
+    double node[8], weight[8];
+} Quadrature;
+const Quadrature *arc_quadrature(double rho);
 
 #endif

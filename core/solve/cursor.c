@@ -34,6 +34,29 @@ static Slice aligned_slice(const BaseCursor *cursor, size_t n, double offset) {
     return sampled_slice(cursor->base, j, whole + offset / cursor->base->interval);
 }
 
+// The piece that holds `offset` after output sample n; returns for how long. Times are taken from
+// the sample on, so that knots keep their digits late in a run.
+static double piece_slice(const BaseCursor *cursor, size_t n, double offset, Slice *slice) {
+    const Base *base = cursor->base;
+    const double sample = (double)n / cursor->sample_rate;
+    const double clock = 8 * DBL_EPSILON * (sample + offset); // nearer is as good as there
+    *slice = (Slice){0, 0, 0};
+    for (size_t i = 0; i < base->piece_count; i++) {
+        const BasePiece *piece = &base->pieces[i];
+        const double since = sample - piece->time + offset;
+        if (since < -clock)
+            return -since;
+        const double t = fmax(since, 0), cosine = cos(base->omega * t), sine = sin(base->omega * t);
+        const bool is_still = piece->value == 0 && piece->slope == 0;
+        *slice = is_still ? (Slice){0, 0, 0}
+                 : base->omega > 0
+                     ? (Slice){piece->value * cosine + piece->slope * sine,
+                               piece->slope * cosine - piece->value * sine, base->omega}
+                     : (Slice){piece->value + piece->slope * t, piece->slope, 0};
+    }
+    return INFINITY;
+}
+
 bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
     switch (cursor->base->form) {
     case BASE_STILL:
@@ -42,6 +65,9 @@ bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
     case BASE_SINE:
         *slice = sine_slice(cursor->base, (double)n / cursor->sample_rate);
         return true;
+    case BASE_PIECES:
+        return piece_slice(cursor, n, 0, slice) >=
+               (1 - 8 * DBL_EPSILON * (double)(n + 1)) / cursor->sample_rate;
     case BASE_SAMPLED:
         break;
     }
@@ -55,6 +81,8 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
     const Base *base = cursor->base;
     const double time = (double)n / cursor->sample_rate + offset;
     *slice = (Slice){0, 0, 0};
+    if (base->form == BASE_PIECES)
+        return piece_slice(cursor, n, offset, slice);
     if (base->form == BASE_SINE)
         *slice = sine_slice(base, time);
     if (base->form != BASE_SAMPLED)

@@ -13,6 +13,7 @@
 // offset from it, so that short contacts keep their digits late in a run.
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,6 +21,7 @@
 #include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
+#include "core/solve/frame.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
@@ -83,7 +85,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     if (held == NULL) {
         if ((held = exact->holds[exact->side] = calloc(1, sizeof *held)) == NULL)
             return false;
-        hold_make(held, &exact->touching[exact->side], slice->omega, exact->interval);
+        hold_make(held, &exact->touching[exact->side], exact->run->base->omega, exact->interval);
     }
     const double mass = exact_effective_mass(exact);
     State end;
@@ -112,7 +114,7 @@ static Status advance(Exact *exact, double length) {
     if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
         hold(exact, &slice, length))
         return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
-    length = fmin(length, 1 / system->rate);
+    length = fmin(length, 1 / fmax(system->rate, slice.omega));
     Arc arc;
     arc_make(&arc, system, &exact->state, &slice, length);
     double s;
@@ -200,7 +202,7 @@ static Status cross(Exact *exact, double length) {
 
 static Status prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
     const Plan *plan = run->plan;
-    memset(exact, 0, sizeof *exact);
+    memset(exact, 0, offsetof(Exact, trust));
     exact->run = run;
     exact->plan = plan;
     exact->damper = plan->dampers;
@@ -212,7 +214,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
                      .damping = plan->damping[0] / plan->mass[0],
                      .share = share};
     const double own = fmax(sqrt(flying.omega2), flying.damping);
-    flying.rate = fmax(fmax(own, run->base->omega), 1e-300);
+    flying.rate = fmax(own, 1e-300);
     exact->flying = exact->resting = flying;
     exact->resting.is_resting = true;
     for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->damper_count > 0; side++) {
@@ -234,13 +236,15 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
                            exact->damper->velocity};
+    trust_start(&exact->trust, &exact->flying, exact->touching, &exact->resting, &exact->state,
+                exact->damper->clearance, run->base->form == BASE_SINE, plan->duration);
     const EnergyState energy = exact_energy(exact);
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
+    exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
     exact_stride_start(exact);
     if (exact->lanes.run == NULL)
-        flight_make(&exact->flight, &flying, run->base->form == BASE_SINE ? run->base->omega : 0,
-                    exact->interval);
+        flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
     return STATUS_OK;
 }
 
@@ -253,7 +257,7 @@ static Status settle(Exact *exact) {
         Side side;
         (void)base_cursor_slice(&exact->base, 0, 0, &slice);
         arc_make(&arc, exact_motion(exact), &exact->state, &slice,
-                 fmin(exact->interval, 1 / exact_motion(exact)->rate));
+                 fmin(exact->interval, 1 / fmax(exact_motion(exact)->rate, slice.omega)));
         is_event = exact->phase == FLIGHT && exact_find_event(exact, &arc, &s, &side) && s == 0;
         if (is_event)
             exact_touch(exact, side);
@@ -291,12 +295,16 @@ static Status solve(Exact *exact) {
     // The duration may end between samples.
     TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
     exact_note(exact);
+    exact_end_phase(exact);
+    trust_tell(&exact->trust, exact->ledger.response);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
     return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return frame_run(run, response, problem);
     Exact exact;
     TRY(prepare(&exact, run, response, problem));
     const Status status = solve(&exact);

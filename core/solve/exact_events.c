@@ -23,6 +23,16 @@ void exact_pass_sample(Exact *exact) {
     ledger_peaks(&exact->ledger, &at);
 }
 
+void exact_end_phase(Exact *exact) {
+    const double time = exact_time(exact), largest = exact->ledger.response->peaks.displacement;
+    if (exact->phase == FLIGHT)
+        trust_fly(&exact->trust, time, &exact->state, largest);
+    else if (exact->phase == CONTACT)
+        trust_press(&exact->trust, exact->side, time, &exact->state, largest);
+    else
+        trust_rest(&exact->trust, time, &exact->state, largest);
+}
+
 static void begin_contact(Exact *exact, Side side) {
     exact->phase = CONTACT;
     exact->contact_arcs = 0;
@@ -37,6 +47,7 @@ static void begin_contact(Exact *exact, Side side) {
 static void begin_rest(Exact *exact, Side side) {
     // What relative momentum is left goes over to both, conserved.
     const double mass = exact_effective_mass(exact), speed = fabs(exact->state.w);
+    trust_stick(&exact->trust);
     exact->state.v += exact->resting.share * exact->state.w;
     exact->state.w = 0;
     exact->state.r = 0;
@@ -53,6 +64,7 @@ static void bounce(Exact *exact, Side side) {
     const double sign = exact_sign(side), e = exact->damper->stops[side].restitution;
     const double approach = fabs(exact->state.w);
     const double mass = exact_effective_mass(exact); // m_e = m M / (M + m)
+    trust_bounce(&exact->trust, e, exact->state.w, exact_push(exact));
     exact->origin = (Origin)side;
     exact->state.r = 0;
     exact->state.v += sign * exact->resting.share * (1 + e) * approach;
@@ -72,6 +84,7 @@ static void bounce(Exact *exact, Side side) {
 void exact_touch(Exact *exact, Side side) {
     exact->is_leaving = false;
     exact_note(exact);
+    exact_end_phase(exact);
     if (exact->plan->form == CONTACT_LINEAR)
         begin_contact(exact, side);
     else if (exact->damper->clearance == 0)
@@ -83,6 +96,7 @@ void exact_touch(Exact *exact, Side side) {
 
 void exact_release(Exact *exact) {
     exact_note(exact);
+    exact_end_phase(exact);
     // A slope of the wrong sign is rounding: the gap does open.
     const double sign = exact_sign(exact->side);
     exact->is_leaving = exact->phase == RESTING;

@@ -13,4 +13,7 @@ void exact_release(Exact *exact);          // contact or rest ends
 void exact_pass_sample(Exact *exact);      // the present interval's end: records the next sample
 void exact_note(Exact *exact);             // takes peaks and the energy balance at this instant
 
+// Tells the estimate of what rounding does that the present phase ends, or the run.
+void exact_end_phase(Exact *exact);
+
 #endif

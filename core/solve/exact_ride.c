@@ -244,8 +244,7 @@ __attribute__((target("avx2"))) static size_t run_avx2(Press *press, size_t most
     return run(press, most);
 }
 
-__attribute__((target("avx512f,avx512dq"))) static size_t
-run_avx512(Press *press, size_t most) {
+__attribute__((target("avx512f,avx512dq"))) static size_t run_avx512(Press *press, size_t most) {
     return run(press, most);
 }
 #endif

@@ -12,6 +12,7 @@
 #include "core/solve/pulse.h"
 #include "core/solve/record.h"
 #include "core/solve/solver.h"
+#include "core/solve/trust.h"
 
 typedef enum Phase { FLIGHT, CONTACT, RESTING } Phase;
 typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN_MIDDLE } Origin;
@@ -47,6 +48,7 @@ typedef struct Exact {
     size_t arcs;         // since the watch was asked
     size_t events;       // all so far
     size_t still_events; // in a row, without time passing
+    Trust trust;         // last: it is large, and cleans itself
 } Exact;
 
 // +1 for the right stop, -1 for the left.

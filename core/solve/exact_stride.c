@@ -32,7 +32,7 @@ void exact_stride_start(Exact *exact) {
     const size_t bytes = exact->plan->count * sizeof(double);
     Stretch *stretch = &exact->stretch;
     double *const *columns = exact->recorder.columns;
-    if (base->form == BASE_SINE || (base->form == BASE_SAMPLED && exact->base.ratio != 1))
+    if (base->form != BASE_STILL && !(base->form == BASE_SAMPLED && exact->base.ratio == 1))
         return;
     lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
     exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;

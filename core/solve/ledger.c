@@ -102,6 +102,7 @@ void ledger_balance(Ledger *ledger, const EnergyState *state) {
         held - energy->initial - energy->input + energy->structural_damping + energy->contact;
     ledger->largest_energy = larger(ledger->largest_energy, larger(held, fabs(energy->input)));
     ledger->largest_balance = larger(ledger->largest_balance, fabs(balance));
+    ledger->largest_gain = larger(ledger->largest_gain, balance);
 }
 
 void ledger_peaks(Ledger *ledger, const Moment *at) {
@@ -129,6 +130,12 @@ Status ledger_status(const Ledger *ledger, Problem *problem) {
     if (ledger->status == STATUS_NO_MEMORY)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for more than %zu impacts",
                            ledger->response->impacts.count);
+    if (ledger->gain_most > 0 && ledger->largest_gain > ledger->gain_most * ledger->largest_energy)
+        return problem_set(problem, STATUS_UNSTABLE,
+                           "the motion gained %.3g J that neither the base nor the start gave it, "
+                           "more than %.3g of its largest energy, %.3g J: its numbers are too far "
+                           "apart for double precision",
+                           ledger->largest_gain, ledger->gain_most, ledger->largest_energy);
     return STATUS_OK;
 }
 

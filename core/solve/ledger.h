@@ -23,12 +23,17 @@ typedef struct LedgerRow {
     Impact impact;
 } LedgerRow;
 
+// Gain_most of an exact solver: there energy comes from nothing but rounding, some 1e-14 of it.
+#define LEDGER_GAIN_EXACT 1e-6
+
 typedef struct Ledger {
     Response *response;
     size_t room, most;
     Status status;
     Energy energy;
     double largest_energy, largest_balance;
+    double largest_gain; // energy held that nothing accounts for [J]
+    double gain_most;    // of largest_gain over largest_energy; above it the run fails; 0: any
 } Ledger;
 
 void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy);
@@ -51,7 +56,8 @@ void ledger_peaks(Ledger *ledger, const Moment *at);
 void ledger_forget_peaks(Ledger *ledger, const Moment *at);
 void ledger_acceleration(Ledger *ledger, double acceleration);
 
-// STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept.
+// STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept, STATUS_UNSTABLE once more energy
+// came out of nothing than gain_most allows.
 Status ledger_status(const Ledger *ledger, Problem *problem);
 // Lists the open ones of `rows`, puts all into order (by start, then damper, then left before
 // right) and writes the energies into the response.

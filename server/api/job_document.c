@@ -2,6 +2,7 @@
 
 #include "server/base/clock.h"
 #include "server/codec/write.h"
+#include "server/jobs/documents.h"
 
 static void write_time(Bytes *bytes, const char *name, int64_t unix_ms) {
     char text[32];
@@ -45,7 +46,8 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     if (parts & JOB_PUT_WHOLE) {
         write_raw(bytes, "plan", show->plan);
         write_raw(bytes, "summary", show->summary);
-        write_raw(bytes, "warnings", show->warnings != NULL ? show->warnings : "[]");
+        bytes_text(bytes, ", \"warnings\": ");
+        document_join(bytes, show->warnings, show->notes);
     }
     bytes_text(bytes, ", \"timing\": {\"queued\": ");
     bytes_real(bytes, show->queued);

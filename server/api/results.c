@@ -11,6 +11,7 @@
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/http/reply.h"
+#include "server/jobs/documents.h"
 
 // The scene as it was run, read back from its canonical JSON. Cleared by simulation_clear in any
 // case.
@@ -31,17 +32,10 @@ static Status read_scene(const ResultRow *row, Simulation *simulation, Problem *
     return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
 }
 
-// Of "displacement" as of "displacement_2".
 static const char *channel_unit(const char *name) {
-    for (size_t i = 0; i < CHANNEL_COUNT; i++) {
-        const size_t size = strlen(channels[i].name);
-        if (strncmp(name, channels[i].name, size) != 0)
-            continue;
-        const char *rest = name + size;
-        if (*rest == '\0' || (*rest == '_' && rest[1 + strspn(rest + 1, "0123456789")] == '\0'))
-            return channels[i].unit;
-    }
-    return NULL;
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    return channel != NULL ? channel->unit : NULL;
 }
 
 static void write_units(Bytes *bytes, const Simulation *simulation) {
@@ -99,9 +93,9 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     }
     bytes_text(bytes, "], \"sample_rate\": ");
     bytes_real(bytes, row->sample_rate);
-    bytes_format(bytes,
-                 ", \"count\": %llu, \"warnings\": %s, \"links\": ", (unsigned long long)row->count,
-                 json_or(row->warnings, "[]"));
+    bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
+    document_join(bytes, row->warnings, row->notes);
+    bytes_text(bytes, ", \"links\": ");
     write_links(bytes, row->id);
     bytes_text(bytes, "}\n");
 }

@@ -86,7 +86,11 @@ static Status reply_table(App *app, Reply *reply, const Encoder *encoder, const 
 static void list_names(const Columns *columns, char *target, size_t size) {
     target[0] = '\0';
     for (size_t i = 0; i < columns->count; i++) {
-        const size_t used = strlen(target);
+        const size_t used = strlen(target), more = strlen(columns->at[i].name) + 2;
+        if (used + more + sizeof ", and 1000 more" > size) {
+            snprintf(target + used, size - used, ", and %zu more", columns->count - i);
+            return;
+        }
         snprintf(target + used, size - used, "%s%s", i > 0 ? ", " : "", columns->at[i].name);
     }
 }

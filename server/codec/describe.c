@@ -109,6 +109,44 @@ static Range count_range(const Field *field) {
     return range;
 }
 
+// A text of the choices, or one with a number.
+static void print_choices(Printer *printer, const Field *field) {
+    if (field->choices == NULL)
+        return;
+    if ((field->flags & FIELD_NUMBERED) == 0) {
+        texts_member(printer, "enum", field->choices);
+        return;
+    }
+    name_member(printer, "pattern");
+    bytes_text(printer->bytes, "\"^(");
+    for (size_t i = 0; field->choices[i] != NULL; i++)
+        bytes_format(printer->bytes, "%s%s", i > 0 ? "|" : "", field->choices[i]);
+    bytes_text(printer->bytes, ")(_[1-9][0-9]*)?$\"");
+}
+
+static void print_reals(Printer *printer, const Field *field) {
+    text_member(printer, "type", "array");
+    open_member(printer, "items", "{");
+    text_member(printer, "type", "number");
+    print_range(printer, &field->range);
+    close_bracket(printer, "}");
+    print_length(printer, field);
+}
+
+static void print_lone(Printer *printer, const Field *field) {
+    open_member(printer, "anyOf", "[");
+    begin_line(printer);
+    open_bracket(printer, "{");
+    text_member(printer, "type", "number");
+    print_range(printer, &field->range);
+    close_bracket(printer, "}");
+    begin_line(printer);
+    open_bracket(printer, "{");
+    print_reals(printer, field);
+    close_bracket(printer, "}");
+    close_bracket(printer, "]");
+}
+
 static void print_texts(Printer *printer, const Field *field) {
     const bool has_pairs = (field->flags & FIELD_PAIRS) != 0;
     if (has_pairs) {
@@ -119,8 +157,7 @@ static void print_texts(Printer *printer, const Field *field) {
     text_member(printer, "type", "array");
     open_member(printer, "items", "{");
     text_member(printer, "type", "string");
-    if (field->choices != NULL)
-        texts_member(printer, "enum", field->choices);
+    print_choices(printer, field);
     close_bracket(printer, "}");
     print_length(printer, field);
     if (has_pairs) {
@@ -225,10 +262,15 @@ static void print_value(Printer *printer, const Field *field) {
             text_member(printer, "default", field->choices[(int)field->initial]);
         break;
     case FIELD_KIND_REALS:
+        if ((field->flags & FIELD_LONE) != 0)
+            print_lone(printer, field);
+        else
+            print_reals(printer, field);
+        break;
+    case FIELD_KIND_ROWS:
         text_member(printer, "type", "array");
         open_member(printer, "items", "{");
-        text_member(printer, "type", "number");
-        print_range(printer, &field->range);
+        print_reals(printer, field);
         close_bracket(printer, "}");
         print_length(printer, field);
         break;

@@ -7,16 +7,9 @@
 #include <string.h>
 
 #include "server/base/shortest.h"
+#include "server/codec/arrays.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), KINDS_SHOWN = 64 };
-
-static void out_of_memory(Reader *reader) {
-    reader->is_out_of_memory = true;
-}
-
-static double number_of(const json_t *value) {
-    return json_number_value(value) + 0.0; // -0 becomes 0
-}
 
 static void read_count(Reader *reader, const json_t *value, const Field *field, uint64_t *target,
                        const char *pointer) {
@@ -28,7 +21,7 @@ static void read_count(Reader *reader, const json_t *value, const Field *field, 
         *target = (uint64_t)json_integer_value(value);
         return;
     }
-    const double number = number_of(value);
+    const double number = read_number(value);
     if (number >= 0 && number < 0x1p63 && floor(number) == number) {
         *target = (uint64_t)number;
         return;
@@ -59,7 +52,7 @@ static void read_text(Reader *reader, const json_t *value, const Field *field, c
     }
     char *text = strdup(json_string_value(value));
     if (text == NULL) {
-        out_of_memory(reader);
+        read_no_memory(reader);
         return;
     }
     free(*target);
@@ -81,120 +74,6 @@ static void read_choice(Reader *reader, const json_t *value, const Field *field,
     refuse_name(reader, pointer, value, field->choices);
 }
 
-static bool allows_length(Reader *reader, const json_t *value, const Field *field, size_t has,
-                          const char *what, const char *pointer) {
-    if (field->most == 0 || has <= field->most)
-        return true;
-    refuse_value(reader, pointer, value, NULL, NULL, "must have at most %zu %s, has %zu",
-                 field->most, what, has);
-    return false;
-}
-
-// A number that the row allows, in place of one that could not be read, so that it is not judged a
-// second time.
-static double allowed_number(const Range *range) {
-    if (!isinf(range->least))
-        return range->is_open_below ? nextafter(range->least, (double)INFINITY) : range->least;
-    if (!isinf(range->most))
-        return range->most;
-    return 0;
-}
-
-static void read_reals(Reader *reader, const json_t *value, const Field *field, Reals *target,
-                       const char *pointer) {
-    if (!json_is_array(value)) {
-        refuse_type(reader, pointer, value, field, "an array of numbers");
-        return;
-    }
-    const size_t count = json_array_size(value);
-    if (!allows_length(reader, value, field, count, "numbers", pointer))
-        return;
-    double *at = count > 0 ? malloc(count * sizeof *at) : NULL;
-    if (at == NULL && count > 0) {
-        out_of_memory(reader);
-        return;
-    }
-    for (size_t i = 0; i < count; i++) {
-        const json_t *element = json_array_get(value, i);
-        if (json_is_number(element)) {
-            at[i] = number_of(element);
-            continue;
-        }
-        at[i] = allowed_number(&field->range);
-        if (!refuse_wants_detail(reader))
-            continue;
-        char place[POINTER_SIZE];
-        pointer_index(place, sizeof place, pointer, i);
-        refuse_type(reader, place, element, field, "a number");
-    }
-    free(target->at);
-    *target = (Reals){at, count};
-}
-
-// "key=value", or `value` alone without a key.
-static char *pair_text(const char *key, const char *value) {
-    if (key == NULL)
-        return strdup(value);
-    const size_t size = strlen(key) + 1 + strlen(value) + 1;
-    char *text = malloc(size);
-    if (text != NULL)
-        snprintf(text, size, "%s=%s", key, value);
-    return text;
-}
-
-// What is no string is told and its place kept by an allowed text, so that those behind it keep
-// theirs.
-static void add_text(Reader *reader, const json_t *value, const char *key, const Field *field,
-                     Texts *texts, const char *place) {
-    const char *content = json_string_value(value);
-    if (content == NULL) {
-        refuse_type(reader, place, value, NULL, "a string");
-        content = field->choices != NULL ? field->choices[0] : "";
-    }
-    char *text = pair_text(key, content);
-    if (text == NULL)
-        out_of_memory(reader);
-    else
-        texts->at[texts->count++] = text;
-}
-
-static void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *target,
-                       const char *pointer) {
-    const bool is_pairs = json_is_object(value) && (field->flags & FIELD_PAIRS) != 0;
-    if (!json_is_array(value) && !is_pairs) {
-        refuse_type(reader, pointer, value, field,
-                    (field->flags & FIELD_PAIRS) != 0 ? "an array or an object of strings"
-                                                      : "an array of strings");
-        return;
-    }
-    const size_t count = is_pairs ? json_object_size(value) : json_array_size(value);
-    if (!allows_length(reader, value, field, count, "texts", pointer))
-        return;
-    Texts texts = {count > 0 ? calloc(count, sizeof *texts.at) : NULL, 0};
-    if (texts.at == NULL && count > 0) {
-        out_of_memory(reader);
-        return;
-    }
-    char place[POINTER_SIZE];
-    if (is_pairs) {
-        const char *key;
-        json_t *element;
-        json_object_foreach((json_t *)value, key, element) {
-            pointer_join(place, sizeof place, pointer, key);
-            add_text(reader, element, key, field, &texts, place);
-        }
-    } else {
-        for (size_t i = 0; i < count; i++) {
-            pointer_index(place, sizeof place, pointer, i);
-            add_text(reader, json_array_get(value, i), NULL, field, &texts, place);
-        }
-    }
-    for (size_t i = 0; i < target->count; i++)
-        free(target->at[i]);
-    free(target->at);
-    *target = texts;
-}
-
 static void read_list(Reader *reader, const json_t *value, const Field *field, void *target,
                       const char *pointer) {
     if (!json_is_array(value)) {
@@ -202,18 +81,18 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
         return;
     }
     const size_t count = json_array_size(value);
-    if (count == 0 || !allows_length(reader, value, field, count, "elements", pointer))
+    if (count == 0 || !read_allows(reader, value, field, count, "elements", pointer))
         return;
     List list = {calloc(count, field->size), 0};
     if (list.at == NULL) {
-        out_of_memory(reader);
+        read_no_memory(reader);
         return;
     }
     for (size_t i = 0; i < count; i++) {
         void *element = (char *)list.at + i * field->size;
         list.count = i + 1;
         if (fields_default(field->fields, element) != STATUS_OK) {
-            out_of_memory(reader);
+            read_no_memory(reader);
             break;
         }
         char place[POINTER_SIZE];
@@ -247,7 +126,7 @@ static void read_item(Reader *reader, const json_t *value, const Field *field, v
     }
     // What stays absent as a whole has its members' defaults only once it is there.
     if (field->presence != PRESENCE_DEFAULT && fields_default(field->fields, target) != STATUS_OK) {
-        out_of_memory(reader);
+        read_no_memory(reader);
     } else if (is_short) {
         size_t offset = 0;
         const Field *row = fields_find(field->fields, field->shorthand, &offset);
@@ -295,7 +174,7 @@ static void read_variant(Reader *reader, const json_t *value, const Field *field
     const Kind *kind = read_kind(reader, value, field->kinds, pointer, &is_known);
     Variant *variant = variant_new(kind != NULL ? kind : field->kinds->at(0));
     if (variant == NULL) {
-        out_of_memory(reader);
+        read_no_memory(reader);
         return;
     }
     variant_free(*target);
@@ -304,7 +183,7 @@ static void read_variant(Reader *reader, const json_t *value, const Field *field
     walk_object(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
                 field->kinds->tag);
     if (silent.is_out_of_memory)
-        out_of_memory(reader);
+        read_no_memory(reader);
 }
 
 static void read_value(Reader *reader, const json_t *value, const Field *field, void *member,
@@ -312,7 +191,7 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
     switch (field->kind) {
     case FIELD_KIND_REAL:
         if (json_is_number(value))
-            *(double *)member = number_of(value);
+            *(double *)member = read_number(value);
         else
             refuse_type(reader, pointer, value, field, "a number");
         break;
@@ -333,6 +212,9 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         break;
     case FIELD_KIND_REALS:
         read_reals(reader, value, field, member, pointer);
+        break;
+    case FIELD_KIND_ROWS:
+        read_rows(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_TEXTS:
         read_texts(reader, value, field, member, pointer);

@@ -26,6 +26,16 @@ static void put_reals(Bytes *bytes, const Reals *reals) {
     bytes_text(bytes, "]");
 }
 
+static void put_rows(Bytes *bytes, const Rows *rows) {
+    bytes_text(bytes, "[");
+    for (size_t i = 0; i < rows->count; i++) {
+        if (i > 0)
+            bytes_text(bytes, ", ");
+        put_reals(bytes, &rows->at[i]);
+    }
+    bytes_text(bytes, "]");
+}
+
 static void put_texts(Bytes *bytes, const Texts *texts) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < texts->count; i++) {
@@ -63,8 +73,16 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
     case FIELD_KIND_CHOICE:
         bytes_json_string(bytes, field->choices[*(const int *)member]);
         break;
-    case FIELD_KIND_REALS:
-        put_reals(bytes, member);
+    case FIELD_KIND_REALS: {
+        const Reals *reals = member;
+        if ((field->flags & FIELD_LONE) != 0 && reals->count == 1)
+            bytes_real(bytes, reals->at[0]);
+        else
+            put_reals(bytes, reals);
+        break;
+    }
+    case FIELD_KIND_ROWS:
+        put_rows(bytes, member);
         break;
     case FIELD_KIND_TEXTS:
         put_texts(bytes, member);
@@ -96,8 +114,8 @@ static bool is_emptied(const Field *field, const void *item) {
 }
 
 static bool is_array(const Field *field) {
-    return field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_TEXTS ||
-           field->kind == FIELD_KIND_LIST;
+    return field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
+           field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
 }
 
 static void put_members(Bytes *bytes, const Field *fields, const void *item, WriteStyle style,

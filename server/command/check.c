@@ -39,6 +39,9 @@ static void derived_print(const Derived *derived) {
     real_print("k_b", derived->stiffness, "N/m");
     real_print("c_b", derived->damping, "N s/m");
     real_print("Z", derived->damping_ratio, NULL);
+    real_print("n", derived->exponent, NULL);
+    real_print("reached e", derived->reached_restitution, NULL);
+    real_print("reached T_c", derived->reached_contact_time, "s");
     putchar('\n');
 }
 
@@ -49,6 +52,21 @@ static void decision_print(const Decision *decision) {
         printf(" (%s%s%s)", text_real(text, decision->value), decision->unit != NULL ? " " : "",
                decision->unit != NULL ? decision->unit : "");
     putchar('\n');
+}
+
+enum { MODES_SHOWN = 12 };
+
+static void modes_print(const PlanModes *modes) {
+    puts("\nModes");
+    for (size_t i = 0; i < modes->count && i < MODES_SHOWN; i++) {
+        printf("  %zu: %.6g Hz", i + 1, modes->at[i].frequency);
+        if (!isnan(modes->at[i].damping_ratio))
+            printf(", damping ratio %.4g", modes->at[i].damping_ratio);
+        putchar('\n');
+    }
+    if (modes->count > MODES_SHOWN)
+        printf("  and %zu more, to %.6g Hz\n", modes->count - MODES_SHOWN,
+               modes->at[modes->count - 1].frequency);
 }
 
 static void plan_print(const char *path, const DryRun *run) {
@@ -67,6 +85,8 @@ static void plan_print(const char *path, const DryRun *run) {
         puts("\nDecisions");
     for (size_t i = 0; i < run->plan.decisions.count; i++)
         decision_print(&run->plan.decisions.at[i]);
+    if (run->plan.modes.count > 0)
+        modes_print(&run->plan.modes);
     if (run->plan.derived.count > 0)
         puts("\nStops");
     for (size_t i = 0; i < run->plan.derived.count; i++)

@@ -1,5 +1,5 @@
 // A file that appears whole or not at all: written beside its name, renamed at the end, removed
-// when the program is interrupted. Not a stream to a terminal. Used by run.c.
+// when the program is interrupted. Not a stream to a terminal. Used by run.c and import.c.
 #ifndef SERVER_COMMAND_OUTPUT_H
 #define SERVER_COMMAND_OUTPUT_H
 

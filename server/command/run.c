@@ -66,10 +66,11 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
 static Status job_write(const Simulation *simulation, const Warnings *warnings,
                         const Outcome *outcome, const int64_t began_unix_ms, double took,
                         Bytes *bytes) {
-    Bytes plan = {0}, summary = {0}, told = {0};
+    Bytes plan = {0}, summary = {0}, told = {0}, notes = {0};
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
     document_warnings(&told, warnings);
+    document_warnings(&notes, &outcome->warnings);
     JobShow show = {.id = "j-local",
                     .state = JOB_SUCCESSFUL,
                     .progress = 100,
@@ -81,29 +82,33 @@ static Status job_write(const Simulation *simulation, const Warnings *warnings,
                     .plan = plan.at,
                     .summary = summary.at,
                     .warnings = told.at,
+                    .notes = notes.at,
                     .title = simulation->title};
     intake_result_id(simulation, show.result);
-    const bool is_failed = plan.is_failed || summary.is_failed || told.is_failed;
+    const bool is_failed = plan.is_failed || summary.is_failed || told.is_failed || notes.is_failed;
     if (!is_failed)
         job_put(bytes, &show, JOB_PUT_WHOLE);
     bytes_clear(&plan);
     bytes_clear(&summary);
     bytes_clear(&told);
+    bytes_clear(&notes);
     return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
 }
 
 // Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
-static Status scene_run(const Simulation *simulation, const Warnings *warnings, const char *output,
-                        const Encoder *encoder, Problem *problem) {
+static Status scene_run(const char *path, const Simulation *simulation, const Warnings *warnings,
+                        const char *output, const Encoder *encoder, Problem *problem) {
     Outcome *outcome = NULL;
     Bytes job = {0}, bytes = {0};
     Bar bar;
     const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
-    Status status = simulation_run(simulation, &limits, &watch, &outcome, problem);
+    Status status = simulation_run(simulation, &limits, &watch, NULL, &outcome, problem);
     bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
+    if (status == STATUS_OK)
+        scene_file_warn(path, &outcome->warnings);
     if (status == STATUS_OK)
         status = job_write(simulation, warnings, outcome, began_unix_ms, took, &job);
     if (status == STATUS_OK && output == NULL) {
@@ -143,7 +148,7 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, const c
         if (output != NULL)
             status = output_open(output, problem);
         if (status == STATUS_OK)
-            status = scene_run(&simulation, &warnings, output, encoder, problem);
+            status = scene_run(path, &simulation, &warnings, output, encoder, problem);
         output_drop();
     }
     simulation_clear(&simulation);

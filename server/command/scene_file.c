@@ -4,8 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-// What people call the source of the text.
-static const char *source_name(const char *path) {
+const char *scene_file_name(const char *path) {
     return strcmp(path, "-") == 0 ? "standard input" : path;
 }
 
@@ -34,7 +33,7 @@ Status scene_file_read(const char *path, Bytes *text, Problem *problem) {
 }
 
 void scene_file_refuse(const char *path, const Problem *problem) {
-    const char *name = source_name(path);
+    const char *name = scene_file_name(path);
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         const Fault *fault = &problem->faults[i];
         fprintf(stderr, "%s: %s%s%s", name, fault->pointer, fault->pointer[0] != '\0' ? ": " : "",
@@ -51,6 +50,6 @@ void scene_file_refuse(const char *path, const Problem *problem) {
 
 void scene_file_warn(const char *path, const Warnings *warnings) {
     for (size_t i = 0; i < warnings->count; i++)
-        fprintf(stderr, "%s: warning: %s: %s\n", source_name(path), warnings->at[i].pointer,
+        fprintf(stderr, "%s: warning: %s: %s\n", scene_file_name(path), warnings->at[i].pointer,
                 warnings->at[i].detail);
 }

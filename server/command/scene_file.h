@@ -1,5 +1,5 @@
 // A scene given on the command line: its text, and what a person is told about its faults.
-// Judges nothing itself. Used by run.c and check.c.
+// Judges nothing itself. Used by run.c, check.c and import.c.
 #ifndef SERVER_COMMAND_SCENE_FILE_H
 #define SERVER_COMMAND_SCENE_FILE_H
 
@@ -12,6 +12,9 @@ enum {
     SCENE_FILE_IMPACTS = 10000000,
     SCENE_FILE_STEPS = 1000000000
 };
+
+// What people call the source of the text: the path, or standard input for "-".
+const char *scene_file_name(const char *path);
 
 // Reads the file, or standard input for "-". Cleared by bytes_clear in any case.
 Status scene_file_read(const char *path, Bytes *text, Problem *problem);

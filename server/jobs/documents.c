@@ -1,5 +1,7 @@
 #include "server/jobs/documents.h"
 
+#include <string.h>
+
 #include "server/codec/write.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan) {
@@ -13,6 +15,21 @@ void document_summary(Bytes *bytes, const Summary *summary) {
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
     write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
                WRITE_REPORT);
+}
+
+void document_join(Bytes *bytes, const char *first, const char *second) {
+    static const char empty[] = "[]";
+    if (first == NULL || strcmp(first, empty) == 0) {
+        bytes_text(bytes, second != NULL ? second : empty);
+        return;
+    }
+    if (second == NULL || strcmp(second, empty) == 0) {
+        bytes_text(bytes, first);
+        return;
+    }
+    bytes_put(bytes, first, strlen(first) - 1);
+    bytes_text(bytes, ", ");
+    bytes_text(bytes, second + 1);
 }
 
 void document_energy(Bytes *bytes, const Energy *energy) {

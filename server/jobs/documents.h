@@ -9,6 +9,8 @@
 void document_plan(Bytes *bytes, const PlanReport *plan);
 void document_summary(Bytes *bytes, const Summary *summary);
 void document_warnings(Bytes *bytes, const Warnings *warnings);
+// Two such arrays as one; NULL is an empty one.
+void document_join(Bytes *bytes, const char *first, const char *second);
 void document_energy(Bytes *bytes, const Energy *energy);
 void document_impacts(Bytes *bytes, const Impacts *impacts);
 // Without any density: null.

@@ -62,6 +62,7 @@ void job_drop(Job *job) {
     job_row_clear(&job->row);
     free(job->plan);
     free(job->summary);
+    free(job->notes);
     free(job->wakers.at);
     intake_drop(job->intake);
     free(job);
@@ -115,7 +116,7 @@ Status job_show(Job *job, JobShow *show) {
         show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
     const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
-                          copy(&show->summary, job->summary) &&
+                          copy(&show->summary, job->summary) && copy(&show->notes, job->notes) &&
                           copy(&show->warnings, row->warnings) && copy(&show->title, row->title);
     unlock(job);
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
@@ -126,6 +127,7 @@ void job_show_clear(JobShow *show) {
     free(show->plan);
     free(show->summary);
     free(show->warnings);
+    free(show->notes);
     free(show->title);
     *show = (JobShow){0};
 }

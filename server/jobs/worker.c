@@ -47,11 +47,12 @@ static char *take(Bytes *bytes, Status *status) {
 static Status describe(const Computation *computation, Findings *findings) {
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
-    Bytes plan = {0}, summary = {0}, energy = {0};
+    Bytes plan = {0}, summary = {0}, notes = {0}, energy = {0};
     Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
+    document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);
     document_impacts(&impacts, &outcome->response.impacts);
     if (outcome->spectrum.densities.count > 0)
@@ -62,6 +63,7 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->warnings = strdup(computation->warnings);
     row->plan = take(&plan, &status);
     row->summary = take(&summary, &status);
+    row->notes = take(&notes, &status);
     row->energy = take(&energy, &status);
     row->impacts = take(&impacts, &status);
     if (outcome->spectrum.densities.count > 0)
@@ -82,14 +84,15 @@ static void fail(Findings *findings, Status status, const Problem *problem) {
     findings->problem = bytes_take(&bytes, NULL);
 }
 
-static void run(Intake *intake, Computation *computation, Findings *findings, Problem *problem) {
+static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
+    const Intake *intake = worker->intake;
     const Watch watch = {computation, advance};
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
-    Status status =
-        simulation_run(&computation->simulation, limits, &watch, &findings->outcome, problem);
+    Status status = simulation_run(&computation->simulation, limits, &watch, &worker->workspace,
+                                   &findings->outcome, problem);
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);
@@ -157,6 +160,7 @@ static void publish(const Findings *findings, Job **jobs, size_t count, Status s
             job->plan = findings->result.plan == NULL ? NULL : strdup(findings->result.plan);
             job->summary =
                 findings->result.summary == NULL ? NULL : strdup(findings->result.summary);
+            job->notes = findings->result.notes == NULL ? NULL : strdup(findings->result.notes);
         }
         if (saved != STATUS_OK) {
             Bytes bytes = {.most = 1 << 20};
@@ -271,7 +275,7 @@ void *worker_main(void *context) {
     while ((computation = next_computation(worker)) != NULL) {
         pthread_mutex_unlock(&intake->lock);
         Findings findings = {0};
-        run(intake, computation, &findings, &problem);
+        run(worker, computation, &findings, &problem);
         if (findings.status != STATUS_CANCELLED)
             finish(intake, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
@@ -284,5 +288,6 @@ void *worker_main(void *context) {
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);
+    workspace_clear(&worker->workspace);
     return NULL;
 }

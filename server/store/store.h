@@ -70,6 +70,7 @@ typedef struct ResultRow {
     char id[72];
     char *engine;
     char *scene, *plan, *summary, *warnings, *energy, *impacts; // JSON documents
+    char *notes;    // JSON array, what the run itself warned of; NULL: nothing
     char *psd;      // JSON; NULL where none was asked for
     uint64_t count; // samples
     double sample_rate;

@@ -215,6 +215,34 @@ def test_the_landing_page_has_lines_that_work():
         assert os.path.getsize(os.path.join(folder, "series.npy")) == 128 + 8 * 6 * 10001
 
 
+def test_a_run_says_how_far_it_can_be_trusted():
+    """Beyond trust_horizon a warning of the run joins the scene's: on the job, again, on the result, after a restart."""
+    random = {**program.scene("paper_random_sponge"), "duration": 30,
+              "output": {"channels": [], "psd": {"channels": ["mean_acceleration"], "segment": 65536}}}
+    folder = tempfile.mkdtemp(prefix="impactd-")
+    try:
+        documents = []
+        with program.daemon(data=folder) as daemon:
+            job = program.finished(daemon, random)
+            documents += [job, daemon.get(job["links"]["self"]).json(), daemon.get(job["links"]["result"]).json(),
+                          program.finished(daemon, {**random, "title": "the same"})]
+            assert documents[-1]["cached"] is True, documents[-1]
+            calm = program.finished(daemon, sponge())
+        with program.daemon(data=folder) as daemon:
+            documents += [daemon.get(job["links"]["self"]).json(), daemon.get(job["links"]["result"]).json(),
+                          program.finished(daemon, random)]
+        for document in documents:
+            summary, warnings = document["summary"], document["warnings"]
+            assert [warning["pointer"] for warning in warnings] == ["/output/psd/segment", "/duration"], warnings
+            assert 2 < summary["trust_horizon"] < 30 and 1e-6 < summary["error_estimate"] <= 1, summary
+            assert f"{summary['trust_horizon']:.6g} s" in warnings[1]["detail"], warnings
+            assert "only statistics hold" in warnings[1]["detail"], warnings
+        assert calm["summary"]["trust_horizon"] is None and calm["warnings"] == [], calm
+        assert 0 < calm["summary"]["error_estimate"] < 1e-6, calm
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def test_results_never_change():
     """A result has a strong ETag and is immutable; If-None-Match answers 304 without a body; HEAD is GET without."""
     with program.daemon() as daemon:

@@ -33,6 +33,9 @@ FOREIGN = {
     "sqlite3.h": ["server/store/database.c", "server/store/row.c"],
     "jansson.h": ["server/codec/"],
     "fftw3.h": ["core/math/fourier.c"],
+    "lapacke.h": ["core/math/linear.c"],
+    "arkode/": ["core/math/ode.c"],
+    "nvector/": ["core/math/ode.c"],
     "gnutls/": ["server/base/digest.c"],
     "dragonbox/": ["server/base/shortest.cpp"],
 }
@@ -50,6 +53,7 @@ BANNED = {
     r"sqlite3_\w+": ("SQL is the store's", ["server/store/database.c", "server/store/row.c"]),
     r"MHD_\w+": ("libmicrohttpd is the listener's", ["server/http/listener.c"]),
     r"fftw_\w+": ("FFTW is fourier.c's", ["core/math/fourier.c"]),
+    r"LAPACKE_\w+": ("LAPACK is linear.c's", ["core/math/linear.c"]),
     r"gnutls_\w+": ("GnuTLS is digest.c's", ["server/base/digest.c"]),
 }
 CORE_BANNED = {

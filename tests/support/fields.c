@@ -28,7 +28,8 @@ Texts texts_of(size_t count, const char *const *texts) {
 
 Reals reals_of(size_t count, const double *values) {
     Reals copy = {calloc(count + 1, sizeof *copy.at), count};
-    memcpy(copy.at, values, count * sizeof *values);
+    for (size_t i = 0; i < count; i++)
+        copy.at[i] = values[i];
     return copy;
 }
 

@@ -20,7 +20,7 @@ void paper_scene(Simulation *simulation, double restitution, double contact_time
 
 void paper_free(Simulation *simulation, double displacement) {
     scene_choose(&simulation->scene.excitation, &excitation_kinds, "free");
-    ((Excitation *)(void *)simulation->scene.excitation)->displacement = displacement;
+    scene_start(simulation, displacement, 0);
 }
 
 void paper_random(Simulation *simulation, double rms, uint64_t seed) {

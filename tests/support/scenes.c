@@ -6,6 +6,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/fields.h"
+
 void scene_without_damper(Simulation *simulation) {
     assert_int_equal(fields_default(simulation_fields, simulation), STATUS_OK);
     Scene *scene = &simulation->scene;
@@ -14,7 +16,7 @@ void scene_without_damper(Simulation *simulation) {
     sdof->mass = 1.35;
     sdof->stiffness = 865;
     sdof->damping = 1.092;
-    ((Excitation *)(void *)scene->excitation)->displacement = 0.015;
+    scene_start(simulation, 0.015, 0);
     scene->duration = 10;
     scene->sample_rate = 1000;
 }
@@ -29,6 +31,14 @@ void scene_with_damper(Simulation *simulation, double restitution, double contac
     damper->buffer.restitution = restitution;
     damper->buffer.contact_time = contact_time;
     simulation->scene.dampers = (Dampers){damper, 1};
+}
+
+void scene_start(Simulation *simulation, double displacement, double velocity) {
+    Excitation *excitation = (Excitation *)(void *)simulation->scene.excitation;
+    free(excitation->displacement.at);
+    free(excitation->velocity.at);
+    excitation->displacement = reals_of(1, &displacement);
+    excitation->velocity = reals_of(1, &velocity);
 }
 
 void scene_choose(Variant **variant, const KindTable *kinds, const char *name) {

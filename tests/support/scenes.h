@@ -13,6 +13,9 @@ void scene_without_damper(Simulation *simulation);
 // given).
 void scene_with_damper(Simulation *simulation, double restitution, double contact_time);
 
+// The state at the start of a structure of one storey.
+void scene_start(Simulation *simulation, double displacement, double velocity);
+
 // Replaces a variant by one of another kind with its defaults.
 void scene_choose(Variant **variant, const KindTable *kinds, const char *name);
 

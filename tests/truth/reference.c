@@ -27,6 +27,8 @@ __extension__ typedef __float128 Quad;
 #define real_abs fabsq
 #define real_sin sinq
 #define real_cos cosq
+#define real_sinh sinhq
+#define real_cosh coshq
 #define real_log logq
 #define REAL_EPSILON ((Quad)1e-34)
 #define CLOSING ((Quad)1e-18)
@@ -36,6 +38,8 @@ __extension__ typedef __float128 Quad;
 #undef real_abs
 #undef real_sin
 #undef real_cos
+#undef real_sinh
+#undef real_cosh
 #undef real_log
 #undef REAL_EPSILON
 #undef CLOSING
@@ -45,6 +49,8 @@ __extension__ typedef __float128 Quad;
 #define real_abs fabs
 #define real_sin sin
 #define real_cos cos
+#define real_sinh sinh
+#define real_cosh cosh
 #define real_log log
 #define REAL_EPSILON 1.1e-16
 #define CLOSING 1e-14

@@ -15,6 +15,7 @@ typedef struct ReferenceScene {
     double mass, stiffness, damping; // of the structure
     double damper_mass, clearance, offset, position, relative_velocity;
     bool is_impulse;
+    bool is_zero_force; // contacts end when the force does, not the penetration
     double restitution[2], contact_time[2];
     double displacement, velocity;
     ReferenceBase base;

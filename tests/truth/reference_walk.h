@@ -7,8 +7,10 @@
 // last touched, from mid-clearance before. Contact adds n = N / m_e:
 //   x'' = -a_g - s + share n,  r'' = s - n,  s = (C x' + K x) / M,  n = (c r' + k r) / m_e, or s
 //   while resting.
+// Under zero_force a contact ends where n comes to 0; until the mass is out of the buffer (INSIDE)
+// it flies, and n is what the buffer would press.
 
-typedef enum NAME(Phase) { NAME(FLIGHT), NAME(CONTACT), NAME(REST) } NAME(Phase);
+typedef enum NAME(Phase) { NAME(FLIGHT), NAME(INSIDE), NAME(CONTACT), NAME(REST) } NAME(Phase);
 
 typedef struct NAME(Series) {
     int degree;
@@ -174,8 +176,9 @@ static void NAME(series)(const NAME(Walk) * walk, real h, real value, real slope
                          NAME(Series) * series) {
     const bool is_sine = walk->scene->base == REFERENCE_SINE;
     const real h2 = h * h, turn2 = walk->base_omega * walk->base_omega * h2;
-    const real k = walk->phase == NAME(CONTACT) ? walk->contact_omega2[walk->side] : 0;
-    const real c = walk->phase == NAME(CONTACT) ? walk->contact_damping[walk->side] : 0;
+    const bool is_pressed = walk->phase == NAME(CONTACT) || walk->phase == NAME(INSIDE);
+    const real k = is_pressed ? walk->contact_omega2[walk->side] : 0;
+    const real c = is_pressed ? walk->contact_damping[walk->side] : 0;
     int degree = 4;
     real tail = 1;
     for (int i = 1; i < TERMS - 4; i++) {
@@ -199,8 +202,9 @@ static void NAME(series)(const NAME(Walk) * walk, real h, real value, real slope
         const real over = 1 / (real)((i + 1) * (i + 2));
         if (is_sine)
             g[i + 2] = -turn2 * over * g[i];
-        x[i + 2] = h2 * over * (walk->share * n[i] - g[i] - s);
-        r[i + 2] = walk->phase == NAME(REST) ? 0 : h2 * over * (s - n[i]);
+        const real force = walk->phase == NAME(INSIDE) ? 0 : n[i];
+        x[i + 2] = h2 * over * (walk->share * force - g[i] - s);
+        r[i + 2] = walk->phase == NAME(REST) ? 0 : h2 * over * (s - force);
     }
 }
 
@@ -274,8 +278,10 @@ static void NAME(open)(NAME(Walk) * walk, NAME(Phase) phase) {
     walk->phase = phase;
     walk->open = (ReferenceImpact){
         phase == NAME(REST), walk->side, (double)walk->t, NAN, NAN, NAN, NAN, NAN, NAN};
+    // A mass that is pressed again while it leaves the buffer approaches nothing.
+    const real inward = walk->side == 1 ? walk->w : -walk->w;
     if (phase == NAME(CONTACT))
-        walk->open.approach = (double)real_abs(walk->w);
+        walk->open.approach = inward > 0 ? (double)inward : 0;
     const real n = NAME(pressure)(walk);
     walk->peak = real_abs(n);
     walk->impulse = walk->lost = 0;
@@ -376,6 +382,26 @@ static void NAME(gauss)(NAME(Walk) * walk) {
     }
 }
 
+// (w T_c)^2 under zero_force. With Z = cos a: a / tan a = -ln(e) / 2 and w T_c = 2 a / sin a;
+// beyond critical damping the same with hyperbolic functions.
+static real NAME(zero_force)(real loss, real pi) {
+    const real half = -loss / 2;
+    const bool is_over = half > 1;
+    real low = 0, high = is_over ? half + 1 : pi / 2;
+    if (half == 1)
+        return 4;
+    for (int i = 0; i < 150; i++) {
+        const real a = (low + high) / 2;
+        const real here = is_over ? a * real_cosh(a) / real_sinh(a) : a * real_cos(a) / real_sin(a);
+        if ((here < half) == is_over)
+            low = a;
+        else
+            high = a;
+    }
+    const real turn = (low + high) / (is_over ? real_sinh(low) : real_sin(low));
+    return turn * turn;
+}
+
 static void NAME(start)(NAME(Walk) * walk, const ReferenceScene *scene, ReferenceAnswer *answer) {
     memset(walk, 0, sizeof *walk);
     walk->scene = scene;
@@ -407,7 +433,8 @@ static void NAME(start)(NAME(Walk) * walk, const ReferenceScene *scene, Referenc
         if (scene->is_impulse)
             continue;
         const real T = scene->contact_time[side], loss = real_log((real)scene->restitution[side]);
-        walk->contact_omega2[side] = (pi * pi + loss * loss) / (T * T);
+        const real turn = scene->is_zero_force ? NAME(zero_force)(loss, pi) : pi * pi + loss * loss;
+        walk->contact_omega2[side] = turn / (T * T);
         walk->contact_damping[side] = -2 * loss / T;
         walk->rate[side] +=
             NAME(root_bound)(walk->contact_omega2[side]) + walk->contact_damping[side];
@@ -424,6 +451,7 @@ static void NAME(start)(NAME(Walk) * walk, const ReferenceScene *scene, Referenc
 static bool NAME(stretch)(NAME(Walk) * walk, const NAME(Series) * series, bool *is_event) {
     real f[TERMS], s = 1;
     int side = walk->side;
+    bool is_pressed = false;
     const int degree = series->degree;
     *is_event = false;
     if (walk->phase == NAME(FLIGHT)) {
@@ -439,8 +467,22 @@ static bool NAME(stretch)(NAME(Walk) * walk, const NAME(Series) * series, bool *
                 side = stop;
             }
         }
+    } else if (walk->phase == NAME(INSIDE)) {
+        // Out of the buffer, or pressed again before that.
+        for (int way = 0; way < 2; way++) {
+            real here;
+            for (int i = 0; i <= degree; i++)
+                f[i] = (walk->side == 1 ? 1 : -1) * (way == 0 ? series->r[i] : -series->n[i]);
+            if (NAME(crossing)(f, degree, way == 1 && walk->leaving == walk->side, &here) &&
+                (!*is_event || here < s)) {
+                *is_event = true;
+                s = here;
+                is_pressed = way == 1;
+            }
+        }
     } else {
-        const real *of = walk->phase == NAME(CONTACT) ? series->r : series->n;
+        const bool is_contact = walk->phase == NAME(CONTACT) && !walk->scene->is_zero_force;
+        const real *of = is_contact ? series->r : series->n;
         for (int i = 0; i <= degree; i++)
             f[i] = walk->side == 1 ? of[i] : -of[i];
         *is_event = NAME(crossing)(f, degree, walk->leaving == walk->side, &s);
@@ -456,12 +498,29 @@ static bool NAME(stretch)(NAME(Walk) * walk, const NAME(Series) * series, bool *
         return false;
     if (walk->phase == NAME(FLIGHT))
         return NAME(touch)(walk, side);
-    const bool is_release = walk->phase == NAME(REST);
-    if (!is_release)
+    if (is_pressed) {
+        NAME(open)(walk, NAME(CONTACT));
+        return true;
+    }
+    if (walk->phase == NAME(INSIDE)) {
         walk->r = 0;
-    else
+        walk->phase = NAME(FLIGHT);
+        return true;
+    }
+    const bool is_inside = walk->phase == NAME(CONTACT) && walk->scene->is_zero_force;
+    const bool is_release = walk->phase == NAME(REST);
+    if (is_release || is_inside)
         walk->leaving = walk->side;
-    return NAME(close)(walk, true);
+    else
+        walk->r = 0;
+    // What is left in the spring is released inside the buffer.
+    if (is_inside)
+        walk->lost += walk->contact_omega2[walk->side] * walk->r * walk->r / 2;
+    if (!NAME(close)(walk, true))
+        return false;
+    if (is_inside)
+        walk->phase = NAME(INSIDE);
+    return true;
 }
 
 // A free mass that starts at a stop and moves, or is about to move, into it.
@@ -518,7 +577,7 @@ static void NAME(run)(const ReferenceScene *scene, double stride, double most,
         if (!is_event)
             walk.t = is_cut ? walk.t + h : target;
     }
-    if (walk.phase != NAME(FLIGHT) && !NAME(close)(&walk, false))
+    if ((walk.phase == NAME(CONTACT) || walk.phase == NAME(REST)) && !NAME(close)(&walk, false))
         return;
     answer->is_whole = true;
 }

@@ -13,10 +13,7 @@
 
 #include <cmocka.h>
 
-#include "core/excite/record.h"
-#include "core/excite/sine.h"
-#include "tests/support/paper.h"
-#include "tests/truth/reference.h"
+#include "tests/truth/drawn.h"
 
 static size_t scenes = 60;
 static uint64_t seed = 1;
@@ -61,189 +58,6 @@ typedef struct Misses {
     bool is_same; // the same impacts
     char why[200];
 } Misses;
-
-static uint64_t random_state;
-static uint64_t draw(void) {
-    uint64_t z = random_state += 0x9e3779b97f4a7c15U;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-    return z ^ (z >> 31);
-}
-static double uniform(double a, double b) {
-    return a + (b - a) * (double)(draw() >> 11) * 0x1p-53;
-}
-static double scattered(double a, double b) {
-    return a * pow(b / a, uniform(0, 1));
-}
-static bool chance(double p) {
-    return uniform(0, 1) < p;
-}
-
-static const double TURN = 6.283185307179586;
-
-// A scene of its own for each seed; samples are the caller's to free.
-static void scene_draw(ReferenceScene *scene, uint64_t number) {
-    memset(scene, 0, sizeof *scene);
-    random_state = number * 0x2545f4914f6cdd1dU;
-    const double reach = scattered(1e-3, 0.1), omega = TURN * scattered(0.3, 15);
-    scene->mass = scattered(0.1, 100);
-    scene->stiffness = chance(0.07) ? 0 : scene->mass * omega * omega;
-    scene->damping = 2 * scene->mass * omega *
-                     (chance(scene->stiffness == 0 ? 0.5 : 0.1) ? 0
-                      : chance(0.05)                            ? uniform(1, 3)
-                                                                : scattered(1e-3, 0.2));
-    scene->damper_mass = scene->mass * scattered(1e-3, 10);
-    scene->clearance = reach * uniform(0.05, 2);
-    scene->is_impulse = chance(0.4);
-    if (!scene->is_impulse && chance(0.05))
-        scene->clearance = 0;
-    scene->offset = chance(0.2) ? reach * uniform(-1, 1) : 0;
-    scene->position = chance(0.4) ? scene->clearance * uniform(-0.5, 0.5) : 0;
-    scene->relative_velocity = chance(0.4) ? reach * omega * uniform(-1, 1) : 0;
-    const bool is_uneven = chance(0.3);
-    for (int side = 0; side < 2; side++) {
-        scene->restitution[side] = uniform(0.1, 0.97);
-        scene->contact_time[side] = scattered(3e-5, 5e-2);
-        if (!is_uneven && side == 1) {
-            scene->restitution[1] = scene->restitution[0];
-            scene->contact_time[1] = scene->contact_time[0];
-        }
-    }
-    const double rates[] = {1000, 1000, 1000, 1000, 200, 50, 20, 333, 5000, 1234.5};
-    scene->sample_rate = rates[draw() % COUNT(rates)];
-    scene->duration = 3;
-    scene->base = (ReferenceBase)(draw() % 3);
-    if (scene->base == REFERENCE_STILL || chance(0.3)) {
-        scene->displacement = reach * uniform(-1, 1);
-        scene->velocity = chance(0.5) ? reach * omega * uniform(-1, 1) : 0;
-    }
-    const double level = reach * omega * omega * scattered(0.03, 2);
-    if (scene->base == REFERENCE_SINE) {
-        scene->frequency = chance(0.1) ? scattered(20, 400) : scattered(0.2, 20);
-        scene->is_amplitude_displacement = chance(0.4);
-        scene->amplitude =
-            scene->is_amplitude_displacement ? level / pow(TURN * scene->frequency, 2) : level;
-    }
-    if (scene->base == REFERENCE_RECORD) {
-        const double intervals[] = {1e-3, 0.005, 0.01, 0.0123, 1 / 300.0, 0.0007, 0.02, 0.11};
-        scene->interval =
-            chance(0.2) ? 1 / scene->sample_rate : intervals[draw() % COUNT(intervals)];
-        const double length = chance(0.4) ? uniform(0.2, 2.8) : 3.1;
-        scene->sample_count = (size_t)(length / scene->interval) + 2;
-        double *samples = malloc(scene->sample_count * sizeof *samples);
-        if (samples == NULL)
-            abort();
-        const double memory = exp(-scene->interval * omega);
-        double value = 0;
-        for (size_t i = 0; i < scene->sample_count; i++) {
-            value = memory * value +
-                    sqrt(1 - memory * memory) * level * (uniform(-1, 1) + uniform(-1, 1));
-            samples[i] = value;
-        }
-        scene->samples = samples;
-    }
-}
-
-static void scene_print(const ReferenceScene *scene) {
-    printf(
-        "    M %.17g K %.17g C %.17g m %.17g d %.17g offset %.17g position %.17g velocity %.17g\n"
-        "    %s e %.17g %.17g T_c %.17g %.17g x0 %.17g v0 %.17g\n"
-        "    base %d frequency %.17g amplitude %.17g %d samples %zu interval %.17g rate %.17g\n",
-        scene->mass, scene->stiffness, scene->damping, scene->damper_mass, scene->clearance,
-        scene->offset, scene->position, scene->relative_velocity,
-        scene->is_impulse ? "impulse" : "spring_damper", scene->restitution[0],
-        scene->restitution[1], scene->contact_time[0], scene->contact_time[1], scene->displacement,
-        scene->velocity, (int)scene->base, scene->frequency, scene->amplitude,
-        scene->is_amplitude_displacement, scene->sample_count, scene->interval, scene->sample_rate);
-}
-
-static const char *const wanted[REFERENCE_CHANNELS] = {
-    "displacement",        "velocity",        "acceleration",  "mean_acceleration",
-    "damper_displacement", "damper_velocity", "contact_force",
-};
-
-static Outcome *solver_run(const ReferenceScene *scene) {
-    static Problem problem;
-    Simulation simulation;
-    paper_scene(&simulation, scene->restitution[0], scene->contact_time[0], scene->duration);
-    StructureSdof *structure = (StructureSdof *)(void *)simulation.scene.structure;
-    structure->mass = scene->mass;
-    structure->stiffness = scene->stiffness;
-    structure->damping = scene->damping;
-    Damper *damper = &simulation.scene.dampers.at[0];
-    damper->mass = scene->damper_mass;
-    damper->clearance = scene->clearance;
-    damper->offset = scene->offset;
-    damper->position = scene->position;
-    damper->velocity = scene->relative_velocity;
-    damper->left_buffer = damper->buffer;
-    damper->right_buffer = damper->buffer;
-    damper->right_buffer.restitution = scene->restitution[1];
-    damper->right_buffer.contact_time = scene->contact_time[1];
-    damper->buffer.restitution = damper->buffer.contact_time = NAN;
-    simulation.scene.sample_rate = scene->sample_rate;
-    if (scene->base == REFERENCE_SINE) {
-        paper_sine(&simulation, scene->amplitude, scene->frequency);
-        ((ExcitationSine *)(void *)simulation.scene.excitation)->quantity =
-            scene->is_amplitude_displacement ? SINE_DISPLACEMENT : SINE_ACCELERATION;
-    } else if (scene->base == REFERENCE_RECORD) {
-        variant_free(simulation.scene.excitation);
-        ExcitationRecord *record = (ExcitationRecord *)(void *)variant_new(&excitation_record.kind);
-        if (record == NULL ||
-            (record->samples.at = malloc(scene->sample_count * sizeof(double))) == NULL)
-            abort();
-        memcpy(record->samples.at, scene->samples, scene->sample_count * sizeof(double));
-        record->samples.count = scene->sample_count;
-        record->interval = scene->interval;
-        simulation.scene.excitation = (Variant *)(void *)record;
-    }
-    Excitation *excitation = (Excitation *)(void *)simulation.scene.excitation;
-    excitation->displacement = scene->displacement;
-    excitation->velocity = scene->velocity;
-    paper_model(&simulation, scene->is_impulse ? "impulse" : "spring_damper");
-    paper_channels(&simulation, wanted, COUNT(wanted));
-    paper_no_psd(&simulation);
-    Outcome *outcome = NULL;
-    problem_clear(&problem);
-    if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_run(&simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
-        printf("  refused: %s %s %s\n", problem.detail,
-               problem.count > 0 ? problem.faults[0].pointer : "",
-               problem.count > 0 ? problem.faults[0].detail : "");
-    simulation_clear(&simulation);
-    return outcome;
-}
-
-// The solver's outcome in the reference's form.
-static bool answer_of(const Outcome *outcome, ReferenceAnswer *answer) {
-    memset(answer, 0, sizeof *answer);
-    answer->count = outcome->response.count;
-    for (size_t i = 0; i < REFERENCE_CHANNELS; i++) {
-        const Column *column = columns_find(&outcome->response.series, wanted[i]);
-        if (column == NULL ||
-            (answer->channels[i] = malloc(answer->count * sizeof(double))) == NULL)
-            return false;
-        memcpy(answer->channels[i], column->values, answer->count * sizeof(double));
-    }
-    const Impacts *impacts = &outcome->response.impacts;
-    if ((answer->impacts = calloc(impacts->count + 1, sizeof *answer->impacts)) == NULL)
-        return false;
-    answer->impact_count = impacts->count;
-    for (size_t i = 0; i < impacts->count; i++) {
-        const Impact *from = &impacts->at[i];
-        answer->impacts[i] = (ReferenceImpact){from->kind == IMPACT_RESTING,
-                                               from->side,
-                                               from->start,
-                                               from->end,
-                                               from->approach_speed,
-                                               from->separation_speed,
-                                               from->peak_force,
-                                               from->impulse,
-                                               from->energy_lost};
-    }
-    answer->is_whole = true;
-    return true;
-}
 
 static double largest(const double *values, size_t count) {
     double most = 0;
@@ -409,7 +223,7 @@ static void fault(Tally *tally, bool *is_told, const ReferenceScene *scene, size
                   const char *text) {
     if (!*is_told) {
         printf("scene %zu (seed %llu):\n", number, (unsigned long long)seed);
-        scene_print(scene);
+        drawn_print(scene);
         tally->failed++;
     }
     *is_told = true;
@@ -428,7 +242,7 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
     if (plain[0].is_whole)
         reference_quad(scene, 1, STEPS_MOST, &quad);
     tally->quad_seconds += (double)(clock() - before) / CLOCKS_PER_SEC;
-    Outcome *outcome = solver_run(scene);
+    Outcome *outcome = drawn_run(scene, true);
     if (outcome == NULL)
         fault(tally, &is_told, scene, number, "the solver gave up");
     else if (!(outcome->summary.energy_residual < 1e-9)) {
@@ -437,7 +251,7 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
     }
     if (!quad.is_whole)
         tally->heavy++;
-    else if (outcome != NULL && answer_of(outcome, &solved)) {
+    else if (outcome != NULL && drawn_answer(outcome, &solved)) {
         Misses by_double, by_solver;
         compare(scene, &plain[0], &quad, &by_double);
         for (int i = 1; i < DOUBLES; i++) {
@@ -488,9 +302,10 @@ static void random_scenes_agree_with_quad_precision(void **state) {
     Tally tally = {0, 0, 0, 0, 0, 0, 0, 0};
     for (size_t i = 0; i < scenes; i++) {
         ReferenceScene scene;
-        scene_draw(&scene, seed * 1000003 + i);
+        drawn_scene(&scene, seed * 1000003 + i, 3);
+        drawn_zero_force(&scene, seed * 1000003 + i);
         judge(&scene, i, &tally);
-        free((void *)(uintptr_t)scene.samples);
+        drawn_clear(&scene);
     }
     printf("%zu scenes: %zu judged with %zu impacts and %zu rests, %zu too chaotic, %zu too heavy, "
            "%zu failed; "
@@ -595,6 +410,35 @@ static void awkward_scenes_agree_with_quad_precision(void **state) {
     assert_true(tally.judged == count);
 }
 
+// The reference itself: two bodies alone return just what their contact was identified from, under
+// both rules and to quad precision.
+static void the_reference_returns_restitution_and_contact_time(void **state) {
+    (void)state;
+    const double restitutions[] = {0.02, 0.1, 0.135, 0.136, 0.46, 0.97};
+    for (size_t i = 0; i < COUNT(restitutions); i++)
+        for (int rule = 0; rule < 2; rule++) {
+            const double e = restitutions[i], T = 3e-3;
+            const ReferenceScene scene = {.mass = 1.35,
+                                          .damper_mass = 0.1107,
+                                          .clearance = 0.015,
+                                          .is_zero_force = rule == 1,
+                                          .restitution = {e, e},
+                                          .contact_time = {T, T},
+                                          .relative_velocity = 0.5,
+                                          .duration = 0.03,
+                                          .sample_rate = 1000};
+            ReferenceAnswer answer;
+            reference_quad(&scene, 1, STEPS_MOST, &answer);
+            assert_true(answer.is_whole && answer.impact_count == 1);
+            const ReferenceImpact *impact = &answer.impacts[0];
+            const double energy = 1.35 * 0.1107 / (1.35 + 0.1107) * 0.5 * 0.5 / 2 * (1 - e * e);
+            assert_true(fabs(impact->separation / impact->approach - e) < 1e-15);
+            assert_true(fabs(impact->end - impact->start - T) < 1e-15 * 0.03 / T);
+            assert_true(fabs(impact->lost / energy - 1) < 1e-14);
+            reference_clear(&answer);
+        }
+}
+
 int main(int argc, char **argv) {
     if (argc > 1)
         scenes = strtoul(argv[1], NULL, 10);
@@ -602,6 +446,7 @@ int main(int argc, char **argv) {
         seed = strtoull(argv[2], NULL, 10);
     is_verbose = argc > 3;
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_reference_returns_restitution_and_contact_time),
         cmocka_unit_test(awkward_scenes_agree_with_quad_precision),
         cmocka_unit_test(random_scenes_agree_with_quad_precision),
     };

@@ -25,6 +25,22 @@ static void laws_are_found_by_name_and_know_their_form(void **state) {
     assert_int_equal(contact_auto.form, CONTACT_CHOSEN);
 }
 
+static void a_power_law_has_what_it_takes(void **state) {
+    (void)state;
+    size_t count = 0;
+    for (size_t i = 0; contacts[i] != NULL; i++) {
+        if (contacts[i]->form != CONTACT_POWER)
+            continue;
+        count++;
+        assert_non_null(contacts[i]->reached);
+        assert_non_null(contacts[i]->duration);
+        assert_non_null(contacts[i]->force);
+    }
+    assert_int_equal(count, 6);
+    assert_ptr_equal(kind_find(&contact_kinds, "hunt_crossley"), &contact_hunt_crossley.kind);
+    assert_null(contact_hertz.factor);
+}
+
 static void a_law_starts_with_zero_penetration(void **state) {
     (void)state;
     for (size_t i = 0; contacts[i] != NULL; i++) {
@@ -41,6 +57,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_walkers_table_is_the_list_with_auto_first),
         cmocka_unit_test(laws_are_found_by_name_and_know_their_form),
+        cmocka_unit_test(a_power_law_has_what_it_takes),
         cmocka_unit_test(a_law_starts_with_zero_penetration),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

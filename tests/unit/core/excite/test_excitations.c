@@ -8,10 +8,11 @@
 #include <cmocka.h>
 
 #include "core/excite/excitation.h"
+#include "core/excite/record.h"
 #include "tests/support/fields.h"
 
 static Problem problem;
-static const Span span = {10, 1000, 0};
+static const Span span = {.duration = 10, .sample_rate = 1000};
 
 static Excitation *excitation_new(const char *name) {
     const Kind *kind = kind_find(&excitation_kinds, name);
@@ -44,7 +45,7 @@ static void the_list_begins_with_free_and_every_kind_takes_an_initial_state(void
         Excitation *excitation = (Excitation *)(void *)variant_new(&excitations[i]->kind);
         assert_ptr_equal(real_of(excitation, "displacement"), &excitation->displacement);
         assert_ptr_equal(real_of(excitation, "velocity"), &excitation->velocity);
-        assert_true(excitation->displacement == 0 && excitation->velocity == 0);
+        assert_true(excitation->displacement.count == 0 && excitation->velocity.count == 0);
         assert_non_null(excitations[i]->make);
         variant_free(&excitation->variant);
     }
@@ -103,6 +104,20 @@ static void a_sine_beyond_numbers_is_refused(void **state) {
     variant_free(&excitation->variant);
 }
 
+static void a_sine_between_the_samples_is_doubted(void **state) {
+    (void)state;
+    Excitation *excitation = excitation_new("sine");
+    *real_of(excitation, "frequency") = 500;
+    excitation_sine.doubt(excitation, &span, "/excitation", &problem);
+    assert_int_equal(problem.count, 0);
+    *real_of(excitation, "frequency") = 500.5;
+    excitation_sine.doubt(excitation, &span, "/excitation", &problem);
+    assert_string_equal(detail_at(&problem, "/excitation/frequency"),
+                        "is 500.5 Hz, above half the sample rate, 500 Hz: the output's samples do "
+                        "not show the motion");
+    variant_free(&excitation->variant);
+}
+
 static void a_sine_needs_its_frequency_and_amplitude(void **state) {
     (void)state;
     Excitation *excitation = excitation_new("sine");
@@ -151,6 +166,38 @@ static void a_record_needs_samples_that_stay_finite(void **state) {
     variant_free(&excitation->variant);
 }
 
+static void doubts_of(double peak, double offset, const char *said) {
+    Excitation *excitation = excitation_new("record");
+    double samples[200];
+    for (size_t i = 0; i < COUNT(samples); i++)
+        samples[i] = peak * (i % 2 == 0 ? 1 : -1) + offset;
+    *(Reals *)variant_member(&excitation->variant, "samples") = reals_of(COUNT(samples), samples);
+    *real_of(excitation, "interval") = 0.02;
+    excitation_kind(excitation)->doubt(excitation, &span, "/excitation", &problem);
+    assert_int_equal(problem.count, said != NULL);
+    if (said != NULL && strstr(detail_at(&problem, "/excitation/samples"), said) == NULL)
+        fail_msg("%s", detail_at(&problem, "/excitation/samples"));
+    variant_free(&excitation->variant);
+}
+
+static void a_record_is_doubted_for_its_size_and_its_drift(void **state) {
+    (void)state;
+    doubts_of(3, 0, NULL);
+    doubts_of(50, 0, "reach 50 m/s^2 (sample 0), more than 5 g");
+    doubts_of(5e-5, 0, "reach only 5e-05 m/s^2");
+    doubts_of(3, 0.1, "leave the base with 0.398 m/s at their end");
+    doubts_of(0, 1, NULL); // a pulse: it goes one way only
+}
+
+static void what_a_record_adds_up_to(void **state) {
+    (void)state;
+    double values[] = {0, 2, -4, 1, 1};
+    const Reals samples = {values, 5};
+    const RecordLook look = record_look(&samples, 0.5, -2);
+    assert_true(look.highest == 8 && look.lowest == -4 && look.peak_at == 2);
+    assert_true(look.peak_velocity == 1.5 && look.end_velocity == 0.5);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_list_begins_with_free_and_every_kind_takes_an_initial_state),
@@ -158,9 +205,12 @@ int main(void) {
         cmocka_unit_test(a_sine_of_acceleration_is_taken_as_it_is),
         cmocka_unit_test(a_sine_of_displacement_is_differentiated_twice),
         cmocka_unit_test(a_sine_beyond_numbers_is_refused),
+        cmocka_unit_test(a_sine_between_the_samples_is_doubted),
         cmocka_unit_test(a_sine_needs_its_frequency_and_amplitude),
         cmocka_unit_test(a_record_is_scaled_and_copied),
         cmocka_unit_test(a_record_needs_samples_that_stay_finite),
+        cmocka_unit_test(a_record_is_doubted_for_its_size_and_its_drift),
+        cmocka_unit_test(what_a_record_adds_up_to),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,10 +10,10 @@
 static void channels_and_their_names_are_in_one_order(void **state) {
     (void)state;
     for (size_t i = 0; i < CHANNEL_COUNT; i++) {
-        assert_string_equal(channels[i].name, channel_names[i]);
+        assert_string_equal(channels[i].name, channel_requests[i + 1]);
         assert_true(channels[i].unit != NULL && channels[i].psd_unit != NULL);
     }
-    assert_null(channel_names[CHANNEL_COUNT]);
+    assert_null(channel_requests[CHANNEL_COUNT + 1]);
     assert_string_equal(channels[CHANNEL_MEAN_ACCELERATION].psd_unit, "(m/s^2)^2/Hz");
     assert_int_equal(channels[CHANNEL_CONTACT_FORCE].owner, CHANNEL_OF_DAMPER);
 }

@@ -266,6 +266,79 @@ static void equal_dampers_have_one_form(void **state) {
     fields_clear(damper_fields, &damper);
 }
 
+static void a_rig_is_given_where_it_is_used(void **state) {
+    (void)state;
+    Damper damper = damper_new();
+    set_measured(&damper.buffer, 0.6, 0.02);
+    damper.identified_for = IDENTIFIED_FOR_RIG;
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/dampers/0/rig"), "is required by"));
+    damper.rig.impactor_mass = 0.3;
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_OK);
+    assert_true(damper_identified_mass(&damper, 0.1) == 0.3);
+    damper.rig.base_mass = 0.3;
+    assert_true(damper_identified_mass(&damper, 0.1) == 0.15);
+    damper.identified_for = IDENTIFIED_FOR_SCENE;
+    assert_true(damper_identified_mass(&damper, 0.1) == 0.1);
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/dampers/0/rig"), "only with"));
+    // Restitution alone, and stiffness with damping, hold for any masses.
+    damper.identified_for = IDENTIFIED_FOR_RIG;
+    assert_int_equal(complete(&damper, &contact_impulse), STATUS_OK);
+    assert_int_equal(damper.identified_for, IDENTIFIED_FOR_SCENE);
+    assert_true(isnan(damper.rig.impactor_mass) && isnan(damper.rig.base_mass));
+    fields_clear(damper_fields, &damper);
+}
+
+static void a_power_law_fills_its_exponent_and_others_drop_it(void **state) {
+    (void)state;
+    Damper damper = damper_new();
+    set_measured(&damper.buffer, 0.6, 0.02);
+    assert_int_equal(complete(&damper, &contact_flores), STATUS_OK);
+    assert_true(damper.buffer.exponent == 1.5);
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_OK);
+    assert_true(isnan(damper.buffer.exponent));
+    damper.buffer.restitution = NAN;
+    assert_int_equal(complete(&damper, &contact_hertz), STATUS_OK);
+    assert_true(damper.buffer.restitution == 1);
+    damper.clearance = 0;
+    assert_int_equal(complete(&damper, &contact_hertz), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].pointer, "/dampers/0/clearance");
+    fields_clear(damper_fields, &damper);
+}
+
+static void set_table(Buffer *buffer, size_t count) {
+    buffer->table.at = calloc(count, sizeof *buffer->table.at);
+    assert_non_null(buffer->table.at);
+    buffer->table.count = count;
+    for (size_t i = 0; i < count; i++)
+        buffer->table.at[i] = (ContactRow){0.1 * (double)(i + 1), 0.6, 0.02};
+}
+
+static void equal_tables_become_one_buffer(void **state) {
+    (void)state;
+    Damper damper = damper_new();
+    set_table(&damper.left_buffer, 3);
+    set_table(&damper.right_buffer, 3);
+    assert_ptr_equal(law_of(&damper, &contact_auto), &contact_spring_damper);
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_OK);
+    assert_int_equal(damper.buffer.table.count, 3);
+    assert_false(buffer_is_given(&damper.left_buffer) || buffer_is_given(&damper.right_buffer));
+    damper.buffer.table.at[2].approach_speed = 0.2;
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/dampers/0/buffer/table/2/approach_speed"),
+                        "must be above the row before, 0.2 m/s, is 0.2");
+    damper.buffer.table.at[2].approach_speed = 0.3;
+    // Under impulse contact times are left out, and without them a table asks for impulse.
+    assert_int_equal(complete(&damper, &contact_impulse), STATUS_OK);
+    assert_true(isnan(damper.buffer.table.at[1].contact_time));
+    assert_ptr_equal(law_of(&damper, &contact_auto), &contact_impulse);
+    assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
+    assert_int_equal(problem.count, 3);
+    fields_clear(damper_fields, &damper);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_damper_stands_on_the_top_storey),
@@ -278,6 +351,9 @@ int main(void) {
         cmocka_unit_test(each_side_has_one_buffer),
         cmocka_unit_test(faults_of_both_sides_are_told_at_once),
         cmocka_unit_test(equal_dampers_have_one_form),
+        cmocka_unit_test(a_rig_is_given_where_it_is_used),
+        cmocka_unit_test(a_power_law_fills_its_exponent_and_others_drop_it),
+        cmocka_unit_test(equal_tables_become_one_buffer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -148,7 +148,7 @@ static void all_faults_of_a_scene_are_told_at_once_and_each_once(void **state) {
     Simulation simulation;
     scene_with_damper(&simulation, 1.3, 0);
     sdof_of(&simulation)->mass = -1;
-    sdof_of(&simulation)->damping_ratio = 0.01;
+    sdof_of(&simulation)->structure.damping_ratio = 0.01;
     damper_of(&simulation)->clearance = -0.5;
     damper_of(&simulation)->position = 1;
     simulation.scene.duration = 0;
@@ -166,7 +166,7 @@ static void all_faults_of_a_scene_are_told_at_once_and_each_once(void **state) {
     assert_string_equal(detail_at(&problem, "/dampers/0/buffer/contact_time"),
                         "must be above 0 s, is 0");
     assert_string_equal(detail_at(&problem, "/duration"), "must be above 0 s, is 0");
-    assert_begins(detail_at(&problem, "/output/channels/1"), "must be one of displacement");
+    assert_begins(detail_at(&problem, "/output/channels/1"), "must be one of usual, displacement");
     assert_begins(detail_at(&problem, "/output/channels/2"), "velocity is asked for twice");
     assert_begins(detail_at(&problem, "/output/statistics_from"), "must be at least 0 s");
     assert_begins(detail_at(&problem, "/output/psd/segment"), "must be at least 1");
@@ -343,17 +343,23 @@ static void titles_and_labels_have_their_limits(void **state) {
     simulation_clear(&simulation);
 }
 
-static void two_dampers_are_one_too_many_for_now(void **state) {
+static void damp_more(Simulation *simulation, size_t count) {
+    Damper *dampers = realloc(simulation->scene.dampers.at, count * sizeof *dampers);
+    assert_non_null(dampers);
+    for (size_t i = 1; i < count; i++)
+        assert_int_equal(fields_copy(damper_fields, &dampers[0], &dampers[i]), STATUS_OK);
+    simulation->scene.dampers = (Dampers){dampers, count};
+}
+
+static void sixty_four_dampers_are_the_most(void **state) {
     (void)state;
     Simulation simulation;
     scene_with_damper(&simulation, 0.61, 0.025);
-    Damper *two = realloc(simulation.scene.dampers.at, 2 * sizeof *two);
-    assert_non_null(two);
-    assert_int_equal(fields_copy(damper_fields, &two[0], &two[1]), STATUS_OK);
-    simulation.scene.dampers = (Dampers){two, 2};
+    damp_more(&simulation, 64);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    damp_more(&simulation, 65);
     assert_int_equal(complete(&simulation), STATUS_INVALID);
-    assert_int_equal(problem.count, 1);
-    assert_string_equal(detail_at(&problem, "/dampers"), "must have at most 1, has 2 elements");
+    assert_string_equal(detail_at(&problem, "/dampers"), "must have at most 64, has 65 elements");
     simulation_clear(&simulation);
 }
 
@@ -365,10 +371,10 @@ static void implausible_values_get_a_warning_each(void **state) {
     damper_of(&simulation)->position = -2;
     damper_of(&simulation)->mass = 110.7;
     sdof_of(&simulation)->damping = (double)NAN;
-    sdof_of(&simulation)->damping_ratio = 1.6;
+    sdof_of(&simulation)->structure.damping_ratio = 1.6;
     simulation.scene.duration = 0.1;
     simulation.scene.sample_rate = 5;
-    ((Excitation *)(void *)simulation.scene.excitation)->displacement = -15;
+    scene_start(&simulation, -15, 0);
     assert_int_equal(complete(&simulation), STATUS_OK);
     assert_string_equal(warning_at("/dampers/0/clearance"),
                         "is 15 m, more than 1 m: metres are meant, not millimetres");
@@ -391,6 +397,19 @@ static void implausible_values_get_a_warning_each(void **state) {
     *(double *)variant_member(random, "rms") = 981;
     assert_int_equal(complete(&simulation), STATUS_OK);
     assert_begins(warning_at("/excitation/rms"), "is 981 m/s^2, more than 100 m/s^2");
+    simulation_clear(&simulation);
+}
+
+static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_choose(&simulation.scene.excitation, &excitation_kinds, "half_sine");
+    *(double *)variant_member(simulation.scene.excitation, "amplitude") = 1;
+    *(double *)variant_member(simulation.scene.excitation, "length") = 1e-3;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(warnings.count, 1);
+    assert_begins(warning_at("/excitation/length"), "is 0.001 s, less than two samples");
     simulation_clear(&simulation);
 }
 
@@ -434,8 +453,9 @@ int main(void) {
         cmocka_unit_test(statistics_begin_within_the_run),
         cmocka_unit_test(a_scene_that_would_take_too_long_is_refused_beforehand),
         cmocka_unit_test(titles_and_labels_have_their_limits),
-        cmocka_unit_test(two_dampers_are_one_too_many_for_now),
+        cmocka_unit_test(sixty_four_dampers_are_the_most),
         cmocka_unit_test(implausible_values_get_a_warning_each),
+        cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),
         cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
         cmocka_unit_test(accuracy_is_chosen_by_its_solver),
     };

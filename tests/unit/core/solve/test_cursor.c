@@ -52,6 +52,40 @@ static void every_slice_is_the_base(void **state) {
     walk(&(Base){.form = BASE_STILL}, 10);
 }
 
+static void every_slice_of_pieces_is_the_base(void **state) {
+    (void)state;
+    const double starts[] = {0, 0.1, 0.103, 0.2999999}, omegas[] = {0, 31};
+    const double rates[] = {10, 33, 100, 1000};
+    for (size_t i = 0; i < 4; i++)
+        for (size_t j = 0; j < 2; j++)
+            for (size_t k = 0; k < 4; k++)
+                walk(&(Base){.form = BASE_PIECES,
+                             .omega = omegas[j],
+                             .pieces = {{starts[i], 1, -3}, {starts[i] + 0.25, 2, 5}, {0.8, 0, 0}},
+                             .piece_count = 3},
+                     rates[k]);
+}
+
+static void a_piece_on_a_sample_leaves_the_interval_whole(void **state) {
+    (void)state;
+    // Sums of starts and lengths are a rounding off the samples' times, to either side.
+    for (int side = -1; side <= 1; side++) {
+        Base base = {.form = BASE_PIECES, .pieces = {{700.1, 3, 2}, {700.2, 0, 0}}};
+        base.piece_count = 2;
+        for (size_t i = 0; i < 2 && side != 0; i++)
+            base.pieces[i].time = nextafter(base.pieces[i].time, side < 0 ? -1.0 : 1e9);
+        BaseCursor cursor;
+        Slice slice;
+        base_cursor_make(&cursor, &base, 1000);
+        for (size_t n = 700050; n < 700250; n++) {
+            assert_true(base_cursor_interval(&cursor, n, &slice));
+            const bool is_moving = n >= 700100 && n < 700200;
+            assert_true(fabs(slice.value - (is_moving ? 3 + 2e-3 * (double)(n - 700100) : 0)) <
+                        1e-9);
+        }
+    }
+}
+
 static void a_kink_inside_an_interval_forbids_a_whole_step(void **state) {
     (void)state;
     const Base base = {.form = BASE_SAMPLED, .values = values, .count = 5, .interval = 0.07};
@@ -76,6 +110,8 @@ static void a_late_sine_keeps_its_phase(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_slice_is_the_base),
+        cmocka_unit_test(every_slice_of_pieces_is_the_base),
+        cmocka_unit_test(a_piece_on_a_sample_leaves_the_interval_whole),
         cmocka_unit_test(a_kink_inside_an_interval_forbids_a_whole_step),
         cmocka_unit_test(a_late_sine_keeps_its_phase),
     };

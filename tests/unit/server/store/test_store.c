@@ -136,6 +136,7 @@ static ResultRow result_row(const char *id) {
                      .plan = "{}",
                      .summary = "{\"a\": 1}",
                      .warnings = "[]",
+                     .notes = "[2]",
                      .energy = "{}",
                      .impacts = "{}",
                      .count = 11,
@@ -171,6 +172,7 @@ static void a_result_and_its_jobs_are_saved_together_or_not_at_all(void **state)
     result_row_clear(&found);
     assert_int_equal(store_result_head(store, "r-1", &found, NULL), STATUS_OK);
     assert_string_equal(found.summary, "{\"a\": 1}");
+    assert_string_equal(found.notes, "[2]");
     assert_null(found.scene);
     result_row_clear(&found);
     assert_int_equal(store_result_load(store, "r-2", &found, NULL), STATUS_NOT_FOUND);

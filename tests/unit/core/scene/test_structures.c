@@ -11,11 +11,17 @@
 static Problem problem;
 
 static StructureSdof sdof(double damping, double ratio) {
-    return (StructureSdof){.structure = {{&structure_sdof}},
+    return (StructureSdof){.structure = {{&structure_sdof.kind}, ratio},
                            .mass = 1.35,
                            .stiffness = 865,
-                           .damping = damping,
-                           .damping_ratio = ratio};
+                           .damping = damping};
+}
+
+static double structure_damping(const StructureSdof *structure) {
+    double all[4] = {0};
+    structure_fill(&structure->structure, &(const Matrices){all, all + 1, all + 2, all + 3});
+    assert_true(all[0] == structure->mass && all[1] == structure->stiffness && all[3] == 1);
+    return all[2];
 }
 
 static Status complete(StructureSdof *structure) {
@@ -60,7 +66,7 @@ static void the_rows_refuse_what_is_no_structure(void **state) {
     structure.mass = 0;
     structure.stiffness = -865;
     problem_clear(&problem);
-    fields_check(structure_sdof.fields, &structure, "/structure", &problem);
+    fields_check(structure_sdof.kind.fields, &structure, "/structure", &problem);
     assert_int_equal(problem.count, 3);
     assert_string_equal(detail_at(&problem, "/structure/mass"), "must be above 0 kg, is 0");
     assert_string_equal(detail_at(&problem, "/structure/stiffness"),

@@ -1,0 +1,14 @@
+// Which channels a request means: the usual ones by name, numbers where a scene has several storeys
+// or dampers. Not what they hold: that is result/channel.h. Used by request.c.
+#ifndef CORE_SIMULATION_REQUEST_CHANNELS_H
+#define CORE_SIMULATION_REQUEST_CHANNELS_H
+
+#include "core/scene/scene.h"
+
+// Puts the names of the usual channels, or of the usual spectrum's one, in place of CHANNEL_USUAL;
+// then judges all names, below `pointer`. Says nothing of numbers where a fault leaves the storeys
+// or dampers unknown.
+Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, const char *pointer,
+                        Problem *problem);
+
+#endif

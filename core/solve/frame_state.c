@@ -1,0 +1,341 @@
+#include "core/solve/frame_state.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/math/linear.h"
+
+static const double NEARLY = 1e-9;
+
+double frame_time(const Frame *frame) {
+    return (double)frame->sample / frame->plan->sample_rate + frame->offset;
+}
+
+double frame_clock(const Frame *frame) {
+    return 4 * DBL_EPSILON * fmax(frame_time(frame), frame->interval);
+}
+
+double frame_room(const FrameDamper *damper, Side side) {
+    if (damper->origin == FRAME_FROM_MIDDLE)
+        return damper->plan->clearance / 2;
+    return damper->origin == (FrameOrigin)side ? 0 : damper->plan->clearance;
+}
+
+double frame_relative(const FrameDamper *damper) {
+    const double stop = damper->plan->clearance / 2;
+    const double origin =
+        damper->origin == FRAME_FROM_MIDDLE ? 0 : frame_sign((Side)damper->origin) * stop;
+    return damper->plan->offset + origin + damper->r;
+}
+
+void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
+    const size_t n = frame->storeys;
+    if (frame->diagonal != NULL) {
+        for (size_t i = 0; i < n; i++)
+            out[i] = frame->diagonal[i] * p[i] + frame->omega2[i] * q[i];
+        return;
+    }
+    for (size_t i = 0; i < n; i++)
+        out[i] = frame->omega2[i] * q[i];
+    for (size_t j = 0; j < n; j++) {
+        const double *row = frame->damping + j * n; // D is symmetric
+        for (size_t i = 0; i < n; i++)
+            out[i] += row[i] * p[j];
+    }
+}
+
+// What a power law says of the present contact.
+static ContactForce power_now(const Frame *frame, const FrameDamper *damper) {
+    const double sign = frame_sign(damper->side);
+    return frame->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
+}
+
+void frame_feel(Frame *frame) {
+    frame_elastic(frame, frame->q, frame->p, frame->elastic);
+    for (size_t d = 0; d < frame->dampers; d++) {
+        FrameDamper *damper = &frame->damper[d];
+        damper->force = 0;
+        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
+            damper->force = frame_sign(damper->side) * power_now(frame, damper).value;
+        else if (damper->phase == FRAME_CONTACT)
+            damper->force =
+                damper->contact.stiffness * damper->r + damper->contact.damping * damper->w;
+        if (damper->phase != FRAME_RESTING)
+            continue;
+        for (size_t e = 0; e < frame->dampers; e++)
+            if (frame->damper[e].phase == FRAME_RESTING)
+                damper->force +=
+                    frame->hold[d * frame->dampers + e] *
+                    (frame_dot(frame->damper[e].shape, frame->elastic, frame->storeys) +
+                     frame->damper[e].lean * frame->ground);
+    }
+}
+
+// Adds the part of `many` modes from the i-th on to x, v and a. Several at once spare the storeys'
+// ways to memory and back.
+static inline void add_modes(Frame *frame, size_t i, size_t many) {
+    const size_t n = frame->storeys;
+    const double *shape = frame->modal + i * n;
+    const double *q = frame->q + i, *p = frame->p + i, *e = frame->elastic + i;
+    for (size_t j = 0; j < n; j++) {
+        double x = 0, v = 0, a = 0;
+        for (size_t k = 0; k < many; k++) {
+            x += shape[k * n + j] * q[k];
+            v += shape[k * n + j] * p[k];
+            a += shape[k * n + j] * e[k];
+        }
+        frame->x[j] += x;
+        frame->v[j] += v;
+        frame->a[j] -= a;
+    }
+}
+
+void frame_look(Frame *frame) {
+    const size_t n = frame->storeys;
+    frame_feel(frame);
+    memset(frame->x, 0, n * sizeof *frame->x);
+    memset(frame->v, 0, n * sizeof *frame->v);
+    memset(frame->a, 0, n * sizeof *frame->a);
+    size_t i = 0;
+    for (; i + 5 <= n; i += 5)
+        add_modes(frame, i, 5);
+    for (; i < n; i++)
+        add_modes(frame, i, 1);
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const double force = frame->damper[d].force;
+        if (force != 0)
+            for (size_t j = 0; j < n; j++)
+                frame->a[j] += frame->mobility[d * n + j] * force;
+    }
+}
+
+double frame_acceleration(const Frame *frame, size_t d) {
+    const FrameDamper *damper = &frame->damper[d];
+    double sum =
+        damper->lean * frame->ground + frame_dot(damper->shape, frame->elastic, frame->storeys);
+    for (size_t e = 0; e < frame->dampers; e++)
+        sum -= frame->yield[d * frame->dampers + e] * frame->damper[e].force;
+    return sum;
+}
+
+EnergyState frame_energy(const Frame *frame) {
+    EnergyState energy = {0.5 * frame_dot(frame->p, frame->p, frame->storeys), 0};
+    for (size_t i = 0; i < frame->storeys; i++)
+        energy.strain += 0.5 * frame->omega2[i] * frame->q[i] * frame->q[i];
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double z = frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
+        energy.kinetic += 0.5 * damper->plan->mass * z * z;
+        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
+            energy.strain += power_now(frame, damper).strain;
+        else if (damper->phase == FRAME_CONTACT)
+            energy.strain += 0.5 * damper->contact.stiffness * damper->r * damper->r;
+    }
+    return energy;
+}
+
+// With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
+// most the larger of c and sqrt(k); a contact adds to each quotient no more than its own over m_e.
+double frame_rate(const Frame *frame) {
+    double stiff = frame->stiff, viscous = frame->viscous;
+    bool is_touching = false;
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        if (damper->phase != FRAME_CONTACT)
+            continue;
+        is_touching = true;
+        stiff += damper->contact.stiffness / damper->effective_mass;
+        viscous += damper->contact.damping / damper->effective_mass;
+    }
+    return is_touching ? fmax(fmax(sqrt(stiff), viscous), frame->rate) : frame->rate;
+}
+
+// The inverse of `yield` among the dampers that rest, by Gauss and Jordan; it is positive definite.
+void frame_hold_make(Frame *frame) {
+    const size_t n = frame->dampers;
+    double *left = frame->scratch, *right = frame->hold;
+    frame->resting = 0;
+    for (size_t i = 0; i < n; i++) {
+        const bool is_resting = frame->damper[i].phase == FRAME_RESTING;
+        frame->resting += is_resting;
+        for (size_t j = 0; j < n; j++) {
+            const bool is_pair = is_resting && frame->damper[j].phase == FRAME_RESTING;
+            left[i * n + j] = is_pair ? frame->yield[i * n + j] : i == j;
+            right[i * n + j] = is_resting && i == j;
+        }
+    }
+    if (frame->resting == 0)
+        return;
+    for (size_t k = 0; k < n; k++) {
+        const double pivot = left[k * n + k];
+        for (size_t j = 0; j < n; j++) {
+            left[k * n + j] /= pivot;
+            right[k * n + j] /= pivot;
+        }
+        for (size_t i = 0; i < n; i++) {
+            const double factor = left[i * n + k];
+            if (i == k || factor == 0)
+                continue;
+            for (size_t j = 0; j < n; j++) {
+                left[i * n + j] -= factor * left[k * n + j];
+                right[i * n + j] -= factor * right[k * n + j];
+            }
+        }
+    }
+}
+
+// (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a
+// mass that rests on another.
+static double mobility(const Modes *modes, size_t j, size_t k) {
+    const double *a = modes->shapes + j * modes->count, *b = modes->shapes + k * modes->count;
+    long double sum = 0, size = 0;
+    for (size_t i = 0; i < modes->count; i++) {
+        const long double term = (long double)a[i] * b[i];
+        sum += term;
+        size += fabsl(term);
+    }
+    return fabsl(sum) <= 4 * DBL_EPSILON * size ? 0 : (double)sum;
+}
+
+static void make_damper(Frame *frame, size_t d) {
+    const Plan *plan = frame->plan;
+    const size_t n = frame->storeys;
+    FrameDamper *damper = &frame->damper[d];
+    const PlanDamper *planned = &plan->dampers[d];
+    *damper = (FrameDamper){.plan = planned,
+                            .shape = frame->modes->shapes + planned->storey * n,
+                            .lean = plan->influence[planned->storey] - 1,
+                            .phase = FRAME_FLIGHT,
+                            .origin = FRAME_FROM_MIDDLE,
+                            .r = planned->position,
+                            .w = planned->velocity};
+    for (size_t j = 0; j < n; j++)
+        frame->mobility[d * n + j] = mobility(frame->modes, planned->storey, j);
+    for (size_t e = 0; e < frame->dampers; e++)
+        frame->yield[d * frame->dampers + e] =
+            mobility(frame->modes, planned->storey, plan->dampers[e].storey) +
+            (d == e ? 1 / planned->mass : 0);
+    damper->effective_mass = 1 / frame->yield[d * frame->dampers + d];
+    double stiff = 0, size = 0;
+    for (size_t i = 0; i < n; i++) {
+        frame->carry[i] += planned->mass * damper->shape[i];
+        stiff += damper->shape[i] * damper->shape[i] * frame->omega2[i];
+        size += damper->shape[i] * damper->shape[i];
+    }
+    damper->reach = sqrt(stiff) + sqrt(size) * frame->viscous;
+}
+
+// D, its norm and how far it is from only taking energy.
+static void make_damping(Frame *frame) {
+    const size_t n = frame->storeys;
+    frame->damping = frame->modes->damping;
+    double rows = 0, squares = 0, lowest = 0, largest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double own = frame->damping[i * n + i];
+        double sum = 0;
+        for (size_t j = 0; j < n; j++) {
+            sum += fabs(frame->damping[i * n + j]);
+            squares += frame->damping[i * n + j] * frame->damping[i * n + j];
+        }
+        rows = fmax(rows, sum);
+        lowest = fmin(lowest, own - (sum - fabs(own))); // Gershgorin
+        largest = fmax(largest, own);
+        frame->diagonal[i] = own;
+    }
+    frame->viscous = fmin(rows, sqrt(squares));
+    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
+    frame->growth =
+        linear_find_indefinite(n, frame->damping, NEARLY) == 0 ? NEARLY * largest : -lowest;
+    if (!frame->modes->is_classical)
+        frame->diagonal = NULL;
+}
+
+// q = shapes' M x: the modes are normal.
+static void make_modal(const Frame *frame, const double *values, double *modal) {
+    const size_t n = frame->storeys;
+    for (size_t i = 0; i < n; i++) {
+        long double sum = 0;
+        for (size_t j = 0; j < n; j++) {
+            long double carried = 0;
+            for (size_t k = 0; k < n; k++)
+                carried += (long double)frame->plan->mass[j * n + k] * values[k];
+            sum += frame->modes->shapes[j * n + i] * carried;
+        }
+        modal[i] = (double)sum;
+    }
+}
+
+static Status make_room(Frame *frame) {
+    const size_t n = frame->storeys, m = frame->dampers;
+    double **const arrays[] = {&frame->omega2,  &frame->diagonal, &frame->carry,    &frame->q,
+                               &frame->p,       &frame->x,        &frame->v,        &frame->a,
+                               &frame->elastic, &frame->modal,    &frame->mobility, &frame->yield,
+                               &frame->hold,    &frame->scratch};
+    const size_t sizes[] = {n, n, n, n, n, n, n, n, n, n * n, m * n, m * m, m * m, m * m};
+    size_t total = 0;
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+        total += sizes[i];
+    frame->block = calloc(total, sizeof *frame->block);
+    frame->damper = calloc(m > 0 ? m : 1, sizeof *frame->damper);
+    if (frame->block == NULL || frame->damper == NULL)
+        return STATUS_NO_MEMORY;
+    double *at = frame->block;
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        *arrays[i] = at;
+        at += sizes[i];
+    }
+    return STATUS_OK;
+}
+
+Status frame_make(Frame *frame, Run *run, Problem *problem) {
+    const Plan *plan = run->plan;
+    const size_t n = plan->storeys;
+    memset(frame, 0, sizeof *frame);
+    frame->run = run;
+    frame->plan = plan;
+    frame->problem = problem;
+    frame->storeys = n;
+    frame->dampers = plan->damper_count;
+    frame->interval = 1 / plan->sample_rate;
+    frame->modes = &plan->modes;
+    if (plan->modes.count == 0) {
+        TRY(modes_make(&frame->own_modes, n, plan->mass, plan->stiffness, plan->damping,
+                       plan->influence, problem));
+        frame->modes = &frame->own_modes;
+    }
+    if (make_room(frame) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    make_damping(frame);
+    for (size_t i = 0; i < n; i++) {
+        frame->omega2[i] = frame->modes->omega[i] * frame->modes->omega[i];
+        frame->stiff = fmax(frame->stiff, frame->omega2[i]);
+        frame->carry[i] = frame->modes->participation[i];
+        for (size_t j = 0; j < n; j++)
+            frame->modal[i * n + j] = frame->modes->shapes[j * n + i];
+    }
+    frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
+    frame->rate = fmax(fmax(fmax(sqrt(frame->stiff), frame->viscous), run->base->omega), 1e-300);
+    bool is_sound = isfinite(frame->rate);
+    for (size_t d = 0; d < frame->dampers; d++) {
+        make_damper(frame, d);
+        const double m = frame->damper[d].effective_mass;
+        is_sound = is_sound && m > 0 && isfinite(m);
+    }
+    if (!is_sound)
+        return problem_set(
+            problem, STATUS_UNSTABLE,
+            "the scene's masses and stiffnesses are too far apart for double precision");
+    make_modal(frame, plan->displacement, frame->q);
+    make_modal(frame, plan->velocity, frame->p);
+    base_cursor_make(&frame->base, run->base, plan->sample_rate);
+    frame->ground = base_cursor_at(&frame->base, 0);
+    return STATUS_OK;
+}
+
+void frame_clear(Frame *frame) {
+    modes_clear(&frame->own_modes);
+    free(frame->damper);
+    free(frame->block);
+}

@@ -1,0 +1,135 @@
+// What the general engine knows while it runs, and how it looks from outside: rooms, forces,
+// energies. Not the stepping (frame.c), the events (frame_events.c) nor what is written down of it
+// (frame_record.c). Used by core/solve/frame*.c.
+#ifndef CORE_SOLVE_FRAME_STATE_H
+#define CORE_SOLVE_FRAME_STATE_H
+
+#include "core/plan/modes.h"
+#include "core/solve/cursor.h"
+#include "core/solve/ledger.h"
+#include "core/solve/solver.h"
+
+// FRAME_INSIDE: out of contact by the force's end, but not yet out of the buffer.
+typedef enum FramePhase { FRAME_FLIGHT, FRAME_CONTACT, FRAME_INSIDE, FRAME_RESTING } FramePhase;
+typedef enum FrameOrigin {
+    FRAME_FROM_LEFT = SIDE_LEFT,
+    FRAME_FROM_RIGHT = SIDE_RIGHT,
+    FRAME_FROM_MIDDLE
+} FrameOrigin;
+
+typedef struct FrameDamper {
+    const PlanDamper *plan;
+    const double *shape;   // of its storey, mode after mode
+    double lean;           // r_j - 1: a_g's part in r''
+    double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj) [kg]
+    double reach;          // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
+
+    FramePhase phase;
+    Side side;          // of all phases but flight
+    FrameOrigin origin; // what r is counted from
+    int leaving; // terms of the gap, from the constant one on, that are exactly 0: it was released
+                 // from rest a moment ago
+    bool is_fresh;             // the present phase has lasted for no time yet
+    double r, w;               // displacement and speed relative to the storey [m], [m/s]
+    double force;              // N on the structure as of the last frame_look [N]
+    ContactParameters contact; // frozen at the touch
+    LedgerRow row;             // of the present contact or rest
+
+    // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
+    double storey_speed, gained;
+    // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
+    // that presses it [m/s], [m/s], [N s].
+    bool is_met, is_bounced; // is_met: takes part; is_bounced: not from rest
+    double closing, parting, pressed;
+} FrameDamper;
+
+// In modal coordinates, x = shapes q:
+//   q'' = -(D q' + W^2 q) - participation a_g + sum of shape_d N_d
+//   r_d'' = (r_j - 1) a_g + shape_d . (D q' + W^2 q) - sum over e of yield_de N_e
+typedef struct Frame {
+    Run *run;
+    const Plan *plan;
+    const Modes *modes;
+    Modes own_modes; // where the plan has none
+    Problem *problem;
+
+    size_t storeys;        // and modes
+    double *omega2;        // [1/s^2]
+    const double *damping; // D: storeys values where it is diagonal, else storeys x storeys
+    double *diagonal;      // of D, where it is diagonal
+    double *modal;         // shapes, mode after mode
+    double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
+    double rate;           // no eigenvalue of flight, base included, is larger [1/s]
+    double stiff, viscous; // largest of W^2 and of D
+    double drive;          // |participation|
+    double growth;         // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
+
+    size_t dampers;
+    FrameDamper *damper;
+    double *yield; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
+    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]
+    double *hold;     // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
+    size_t resting;   // how many are
+
+    double *q, *p;     // modal displacements and speeds
+    double *x, *v, *a; // of the storeys, as of the last frame_look; a is absolute
+    double *elastic;   // D p + W^2 q, likewise
+    double ground;     // a_g now [m/s^2]
+    double *scratch;   // of frame_hold_make and frame_collide
+    double *block;     // all arrays above
+
+    size_t sample; // the last one passed
+    double offset; // time since then [s]
+    double interval;
+    BaseCursor base;
+    Ledger ledger;
+    size_t events;       // all so far
+    size_t still_events; // in a row, without time passing
+} Frame;
+
+// +1 for the right stop, -1 for the left.
+static inline double frame_sign(Side side) {
+    return side == SIDE_RIGHT ? 1 : -1;
+}
+
+// In a fixed order that processors can do two by two.
+static inline double frame_dot(const double *a, const double *b, size_t count) {
+    double sum[4] = {0, 0, 0, 0};
+    size_t i = 0;
+    for (; i + 4 <= count; i += 4)
+        for (size_t j = 0; j < 4; j++)
+            sum[j] += a[i + j] * b[i + j];
+    for (; i < count; i++)
+        sum[0] += a[i] * b[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+// Everything but the ledger. Freed by frame_clear, also after a failure.
+Status frame_make(Frame *frame, Run *run, Problem *problem);
+void frame_clear(Frame *frame);
+
+double frame_time(const Frame *frame); // [s]
+// The shortest time that can be told from none, at the present one [s].
+double frame_clock(const Frame *frame);
+// Between free mass and stop at r = 0 of the present origin [m].
+double frame_room(const FrameDamper *damper, Side side);
+// Displacement of the free mass relative to its storey [m].
+double frame_relative(const FrameDamper *damper);
+
+// out = D p + W^2 q.
+void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
+// Brings elastic and the dampers' forces up to the present state.
+void frame_feel(Frame *frame);
+// That, and x, v, a of all storeys.
+void frame_look(Frame *frame);
+// r'' of a damper in flight, after frame_feel [m/s^2].
+double frame_acceleration(const Frame *frame, size_t damper);
+EnergyState frame_energy(const Frame *frame);
+
+// No eigenvalue of the present motion is larger [1/s].
+double frame_rate(const Frame *frame);
+
+// Makes `hold` anew: after every change of who rests.
+void frame_hold_make(Frame *frame);
+
+#endif

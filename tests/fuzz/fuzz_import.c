@@ -1,0 +1,170 @@
+// Ground motions of every layout, mutated: whatever comes in, import_read answers with samples that
+// are finite and of the count it tells, or with one fault that has a place. Meant for the
+// instrumented build: build-debug/tests/fuzz_import SECONDS [SEED]. What breaks the rule is
+// printed.
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/excite/import.h"
+
+enum { TEXT_MOST = 4096, MUTATIONS_MOST = 6, ROUNDS_TIMED = 256 };
+
+static const char *const seeds[] = {
+    "PEER STRONG MOTION DATABASE RECORD\nSOMEWHERE, 090\nACCELERATION TIME HISTORY IN UNITS OF G. "
+    "FILTER\n"
+    "NPTS=  7, DT= .01000 SEC\n  -.6403182E-02  -.6028715E-02   .5304162E-03\n   .7743260E-02 .1 "
+    ".2\n .3",
+    "PEER NGA\r\r\nunits: (g)\r\r\n5    0.0100    NPTS, DT\r\r\n   0.233833E-06   "
+    "0.299033D-06\r\r\n 1 2 3\r\r\n",
+    "Prose, 4 points\n*** Begin data ***\nNPTS=  4, dt= .02\n   0.00630   0.00364\n 1 -1\n*** End "
+    "data ***\n\n",
+    "   0.00630   0.00364   0.00099\n  -0.00128   0.00368   0.00864\n   0.00021\n*** End Data "
+    "***\n",
+    "From 1994\nTime[s] Accel[m/s^2]\n0.0000\t-0.0012\n0.0100\t-0.0007\n0.0200\t-0.0003\n0.0300\t1",
+    "motion\n5 0.0100\n2.42E-07\n1.46E-07\n-2.42E-06\n6.85E-04\n5\n",
+    "     0.039111\n     0.020721\n     0.006817\n    -0.020472\n",
+};
+
+// What files are broken with.
+static const char *const pieces[] = {
+    "NPTS",
+    "DT=",
+    "*** Begin data ***\n",
+    "*** End data ***\n",
+    "NaN",
+    "****",
+    "1e999",
+    "-",
+    ".",
+    "E",
+    "D+",
+    "\n",
+    "\r\n",
+    "\t",
+    " ",
+    "0",
+    "9",
+    "99999999999999999999",
+    "1.0-2.0",
+    "UNITS OF G",
+    "m/s^2",
+    "CM/SEC/SEC",
+    "GAL",
+    "time",
+    "VELOCITY TIME",
+    "\xEF\xBB\xBF",
+    "\xff",
+    ",",
+    "=",
+    "1e-320",
+    "1e308",
+    "/",
+    "(g)",
+    "G*",
+};
+
+static uint64_t state;
+
+// Vigna's splitmix64.
+static size_t draw(size_t count) {
+    uint64_t z = state += 0x9E3779B97F4A7C15u;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return count == 0 ? 0 : (size_t)((z ^ (z >> 31)) % count);
+}
+
+static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
+    if (size + length > TEXT_MOST)
+        return size;
+    memmove(text + at + length, text + at, size - at);
+    memcpy(text + at, piece, length);
+    return size + length;
+}
+
+static size_t mutate(char *text, size_t size) {
+    char copy[64];
+    const size_t at = draw(size + 1);
+    switch (draw(6)) {
+    case 0: // another byte
+        if (at < size)
+            text[at] = (char)draw(256);
+        return size;
+    case 1: // something known
+    case 2: {
+        const char *piece = pieces[draw(COUNT(pieces))];
+        return put(text, size, at, piece, strlen(piece));
+    }
+    case 3: { // something left out
+        size_t length = draw(40);
+        length = length < size - at ? length : size - at;
+        memmove(text + at, text + at + length, size - at - length);
+        return size - length;
+    }
+    case 4: { // something once more, elsewhere
+        size_t length = draw(sizeof copy);
+        length = length < size - at ? length : size - at;
+        memcpy(copy, text + at, length);
+        return put(text, size, draw(size + 1), copy, length);
+    }
+    default: // an end
+        return draw(8) == 0 ? at : size;
+    }
+}
+
+static const char *judge(Status status, const Import *import, const Problem *problem) {
+    if (status != STATUS_OK) {
+        if (import->samples.at != NULL || import->header != NULL)
+            return "failed, but left something";
+        return problem->count == 1 && strncmp(problem->faults[0].pointer, "line ", 5) == 0 &&
+                       problem->faults[0].detail[0] != '\0'
+                   ? NULL
+                   : "failed without one fault that has a place";
+    }
+    if (import->samples.count < 2 || !(import->interval > 0) || !isfinite(import->interval))
+        return "no samples or no interval";
+    for (size_t i = 0; i < import->samples.count; i++)
+        if (!isfinite(import->samples.at[i]))
+            return "a sample is not finite";
+    return NULL;
+}
+
+int main(int argc, char **argv) {
+    static Problem problem;
+    const double seconds = argc > 1 ? atof(argv[1]) : 10;
+    state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
+    const time_t start = time(NULL);
+    unsigned long long rounds = 0, passed = 0;
+    while (difftime(time(NULL), start) < seconds)
+        for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
+            char text[TEXT_MOST];
+            const char *seed = seeds[draw(COUNT(seeds))];
+            size_t size = strlen(seed);
+            memcpy(text, seed, size);
+            for (size_t mutations = draw(MUTATIONS_MOST + 1); mutations > 0; mutations--)
+                size = mutate(text, size);
+            const ImportRequest request = {draw(2) == 0 ? 0.01 : (double)NAN, (int)draw(4) - 1};
+            // Of its own size, so that a byte read behind it is seen.
+            char *own = malloc(size > 0 ? size : 1);
+            if (own == NULL)
+                return 1;
+            memcpy(own, text, size);
+            Import import;
+            problem_clear(&problem);
+            const Status status = import_read(own, size, &request, &import, &problem);
+            free(own);
+            const char *wrong = judge(status, &import, &problem);
+            if (wrong != NULL) {
+                fprintf(stderr, "%s; the text:\n", wrong);
+                (void)fwrite(text, 1, size, stderr);
+                return 1;
+            }
+            passed += status == STATUS_OK;
+            import_clear(&import);
+        }
+    printf("%llu texts, %llu of them read\n", rounds, passed);
+    return 0;
+}
