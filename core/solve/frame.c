@@ -131,6 +131,11 @@ static Status happen(Frame *frame, const FrameEvent *event) {
     return ledger_status(&frame->ledger, frame->problem);
 }
 
+// The longest arc: a half-sine of the base is fast only while it lasts.
+static double arc_most(const Frame *frame, const Slice *slice) {
+    return 1 / fmax(frame_rate(frame), slice->omega);
+}
+
 // One step of contact under a power law, at most `length` long.
 static Status press(Engine *engine, const Slice *slice, double length) {
     Frame *frame = &engine->frame;
@@ -157,7 +162,7 @@ static Status advance(Engine *engine, double length) {
     frame->ground = slice.value;
     if (frame_ode_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
-    frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), 1 / frame_rate(frame)));
+    frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), arc_most(frame, &slice)));
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
     if (is_event)
@@ -211,7 +216,7 @@ static Status settle(Engine *engine) {
         Slice slice;
         FrameEvent event;
         (void)base_cursor_slice(&frame->base, 0, 0, &slice);
-        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, 1 / frame_rate(frame)));
+        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, arc_most(frame, &slice)));
         is_event = frame_find_event(frame, &engine->arc, &event) && event.s == 0 &&
                    frame->damper[event.damper].phase == FRAME_FLIGHT;
         if (is_event)
@@ -334,8 +339,10 @@ static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
 
 static void tell(const Neighbour *neighbour, const Frame *frame, Response *response) {
     const double size = fmax(neighbour->largest, response->peaks.displacement);
-    // A frequency's own rounding turns the phase.
-    const double drift = DBL_EPSILON * (1 + frame->rate * frame->plan->duration);
+    // A frequency's own rounding turns the phase; a pulse is over before it matters.
+    const Base *base = frame->run->base;
+    const double rate = fmax(frame->rate, base->form == BASE_SINE ? base->omega : 0);
+    const double drift = DBL_EPSILON * (1 + rate * frame->plan->duration);
     const double error = size > 0 ? fmax(neighbour->worst / size, drift) : 0;
     response->has_trust = neighbour->is_known;
     response->error_estimate = error < PARTED ? error : 1;

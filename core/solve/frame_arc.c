@@ -52,7 +52,7 @@ static void forces(FrameArc *arc, const Frame *frame, size_t k, const double *el
 void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, double length) {
     const size_t n = frame->storeys, m = frame->dampers;
     arc->length = length;
-    arc->rho = length * frame_rate(frame);
+    arc->rho = length * fmax(frame_rate(frame), slice->omega);
     arc->degree = arc_degree(arc->rho);
     arc_base_series(arc->base, arc->degree, slice, length);
     double *restrict speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;

@@ -9,7 +9,7 @@
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct FrameArc {
     double length;                // [s]
-    double rho;                   // length * rate, at most 1
+    double rho;                   // length * rate, the base's included, at most 1
     size_t degree;                // of q and r; forces have one less
     double base[ROOT_DEGREE + 1]; // a_g
     double *q;                    // order after order, each of all modes
@@ -22,7 +22,7 @@ typedef struct FrameArc {
 Status frame_arc_room(FrameArc *arc, const Frame *frame, Problem *problem);
 void frame_arc_clear(FrameArc *arc);
 
-// From the present state; length * frame_rate() must be at most 1.
+// From the present state; length * frame_rate() and length * slice->omega must be at most 1.
 void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, double length);
 
 // Keeps only the part up to s.

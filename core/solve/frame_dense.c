@@ -209,13 +209,17 @@ static void fill(FrameDense *dense, const Work *work) {
     }
 }
 
+static double rate_of(const Frame *frame) {
+    return fmax(frame->rate, frame->turning);
+}
+
 static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *problem) {
     const size_t n = frame->storeys, size = dense->size;
     Work work = {.frame = frame,
                  .n = n,
                  .size = size,
-                 .is_sine = frame->run->base->omega > 0,
-                 .omega = frame->run->base->omega,
+                 .is_sine = frame->turning > 0,
+                 .omega = frame->turning,
                  .h = frame->interval};
     work.T = room;
     work.F = work.T + size * size;
@@ -225,7 +229,7 @@ static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *p
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
     size_t count = 0;
-    for (; work.h * frame->rate > 0.5L; work.h /= 2)
+    for (; work.h * rate_of(frame) > 0.5L; work.h /= 2)
         count++;
     const Quadrature *rule = arc_quadrature(0.5);
     make_small(&work, rule);
@@ -242,7 +246,7 @@ static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *p
 Status frame_dense_make(FrameDense *dense, const Frame *frame, Problem *problem) {
     const size_t n = frame->storeys, size = 2 * n + 2, square = size * size;
     memset(dense, 0, sizeof *dense);
-    if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
+    if (frame->plan->count < WORTH * n || !(frame->interval * rate_of(frame) < 0x1p40))
         return STATUS_OK;
     Real *room =
         malloc((3 * square + 2 * size + (1 + TERMS) * n + NODES * size * n) * sizeof *room);

@@ -14,11 +14,11 @@
 enum { Q, P, A, B, SIZE };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
-static void make_ground(FrameFlight *flight, const Base *base) {
-    const bool is_sine = base->omega > 0;
+static void make_ground(FrameFlight *flight, double omega) {
+    const bool is_sine = omega > 0;
     long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
-    system[VALUE * GROUND + SLOPE] = is_sine ? base->omega : 1;
-    system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)base->omega : 0;
+    system[VALUE * GROUND + SLOPE] = is_sine ? omega : 1;
+    system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)omega : 0;
     system[SUM * GROUND + VALUE] = 1;
     system[FALL * GROUND + SUM] = 1;
     exponential_increment(system, GROUND, flight->length, gain);
@@ -30,8 +30,8 @@ static void make_ground(FrameFlight *flight, const Base *base) {
 
 static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     const long double share = frame->modes->participation[i], damping = frame->diagonal[i];
-    const double omega = frame->run->base->omega;
-    const bool is_sine = frame->run->base->omega > 0;
+    const double omega = frame->turning;
+    const bool is_sine = omega > 0;
     long double system[SIZE * SIZE] = {0};
     system[Q * SIZE + P] = 1;
     system[P * SIZE + Q] = -(long double)frame->omega2[i];
@@ -90,7 +90,7 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + (i + 4) * n + 2;
     flight->length = frame->interval;
-    make_ground(flight, frame->run->base);
+    make_ground(flight, frame->turning);
     for (size_t i = 0; i < n && count > 0; i++)
         make_mode(flight, frame, i);
     return STATUS_OK;

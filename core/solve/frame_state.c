@@ -316,8 +316,12 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
             frame->modal[i * n + j] = frame->modes->shapes[j * n + i];
     }
     frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
-    frame->rate = fmax(fmax(fmax(sqrt(frame->stiff), frame->viscous), run->base->omega), 1e-300);
-    bool is_sound = isfinite(frame->rate);
+    frame->rate = fmax(fmax(sqrt(frame->stiff), frame->viscous), 1e-300);
+    // A pulse that is over sooner is flown through by arcs alone.
+    frame->turning = run->base->omega * frame->interval <= 4 || run->base->form == BASE_SINE
+                         ? run->base->omega
+                         : 0;
+    bool is_sound = isfinite(frame->rate) && isfinite(run->base->omega);
     for (size_t d = 0; d < frame->dampers; d++) {
         make_damper(frame, d);
         const double m = frame->damper[d].effective_mass;

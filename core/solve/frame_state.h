@@ -38,9 +38,11 @@ typedef struct FrameDamper {
     // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
     double storey_speed, gained;
     // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
-    // that presses it [m/s], [m/s], [N s].
+    // that presses it [m/s], [m/s], [N s]; the rest is frame_collide's own.
     bool is_met, is_bounced; // is_met: takes part; is_bounced: not from rest
     double closing, parting, pressed;
+    bool is_pressing, is_spent;
+    double wanted;
 } FrameDamper;
 
 // In modal coordinates, x = shapes q:
@@ -59,7 +61,8 @@ typedef struct Frame {
     double *diagonal;      // of D, where it is diagonal
     double *modal;         // shapes, mode after mode
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
-    double rate;           // no eigenvalue of flight, base included, is larger [1/s]
+    double rate;           // no eigenvalue of flight is larger [1/s]
+    double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
     double stiff, viscous; // largest of W^2 and of D
     double drive;          // |participation|
     double growth;         // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]

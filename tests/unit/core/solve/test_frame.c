@@ -359,6 +359,36 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
     plan_free(plan);
 }
 
+// A half-sine of the base that lasts `length` and leaves the same speed however short it is.
+static double knocked(const Plan *plan, double length, double *steps) {
+    const double start = 0.0123, amplitude = 1 / length;
+    const Base base = {.form = BASE_PIECES,
+                       .omega = 3.14159265358979323846 / length,
+                       .pieces = {{.time = start, .slope = amplitude}, {.time = start + length}},
+                       .piece_count = 2};
+    Response response = {0};
+    Run with = {.plan = plan, .base = &base};
+    assert_int_equal(frame_run(&with, &response, NULL), STATUS_OK);
+    assert_true(response.impacts.count > 2 && response.energy.residual < 1e-12);
+    *steps = with.steps;
+    const double peak = response.peaks.displacement;
+    response_clear(&response);
+    return peak;
+}
+
+static void a_short_pulse_costs_what_a_long_one_does(void **state) {
+    (void)state;
+    for (int is_impulse = 0; is_impulse < 2; is_impulse++) {
+        double steps[2];
+        Plan *plan = shaken_frame(2, is_impulse != 0, 2);
+        const double peak = knocked(plan, 1e-4, &steps[0]);
+        const double sudden = knocked(plan, 1e-10, &steps[1]);
+        assert_true(fabs(sudden / peak - 1) < 0.02);
+        assert_true(steps[1] < 1.5 * steps[0] + 1000);
+        plan_free(plan);
+    }
+}
+
 int main(void) {
     fourier_start();
     const struct CMUnitTest tests[] = {
@@ -370,6 +400,7 @@ int main(void) {
         cmocka_unit_test(a_storey_on_an_unmoved_one_is_a_structure_by_itself),
         cmocka_unit_test(momentum_is_kept_by_everything_that_collides),
         cmocka_unit_test(peaks_and_sums_are_the_largest_storeys),
+        cmocka_unit_test(a_short_pulse_costs_what_a_long_one_does),
         cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -170,6 +170,37 @@ static void random_collisions_meet_their_conditions(void **state) {
     }
 }
 
+// Masses far heavier than their storeys hardly feel a push that throws these to and fro: the
+// impulses of all are far larger than what any of them lacks.
+static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
+    (void)state;
+    for (int i = 0; i < 500; i++) {
+        Bench bench = make(0);
+        for (size_t d = 0; d < 3; d++) {
+            bench.plan->dampers[d].mass = pow(10, uniform(3, 7));
+            bench.plan->dampers[d].storey = 0;
+        }
+        start(&bench);
+        double before, after, kinetic, left, taken = 0, closing[3], size = 0;
+        for (size_t d = 0; d < 3; d++) {
+            const double speed = d > 0 && uniform(0, 1) < 0.4 ? 0 : uniform(1, 5);
+            hit(&bench.frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT, speed,
+                uniform(0, 1));
+            closing[d] = speed;
+            size += speed * bench.plan->dampers[d].mass;
+        }
+        measure(&bench.frame, &before, &kinetic);
+        frame_collide(&bench.frame);
+        measure(&bench.frame, &after, &left);
+        for (size_t d = 0; d < 3; d++)
+            taken +=
+                bench.frame.damper[d].pressed * (closing[d] - bench.frame.damper[d].parting) / 2;
+        assert_true(fabs(after - before) < 1e-8 * size);
+        assert_true(fabs(kinetic - left - taken) < 1e-8 * kinetic);
+        clear(&bench);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_mass_takes_its_effective_mass),
@@ -177,6 +208,7 @@ int main(void) {
         cmocka_unit_test(a_resting_mass_is_pushed_along_by_a_hit_towards_it),
         cmocka_unit_test(a_hit_is_felt_on_other_storeys_through_the_mass_matrix),
         cmocka_unit_test(random_collisions_meet_their_conditions),
+        cmocka_unit_test(masses_heavier_than_their_storeys_are_no_worse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
