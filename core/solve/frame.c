@@ -81,9 +81,8 @@ static void take_contact(Engine *engine, size_t d) {
     ledger_force(&frame->ledger, &damper->row, peak);
     if (s > 0) {
         frame_arc_state(arc, frame, s);
-        frame_look(frame);
-        for (size_t j = 0; j < frame->storeys; j++)
-            ledger_acceleration(&frame->ledger, frame->a[j]);
+        frame_feel(frame);
+        frame_record_acceleration(frame);
     }
     frame_arc_contact(arc, frame, d, &impulse, &lost);
     ledger_stretch(&frame->ledger, &damper->row, arc->length, impulse, lost);
@@ -103,10 +102,12 @@ static void leave(FrameDamper *damper, bool is_hit) {
 static void pass(Engine *engine, const FrameEvent *hit) {
     Frame *frame = &engine->frame;
     const FrameArc *arc = &engine->arc;
-    const FrameWork work = frame_arc_work(arc, frame);
-    ledger_work(&frame->ledger, work.input, work.damping);
-    engine->record.base_speed += work.ground;
-    for (size_t d = 0; d < frame->dampers; d++)
+    if (!frame->is_shadow) {
+        const FrameWork work = frame_arc_work(arc, frame);
+        ledger_work(&frame->ledger, work.input, work.damping);
+        engine->record.base_speed += work.ground;
+    }
+    for (size_t d = 0; d < frame->dampers && !frame->is_shadow; d++)
         if (frame->damper[d].row.is_open)
             take_contact(engine, d);
     frame_arc_state(arc, frame, 1);
@@ -197,8 +198,10 @@ static bool fly(Engine *engine) {
     for (size_t d = 0; d < frame->dampers; d++)
         if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
             return false;
-    if (!frame_flight_step(&engine->flight, frame, &slice, &work))
+    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
         return false;
+    if (frame->is_shadow)
+        return true;
     ledger_work(&frame->ledger, work.input, work.damping);
     engine->record.base_speed += work.ground;
     return true;
@@ -222,8 +225,10 @@ static Status settle(Engine *engine) {
 
 static void take_sample(Engine *engine) {
     Frame *frame = &engine->frame;
+    if (frame->is_shadow)
+        return;
     frame->ground = base_cursor_at(&frame->base, frame->sample);
-    frame_look(frame);
+    frame_feel(frame);
     if (frame->sample == engine->record.statistics_start && frame->sample > 0)
         frame_record_forget(frame);
     frame_record_take(&engine->record, frame);
@@ -259,6 +264,19 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     return STATUS_OK;
 }
 
+// A run of its own that shares what the other has made once, and of which only the motion matters.
+static Status prepare_shadow(Engine *engine, const Engine *of, Run *run, Response *response) {
+    Frame *frame = &engine->frame;
+    TRY(frame_make(frame, run, NULL));
+    TRY(frame_ode_make(&engine->ode, frame, NULL));
+    engine->arc = of->arc;
+    engine->flight = of->flight;
+    frame->is_shadow = true;
+    const EnergyState energy = frame_energy(frame);
+    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    return STATUS_OK;
+}
+
 typedef struct Neighbour {
     Engine engine;
     Run run;
@@ -267,6 +285,7 @@ typedef struct Neighbour {
     bool is_known;         // never failed
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
+    double *apart;         // scratch, of all modes
 } Neighbour;
 
 static double nudge_of(const Frame *frame) {
@@ -284,11 +303,17 @@ static void nudge(Frame *frame) {
 }
 
 static void compare(Neighbour *neighbour, const Frame *frame) {
-    double difference = 0;
-    for (size_t i = 0; i < frame->storeys; i++) {
-        neighbour->largest = fmax(neighbour->largest, fabs(frame->x[i]));
-        difference = fmax(difference, fabs(frame->x[i] - neighbour->engine.frame.x[i]));
+    const size_t n = frame->storeys;
+    double *apart = neighbour->apart, bound = 0, difference = 0;
+    for (size_t i = 0; i < n; i++) {
+        apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
+        bound += frame->widest[i] * fabs(apart[i]);
     }
+    neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
+    if (bound <= neighbour->worst)
+        return;
+    for (size_t j = 0; j < n; j++)
+        difference = fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, apart, n)));
     neighbour->worst = fmax(neighbour->worst, difference);
     if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
         neighbour->horizon = (double)(frame->sample - 1) / frame->plan->sample_rate;
@@ -306,7 +331,8 @@ static void step_neighbour(Neighbour *neighbour, const Frame *frame) {
         neighbour->is_spent = true, neighbour->is_known = false;
 }
 
-static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
+static void start_neighbour(Neighbour *neighbour, const Engine *engine) {
+    const Frame *frame = &engine->frame;
     memset(neighbour, 0, sizeof *neighbour);
     neighbour->horizon = NAN;
     neighbour->is_known = neighbour->is_spent = true;
@@ -317,19 +343,18 @@ static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     Frame *own = &neighbour->engine.frame;
+    neighbour->apart = malloc(frame->storeys * sizeof *neighbour->apart);
     neighbour->is_known =
-        prepare(&neighbour->engine, &neighbour->run, &neighbour->response, NULL) == STATUS_OK;
+        neighbour->apart != NULL && prepare_shadow(&neighbour->engine, engine, &neighbour->run,
+                                                   &neighbour->response) == STATUS_OK;
     if (!neighbour->is_known)
         return;
-    own->ledger.gain_most = 0; // a nudge is a gain
     nudge(own);
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
             (own->damper[d].r > 0 ? -1 : 1) * nudge_of(own) * own->damper[d].plan->clearance;
     neighbour->is_known = settle(&neighbour->engine) == STATUS_OK;
     neighbour->is_spent = !neighbour->is_known;
-    if (neighbour->is_known)
-        take_sample(&neighbour->engine);
 }
 
 static void tell(const Neighbour *neighbour, const Frame *frame, Response *response) {
@@ -350,12 +375,20 @@ static void clear(Engine *engine) {
     frame_clear(&engine->frame);
 }
 
+static void clear_neighbour(Neighbour *neighbour) {
+    frame_ode_clear(&neighbour->engine.ode);
+    frame_clear(&neighbour->engine.frame);
+    response_clear(&neighbour->response);
+    free(neighbour->apart);
+    free(neighbour);
+}
+
 static Status solve(Engine *engine, Neighbour *neighbour) {
     Frame *frame = &engine->frame;
     const Plan *plan = frame->plan;
     TRY(settle(engine));
     take_sample(engine);
-    start_neighbour(neighbour, frame);
+    start_neighbour(neighbour, engine);
     while (frame->sample + 1 < plan->count) {
         TRY(step(engine));
         step_neighbour(neighbour, frame);
@@ -389,8 +422,6 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (engine.record.block != NULL)
         frame_record_finish(&engine.record, &engine.frame, response);
     clear(&engine);
-    clear(&neighbour->engine);
-    response_clear(&neighbour->response);
-    free(neighbour);
+    clear_neighbour(neighbour);
     return status;
 }

@@ -201,15 +201,19 @@ bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, Fr
                       length))
             return false;
     }
-    if (flight->dense.block != NULL)
-        add_dense_work(flight, slice, work);
-    else
-        add_work(flight, frame, slice, work);
-    work->ground = speed;
+    if (work != NULL) {
+        if (flight->dense.block != NULL)
+            add_dense_work(flight, slice, work);
+        else
+            add_work(flight, frame, slice, work);
+        work->ground = speed;
+    }
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         // Its absolute velocity stays.
-        work->input -= damper->plan->mass * speed * (damper->storey_speed + damper->w - speed / 2);
+        if (work != NULL)
+            work->input -=
+                damper->plan->mass * speed * (damper->storey_speed + damper->w - speed / 2);
         damper->r += damper->gained;
         damper->w -= speed + frame_dot(damper->shape, flight->gain_p, n);
     }

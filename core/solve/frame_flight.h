@@ -28,7 +28,7 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
 void frame_flight_clear(FrameFlight *flight);
 
 // Moves the state over the interval, if surely no stop is reached meanwhile, and says what it adds
-// up to. False: it must go by arcs, and nothing has changed.
+// up to, if `work` is not NULL. False: it must go by arcs, and nothing has changed.
 bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work);
 
 #endif
