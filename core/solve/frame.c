@@ -1,5 +1,6 @@
 // The general engine's stepping. Flight of all masses over a whole sample interval is one step
 // where bounds on the gaps' curvature prove that no stop can be reached (frame_flight.h);
+// so is that of one mass pressed to a stiff stop that it surely does not leave (frame_press.h);
 // everything else goes by arcs (frame_arc.h), whose polynomials locate events to rounding. Time is
 // a sample's number and an offset from it, so that short contacts keep their digits late in a run.
 //
@@ -16,6 +17,7 @@
 #include "core/solve/frame_events.h"
 #include "core/solve/frame_flight.h"
 #include "core/solve/frame_ode.h"
+#include "core/solve/frame_press.h"
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
@@ -31,6 +33,7 @@ typedef struct Engine {
     Frame frame;
     FrameArc arc;
     FrameFlight flight;
+    FramePress pressing;
     FrameOde ode;
     FrameRecord record;
     double work; // since the watch was asked
@@ -189,18 +192,20 @@ static Status cross(Engine *engine, double length) {
 }
 
 // The whole interval in one step. False: it must go by arcs.
-static bool fly(Engine *engine) {
+static bool stride(Engine *engine) {
     Frame *frame = &engine->frame;
     Slice slice;
-    FrameWork work;
+    FrameWork work, *const wanted = frame->is_shadow ? NULL : &work;
     if (engine->flight.length == 0 || !base_cursor_interval(&frame->base, frame->sample, &slice))
         return false;
+    bool is_flying = true;
     for (size_t d = 0; d < frame->dampers; d++)
-        if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
-            return false;
-    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
+        is_flying =
+            is_flying && frame->damper[d].phase == FRAME_FLIGHT && frame->damper[d].leaving == 0;
+    if (is_flying ? !frame_flight_step(&engine->flight, frame, &slice, wanted)
+                  : !frame_press_step(&engine->pressing, frame, &engine->flight, &slice, wanted))
         return false;
-    if (frame->is_shadow)
+    if (wanted == NULL)
         return true;
     ledger_work(&frame->ledger, work.input, work.damping);
     engine->record.base_speed += work.ground;
@@ -241,7 +246,7 @@ static void take_sample(Engine *engine) {
 
 static Status step(Engine *engine) {
     Frame *frame = &engine->frame;
-    if (fly(engine))
+    if (stride(engine))
         TRY(count_step(engine, FLIGHT_WORK));
     else
         TRY(cross(engine, frame->interval));
@@ -256,6 +261,7 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_press_make(&engine->pressing, frame, problem));
     TRY(frame_ode_make(&engine->ode, frame, problem));
     TRY(frame_record_start(&engine->record, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
@@ -271,6 +277,7 @@ static Status prepare_shadow(Engine *engine, const Engine *of, Run *run, Respons
     TRY(frame_ode_make(&engine->ode, frame, NULL));
     engine->arc = of->arc;
     engine->flight = of->flight;
+    engine->pressing = of->pressing;
     frame->is_shadow = true;
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
@@ -370,6 +377,7 @@ static void tell(const Neighbour *neighbour, const Frame *frame, Response *respo
 static void clear(Engine *engine) {
     frame_record_clear(&engine->record);
     frame_flight_clear(&engine->flight);
+    frame_press_clear(&engine->pressing);
     frame_ode_clear(&engine->ode);
     frame_arc_clear(&engine->arc);
     frame_clear(&engine->frame);

@@ -11,7 +11,7 @@
 
 #include "core/math/exponential.h"
 
-enum { Q, P, A, B, SIZE };
+enum { Q, P, A, B, SIZE, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
 static void make_ground(FrameFlight *flight, const Base *base) {
@@ -71,9 +71,10 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
         return STATUS_OK; // a_g has its kinks inside the intervals
     if (frame->diagonal == NULL) {
-        TRY(frame_dense_make(&flight->dense, frame, problem));
-        if (flight->dense.block == NULL)
+        // Where making it would cost more than it saves there is none.
+        if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
             return STATUS_OK;
+        TRY(frame_dense_make(&flight->dense, frame, NULL, problem));
     }
     double **const arrays[] = {
         &flight->q[0],     &flight->q[1],     &flight->q[2],     &flight->q[3],    &flight->p[0],
@@ -101,14 +102,6 @@ void frame_flight_clear(FrameFlight *flight) {
     free(flight->block);
 }
 
-// out += matrix y, column after column.
-static void add_columns(const double *matrix, size_t rows, const double *y, size_t size,
-                        double *out) {
-    for (size_t j = 0; j < size; j++)
-        for (size_t i = 0; i < rows; i++)
-            out[i] += matrix[j * rows + i] * y[j];
-}
-
 static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
     const double a = slice->value, b = slice->slope, *q = frame->q, *p = frame->p;
     const size_t n = frame->storeys;
@@ -118,7 +111,7 @@ static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
         flight->start[2 * n] = a;
         flight->start[2 * n + 1] = b;
         memset(flight->gain_q, 0, 2 * n * sizeof *flight->gain_q); // and gain_p
-        add_columns(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
+        frame_dense_add(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
         return;
     }
     double *const *const row = flight->q, *const *const speed = flight->p;
@@ -129,18 +122,7 @@ static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
     }
 }
 
-// sqrt(p'p + q'W^2 q).
-static double size(const Frame *frame) {
-    double squares[2] = {0, 0};
-    for (size_t i = 0; i < frame->storeys; i++) {
-        squares[0] += frame->p[i] * frame->p[i];
-        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
-    }
-    return sqrt(squares[0] + squares[1]);
-}
-
-// Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
-static bool is_clear(const FrameDamper *damper, double gained, double bend, double length) {
+bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length) {
     const double sag = bend * length * length / 8;
     const double most = frame_room(damper, SIDE_RIGHT) - sag;
     const double least = sag - frame_room(damper, SIDE_LEFT);
@@ -150,10 +132,7 @@ static bool is_clear(const FrameDamper *damper, double gained, double bend, doub
 
 static void add_dense_work(const FrameFlight *flight, const Slice *slice, FrameWork *work) {
     const FrameDense *dense = &flight->dense;
-    work->damping = 0;
-    for (size_t j = 0; j < dense->size; j++)
-        work->damping +=
-            flight->start[j] * frame_dot(dense->loss + j * dense->size, flight->start, dense->size);
+    work->damping = frame_dense_form(dense->loss, flight->start, dense->size);
     work->input = -(slice->value * frame_dot(dense->input[0], flight->start, dense->size) +
                     slice->slope * frame_dot(dense->input[1], flight->start, dense->size));
 }
@@ -179,26 +158,30 @@ static void add_work(const FrameFlight *flight, const Frame *frame, const Slice 
     work->input = -(put[0] + put[1] + (a * (ib[0] * a + ib[1] * b) + ib[2] * b * b));
 }
 
+double frame_flight_shaken(const Slice *slice, double length) {
+    const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
+    return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
+}
+
 bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work) {
     const size_t n = frame->storeys;
     const double length = flight->length;
     gain(flight, frame, slice);
     const double speed = flight->ground[0] * slice->value + flight->ground[1] * slice->slope;
     const double fallen = flight->fall[0] * slice->value + flight->fall[1] * slice->slope;
-    const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
-    const double shaken = slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
+    const double shaken = frame_flight_shaken(slice, length);
     const double grown = frame->growth * length; // exp(grown) < 1 / (1 - grown)
     if (!(grown < 0.5))
         return false;
     const double most =
-        frame->dampers > 0 ? (size(frame) + length * frame->drive * shaken) / (1 - grown) : 0;
+        frame->dampers > 0 ? (frame_size(frame) + length * frame->drive * shaken) / (1 - grown) : 0;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->storey_speed = frame_dot(damper->shape, frame->p, n);
         damper->gained = length * (damper->storey_speed + damper->w) - fallen -
                          frame_dot(damper->shape, flight->gain_q, n);
-        if (!is_clear(damper, damper->gained, damper->reach * most + fabs(damper->lean) * shaken,
-                      length))
+        if (!frame_flight_is_clear(damper, damper->gained,
+                                   damper->reach * most + fabs(damper->lean) * shaken, length))
             return false;
     }
     if (work != NULL) {

@@ -31,4 +31,9 @@ void frame_flight_clear(FrameFlight *flight);
 // up to, if `work` is not NULL. False: it must go by arcs, and nothing has changed.
 bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work);
 
+// Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
+bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length);
+// |a_g| is not larger [m/s^2].
+double frame_flight_shaken(const Slice *slice, double length);
+
 #endif

@@ -114,6 +114,15 @@ EnergyState frame_energy(const Frame *frame) {
     return energy;
 }
 
+double frame_size(const Frame *frame) {
+    double squares[2] = {0, 0};
+    for (size_t i = 0; i < frame->storeys; i++) {
+        squares[0] += frame->p[i] * frame->p[i];
+        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
+    }
+    return sqrt(squares[0] + squares[1]);
+}
+
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
 // most the larger of c and sqrt(k); a contact adds to each quotient no more than its own over m_e.
 double frame_rate(const Frame *frame) {

@@ -129,6 +129,7 @@ double frame_storey_acceleration(const Frame *frame, size_t storey);
 // r'' of a damper in flight, after frame_feel [m/s^2].
 double frame_acceleration(const Frame *frame, size_t damper);
 EnergyState frame_energy(const Frame *frame);
+double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
 
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);
