@@ -46,24 +46,31 @@ void frame_arc_clear(FrameArc *arc) {
     free(arc->block);
 }
 
-// The elastic forces e_k of all modes, and by -scale (e_k + participation a_k) what q_{k+2} is
-// without the dampers.
-static void elastic_order(FrameArc *arc, const Frame *frame, size_t k, double scale,
-                          double *restrict speed, double *restrict elastic) {
+// The elastic forces e_k of modes that damping does not couple, and -scale (e_k + share a_k).
+static void diagonal_order(size_t n, const double *restrict viscous, const double *restrict omega2,
+                           const double *restrict share, const double *restrict q, double per_time,
+                           double base, double scale, double *restrict elastic,
+                           double *restrict after) {
+    for (size_t i = 0; i < n; i++) {
+        elastic[i] = viscous[i] * (per_time * q[n + i]) + omega2[i] * q[i];
+        after[i] = -scale * (elastic[i] + share[i] * base);
+    }
+}
+
+// The elastic forces e_k of all modes, and what q_{k+2} is without the dampers.
+static void elastic_order(FrameArc *arc, const Frame *frame, size_t k, double scale, double *speed,
+                          double *elastic) {
     const size_t n = frame->storeys;
-    const double *q = arc->q + k * n, *next = q + n, *share = frame->modes->participation;
+    const double *q = arc->q + k * n, *share = frame->modes->participation;
     const double per_time = (double)(k + 1) / arc->length, base = arc->base[k];
-    const double *viscous = frame->diagonal, *omega2 = frame->omega2;
-    double *restrict after = arc->q + (k + 2) * n;
-    if (viscous != NULL) {
-        for (size_t i = 0; i < n; i++) {
-            elastic[i] = viscous[i] * (per_time * next[i]) + omega2[i] * q[i];
-            after[i] = -scale * (elastic[i] + share[i] * base);
-        }
+    double *after = arc->q + (k + 2) * n;
+    if (frame->diagonal != NULL) {
+        diagonal_order(n, frame->diagonal, frame->omega2, share, q, per_time, base, scale, elastic,
+                       after);
         return;
     }
     for (size_t i = 0; i < n; i++)
-        speed[i] = per_time * next[i];
+        speed[i] = per_time * q[n + i];
     frame_elastic(frame, q, speed, elastic);
     for (size_t i = 0; i < n; i++)
         after[i] = -scale * (elastic[i] + share[i] * base);
