@@ -1,6 +1,6 @@
 // The general engine's stepping. Flight of all masses over a whole sample interval is one step
 // where bounds on the gaps' curvature prove that no stop can be reached (frame_flight.h);
-// so is that of one mass pressed to a stiff stop that it surely does not leave (frame_press.h);
+// a mass pressed to a stiff stop that it surely does not leave has long steps too (frame_press.h);
 // everything else goes by arcs (frame_arc.h), whose polynomials locate events to rounding. Time is
 // a sample's number and an offset from it, so that short contacts keep their digits late in a run.
 //
@@ -73,6 +73,11 @@ static Status count_step(Engine *engine, double each) {
     return engine->work > WATCH_WORK ? keep_going(engine) : STATUS_OK;
 }
 
+static void take_work(Engine *engine, const FrameWork *work) {
+    ledger_work(&engine->frame.ledger, work->input, work->damping);
+    engine->record.base_speed += work->ground;
+}
+
 // What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
 static void take_contact(Engine *engine, size_t d) {
     Frame *frame = &engine->frame;
@@ -107,8 +112,7 @@ static void pass(Engine *engine, const FrameEvent *hit) {
     const FrameArc *arc = &engine->arc;
     if (!frame->is_shadow) {
         const FrameWork work = frame_arc_work(arc, frame);
-        ledger_work(&frame->ledger, work.input, work.damping);
-        engine->record.base_speed += work.ground;
+        take_work(engine, &work);
     }
     for (size_t d = 0; d < frame->dampers && !frame->is_shadow; d++)
         if (frame->damper[d].row.is_open)
@@ -152,6 +156,21 @@ static Status press(Engine *engine, const Slice *slice, double length) {
     return count_step(engine, PRESS_WORK);
 }
 
+// A long step of contact. False: it must go by arcs.
+static bool hold(Engine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameWork work;
+    const double taken =
+        frame_press_step(&engine->pressing, frame, slice, length, frame->is_shadow ? NULL : &work);
+    if (taken == 0)
+        return false;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
+    frame->offset += taken;
+    frame->ground = slice_at(slice, taken);
+    return true;
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(Engine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -161,6 +180,8 @@ static Status advance(Engine *engine, double length) {
     frame->ground = slice.value;
     if (frame_ode_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
+    if (hold(engine, &slice, fmin(length, knot)))
+        return count_step(engine, PRESS_WORK);
     frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), 1 / frame_rate(frame)));
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
@@ -192,23 +213,19 @@ static Status cross(Engine *engine, double length) {
 }
 
 // The whole interval in one step. False: it must go by arcs.
-static bool stride(Engine *engine) {
+static bool fly(Engine *engine) {
     Frame *frame = &engine->frame;
     Slice slice;
-    FrameWork work, *const wanted = frame->is_shadow ? NULL : &work;
+    FrameWork work;
     if (engine->flight.length == 0 || !base_cursor_interval(&frame->base, frame->sample, &slice))
         return false;
-    bool is_flying = true;
     for (size_t d = 0; d < frame->dampers; d++)
-        is_flying =
-            is_flying && frame->damper[d].phase == FRAME_FLIGHT && frame->damper[d].leaving == 0;
-    if (is_flying ? !frame_flight_step(&engine->flight, frame, &slice, wanted)
-                  : !frame_press_step(&engine->pressing, frame, &engine->flight, &slice, wanted))
+        if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
+            return false;
+    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
         return false;
-    if (wanted == NULL)
-        return true;
-    ledger_work(&frame->ledger, work.input, work.damping);
-    engine->record.base_speed += work.ground;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
     return true;
 }
 
@@ -246,7 +263,7 @@ static void take_sample(Engine *engine) {
 
 static Status step(Engine *engine) {
     Frame *frame = &engine->frame;
-    if (stride(engine))
+    if (fly(engine))
         TRY(count_step(engine, FLIGHT_WORK));
     else
         TRY(cross(engine, frame->interval));

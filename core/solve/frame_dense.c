@@ -249,68 +249,78 @@ static void fill(FrameDense *dense, const Work *work) {
     }
 }
 
-static Status make(FrameDense *dense, const Frame *frame, const FrameDamper *contact, Real *room,
-                   Problem *problem) {
-    const size_t n = dense->freedoms, size = dense->size, modes = frame->storeys;
+static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
+    const size_t size = 2 * freedoms + 2, square = size * size;
+    dense->block = malloc((2 * freedoms * size + 2 * square + 2 * size) * sizeof *dense->block);
+    if (dense->block == NULL)
+        return STATUS_NO_MEMORY;
+    dense->freedoms = freedoms;
+    dense->size = size;
+    dense->gain = dense->block;
+    dense->loss = dense->gain + 2 * freedoms * size;
+    dense->input[0] = dense->loss + square;
+    dense->input[1] = dense->input[0] + size;
+    dense->contact = is_contact ? dense->input[1] + size : NULL;
+    return STATUS_OK;
+}
+
+static Status make(FrameDense *dense, size_t levels, Work *work, Problem *problem) {
+    const Frame *frame = work->frame;
+    size_t left = 0; // doublings
+    for (; work->h * frame_rate(frame) > 0.5L; work->h /= 2)
+        left++;
+    const Quadrature *rule = arc_quadrature(0.5);
+    make_small(work, rule);
+    make_forms(work, rule);
+    for (;; left--) {
+        if (left < levels) {
+            if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
+                                   frame->storeys);
+            fill(&dense[left], work);
+        }
+        if (left == 0)
+            return STATUS_OK;
+        if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
+            return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                               frame_time(frame));
+        twice(work);
+    }
+}
+
+Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
+                        const FrameDamper *contact, Problem *problem) {
+    const size_t n = frame->storeys + (contact != NULL), size = 2 * n + 2, square = size * size;
+    memset(dense, 0, levels * sizeof *dense);
+    Real *room =
+        malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
+    if (room == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
+                           frame->storeys);
     Work work = {.frame = frame,
                  .contact = contact,
-                 .modes = modes,
+                 .modes = frame->storeys,
                  .n = n,
                  .size = size,
                  .is_sine = frame->run->base->omega > 0,
                  .omega = frame->run->base->omega,
                  .h = frame->interval};
     work.T = room;
-    work.F = work.T + size * size;
-    work.C = work.F + size * size;
-    work.product = work.C + size * size;
-    work.G = work.product + size * size;
+    work.F = work.T + square;
+    work.C = work.F + square;
+    work.product = work.C + square;
+    work.G = work.product + square;
     work.share = work.G + 2 * size;
     work.pulls = work.share + n;
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
     const double mass = contact == NULL ? 0 : contact->plan->mass;
-    for (size_t i = 0; i < modes; i++)
+    for (size_t i = 0; i < frame->storeys; i++)
         work.share[i] =
             frame->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
     if (contact != NULL)
-        work.share[modes] = mass;
-    size_t count = 0;
-    for (; work.h * frame_rate(frame) > 0.5L; work.h /= 2)
-        count++;
-    const Quadrature *rule = arc_quadrature(0.5);
-    make_small(&work, rule);
-    make_forms(&work, rule);
-    for (size_t i = 0; i < count; i++) {
-        if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
-            return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                               frame_time(frame));
-        twice(&work);
-    }
-    fill(dense, &work);
-    return STATUS_OK;
-}
-
-Status frame_dense_make(FrameDense *dense, const Frame *frame, const FrameDamper *contact,
-                        Problem *problem) {
-    const size_t n = frame->storeys + (contact != NULL), size = 2 * n + 2, square = size * size;
-    memset(dense, 0, sizeof *dense);
-    Real *room =
-        malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
-    dense->block = malloc((2 * n * size + 2 * square + 2 * size) * sizeof *dense->block);
-    if (room == NULL || dense->block == NULL) {
-        free(room);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                           frame->storeys);
-    }
-    dense->freedoms = n;
-    dense->size = size;
-    dense->gain = dense->block;
-    dense->loss = dense->gain + 2 * n * size;
-    dense->input[0] = dense->loss + square;
-    dense->input[1] = dense->input[0] + size;
-    dense->contact = contact != NULL ? dense->input[1] + size : NULL;
-    const Status status = make(dense, frame, contact, room, problem);
+        work.share[frame->storeys] = mass;
+    const Status status = make(dense, levels, &work, problem);
     free(room);
     return status;
 }

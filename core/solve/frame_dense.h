@@ -19,9 +19,11 @@ typedef struct FrameDense {
     double *block;    // NULL where there is none
 } FrameDense;
 
-// `contact`: the damper, in contact now, or NULL. Freed by frame_dense_clear, also after a failure.
-Status frame_dense_make(FrameDense *dense, const Frame *frame, const FrameDamper *contact,
-                        Problem *problem);
+// For the sample interval and `levels` - 1 times its half, where these are not too short for it to
+// be made by doubling (block is NULL then). `contact`: the damper, in contact now, or NULL. Freed
+// by frame_dense_clear, also after a failure.
+Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
+                        const FrameDamper *contact, Problem *problem);
 void frame_dense_clear(FrameDense *dense);
 
 // out += matrix y, column after column.

@@ -14,17 +14,17 @@
 enum { Q, P, A, B, SIZE, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
-static void make_ground(FrameFlight *flight, const Base *base) {
+void frame_flight_ground(const Base *base, double length, double ground[2], double fall[2]) {
     const bool is_sine = base->omega > 0;
     long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
     system[VALUE * GROUND + SLOPE] = is_sine ? base->omega : 1;
     system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)base->omega : 0;
     system[SUM * GROUND + VALUE] = 1;
     system[FALL * GROUND + SUM] = 1;
-    exponential_increment(system, GROUND, flight->length, gain);
+    exponential_increment(system, GROUND, length, gain);
     for (int column = 0; column < 2; column++) {
-        flight->ground[column] = (double)gain[SUM * GROUND + column];
-        flight->fall[column] = (double)gain[FALL * GROUND + column];
+        ground[column] = (double)gain[SUM * GROUND + column];
+        fall[column] = (double)gain[FALL * GROUND + column];
     }
 }
 
@@ -74,7 +74,7 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
         // Where making it would cost more than it saves there is none.
         if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
             return STATUS_OK;
-        TRY(frame_dense_make(&flight->dense, frame, NULL, problem));
+        TRY(frame_dense_make(&flight->dense, 1, frame, NULL, problem));
     }
     double **const arrays[] = {
         &flight->q[0],     &flight->q[1],     &flight->q[2],     &flight->q[3],    &flight->p[0],
@@ -91,7 +91,7 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + (i + 4) * n + 2;
     flight->length = frame->interval;
-    make_ground(flight, frame->run->base);
+    frame_flight_ground(frame->run->base, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
         make_mode(flight, frame, i);
     return STATUS_OK;

@@ -33,6 +33,8 @@ bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, Fr
 
 // Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
 bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length);
+// Over (value, slope): the integral of a_g over `length`, and its integral.
+void frame_flight_ground(const Base *base, double length, double ground[2], double fall[2]);
 // |a_g| is not larger [m/s^2].
 double frame_flight_shaken(const Slice *slice, double length);
 
