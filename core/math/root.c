@@ -27,10 +27,15 @@ static void shift(double *c, size_t degree, double from, double width) {
         c[i] *= scale;
 }
 
+// fmin is a call into the C library.
+static inline double below_zero(double value) {
+    return value < 0 ? value : 0;
+}
+
 static bool is_surely_positive(const double *c, size_t degree) {
     double least = c[0];
     for (size_t i = 1; i <= degree; i++)
-        least += fmin(c[i], 0);
+        least += below_zero(c[i]);
     return least > 0;
 }
 
@@ -38,7 +43,7 @@ static bool is_surely_positive(const double *c, size_t degree) {
 static bool march(const double *c, size_t degree, double *s, bool *found) {
     double bound = 0;
     for (size_t i = 2; i <= degree; i++)
-        bound -= (double)(i * (i - 1)) * fmin(c[i], 0);
+        bound -= (double)(i * (i - 1)) * below_zero(c[i]);
     double at = 0;
     for (int step = 0; step < ROOT_STEPS; step++) {
         const double value = root_value(c, degree, at);

@@ -114,7 +114,7 @@ double arc_impulse(const Arc *arc) {
 // keep below 1e-14. Fewer points are not enough for small rho either: under a linear base v has an
 // s^2 of its own, and v^2 an s^6 with rho^2 alone.
 // clang-format off
-static const Quadrature quadratures[] = {
+const Quadrature arc_rules[ARC_RULES] = {
     {4, {0.06943184420297371, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263},
         {0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269}},
     {5, {0.04691007703066800, 0.2307653449471585, 0.5, 0.7692346550528415, 0.9530899229693320},
@@ -127,7 +127,7 @@ static const Quadrature quadratures[] = {
 // clang-format on
 
 const Quadrature *arc_quadrature(double rho) {
-    return &quadratures[rho <= 0.02 ? 0 : rho <= 0.3 ? 1 : 2];
+    return &arc_rules[rho <= 0.02 ? 0 : rho <= 0.3 ? 1 : 2];
 }
 
 ArcIntegrals arc_integrals(const Arc *arc) {

@@ -92,6 +92,8 @@ typedef struct Quadrature {
     size_t count;
     double node[8], weight[8];
 } Quadrature;
-const Quadrature *arc_quadrature(double rho);
+enum { ARC_RULES = 3 };
+extern const Quadrature arc_rules[ARC_RULES]; // with more and more points
+const Quadrature *arc_quadrature(double rho); // one of them
 
 #endif

@@ -1,5 +1,6 @@
 // The general engine's stepping. Flight of all masses over a whole sample interval is one step
 // where bounds on the gaps' curvature prove that no stop can be reached (frame_flight.h);
+// a mass pressed to a stiff stop that it surely does not leave has long steps too (frame_press.h);
 // everything else goes by arcs (frame_arc.h), whose polynomials locate events to rounding. Time is
 // a sample's number and an offset from it, so that short contacts keep their digits late in a run.
 //
@@ -16,6 +17,7 @@
 #include "core/solve/frame_events.h"
 #include "core/solve/frame_flight.h"
 #include "core/solve/frame_ode.h"
+#include "core/solve/frame_press.h"
 #include "core/solve/frame_record.h"
 #include "core/solve/frame_state.h"
 
@@ -31,6 +33,7 @@ typedef struct Engine {
     Frame frame;
     FrameArc arc;
     FrameFlight flight;
+    FramePress pressing;
     FrameOde ode;
     FrameRecord record;
     double work; // since the watch was asked
@@ -70,6 +73,11 @@ static Status count_step(Engine *engine, double each) {
     return engine->work > WATCH_WORK ? keep_going(engine) : STATUS_OK;
 }
 
+static void take_work(Engine *engine, const FrameWork *work) {
+    ledger_work(&engine->frame.ledger, work->input, work->damping);
+    engine->record.base_speed += work->ground;
+}
+
 // What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
 static void take_contact(Engine *engine, size_t d) {
     Frame *frame = &engine->frame;
@@ -81,9 +89,8 @@ static void take_contact(Engine *engine, size_t d) {
     ledger_force(&frame->ledger, &damper->row, peak);
     if (s > 0) {
         frame_arc_state(arc, frame, s);
-        frame_look(frame);
-        for (size_t j = 0; j < frame->storeys; j++)
-            ledger_acceleration(&frame->ledger, frame->a[j]);
+        frame_feel(frame);
+        frame_record_acceleration(frame);
     }
     frame_arc_contact(arc, frame, d, &impulse, &lost);
     ledger_stretch(&frame->ledger, &damper->row, arc->length, impulse, lost);
@@ -103,10 +110,11 @@ static void leave(FrameDamper *damper, bool is_hit) {
 static void pass(Engine *engine, const FrameEvent *hit) {
     Frame *frame = &engine->frame;
     const FrameArc *arc = &engine->arc;
-    const FrameWork work = frame_arc_work(arc, frame);
-    ledger_work(&frame->ledger, work.input, work.damping);
-    engine->record.base_speed += work.ground;
-    for (size_t d = 0; d < frame->dampers; d++)
+    if (!frame->is_shadow) {
+        const FrameWork work = frame_arc_work(arc, frame);
+        take_work(engine, &work);
+    }
+    for (size_t d = 0; d < frame->dampers && !frame->is_shadow; d++)
         if (frame->damper[d].row.is_open)
             take_contact(engine, d);
     frame_arc_state(arc, frame, 1);
@@ -153,6 +161,23 @@ static Status press(Engine *engine, const Slice *slice, double length) {
     return count_step(engine, PRESS_WORK);
 }
 
+// A long step of contact. False: it must go by arcs.
+static bool hold(Engine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameWork work;
+    if (slice->omega > 0 && frame->turning == 0)
+        return false; // its steps know no such base
+    const double taken =
+        frame_press_step(&engine->pressing, frame, slice, length, frame->is_shadow ? NULL : &work);
+    if (taken == 0)
+        return false;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
+    frame->offset += taken;
+    frame->ground = slice_at(slice, taken);
+    return true;
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(Engine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -162,6 +187,8 @@ static Status advance(Engine *engine, double length) {
     frame->ground = slice.value;
     if (frame_ode_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
+    if (hold(engine, &slice, fmin(length, knot)))
+        return count_step(engine, PRESS_WORK);
     frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), arc_most(frame, &slice)));
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
@@ -202,10 +229,10 @@ static bool fly(Engine *engine) {
     for (size_t d = 0; d < frame->dampers; d++)
         if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
             return false;
-    if (!frame_flight_step(&engine->flight, frame, &slice, &work))
+    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
         return false;
-    ledger_work(&frame->ledger, work.input, work.damping);
-    engine->record.base_speed += work.ground;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
     return true;
 }
 
@@ -227,8 +254,10 @@ static Status settle(Engine *engine) {
 
 static void take_sample(Engine *engine) {
     Frame *frame = &engine->frame;
+    if (frame->is_shadow)
+        return;
     frame->ground = base_cursor_at(&frame->base, frame->sample);
-    frame_look(frame);
+    frame_feel(frame);
     if (frame->sample == engine->record.statistics_start && frame->sample > 0)
         frame_record_forget(frame);
     frame_record_take(&engine->record, frame);
@@ -256,11 +285,26 @@ static Status prepare(Engine *engine, Run *run, Response *response, Problem *pro
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_press_make(&engine->pressing, frame, problem));
     TRY(frame_ode_make(&engine->ode, frame, problem));
     TRY(frame_record_start(&engine->record, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     frame->ledger.gain_most = LEDGER_GAIN_EXACT;
+    return STATUS_OK;
+}
+
+// A run of its own that shares what the other has made once, and of which only the motion matters.
+static Status prepare_shadow(Engine *engine, const Engine *of, Run *run, Response *response) {
+    Frame *frame = &engine->frame;
+    TRY(frame_make(frame, run, NULL));
+    TRY(frame_ode_make(&engine->ode, frame, NULL));
+    engine->arc = of->arc;
+    engine->flight = of->flight;
+    engine->pressing = of->pressing;
+    frame->is_shadow = true;
+    const EnergyState energy = frame_energy(frame);
+    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     return STATUS_OK;
 }
 
@@ -272,6 +316,7 @@ typedef struct Neighbour {
     bool is_known;         // never failed
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
+    double *apart;         // scratch, of all modes
 } Neighbour;
 
 static double nudge_of(const Frame *frame) {
@@ -289,11 +334,17 @@ static void nudge(Frame *frame) {
 }
 
 static void compare(Neighbour *neighbour, const Frame *frame) {
-    double difference = 0;
-    for (size_t i = 0; i < frame->storeys; i++) {
-        neighbour->largest = fmax(neighbour->largest, fabs(frame->x[i]));
-        difference = fmax(difference, fabs(frame->x[i] - neighbour->engine.frame.x[i]));
+    const size_t n = frame->storeys;
+    double *apart = neighbour->apart, bound = 0, difference = 0;
+    for (size_t i = 0; i < n; i++) {
+        apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
+        bound += frame->widest[i] * fabs(apart[i]);
     }
+    neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
+    if (bound <= neighbour->worst)
+        return;
+    for (size_t j = 0; j < n; j++)
+        difference = fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, apart, n)));
     neighbour->worst = fmax(neighbour->worst, difference);
     if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
         neighbour->horizon = (double)(frame->sample - 1) / frame->plan->sample_rate;
@@ -311,7 +362,8 @@ static void step_neighbour(Neighbour *neighbour, const Frame *frame) {
         neighbour->is_spent = true, neighbour->is_known = false;
 }
 
-static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
+static void start_neighbour(Neighbour *neighbour, const Engine *engine) {
+    const Frame *frame = &engine->frame;
     memset(neighbour, 0, sizeof *neighbour);
     neighbour->horizon = NAN;
     neighbour->is_known = neighbour->is_spent = true;
@@ -322,19 +374,18 @@ static void start_neighbour(Neighbour *neighbour, const Frame *frame) {
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     Frame *own = &neighbour->engine.frame;
+    neighbour->apart = malloc(frame->storeys * sizeof *neighbour->apart);
     neighbour->is_known =
-        prepare(&neighbour->engine, &neighbour->run, &neighbour->response, NULL) == STATUS_OK;
+        neighbour->apart != NULL && prepare_shadow(&neighbour->engine, engine, &neighbour->run,
+                                                   &neighbour->response) == STATUS_OK;
     if (!neighbour->is_known)
         return;
-    own->ledger.gain_most = 0; // a nudge is a gain
     nudge(own);
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
             (own->damper[d].r > 0 ? -1 : 1) * nudge_of(own) * own->damper[d].plan->clearance;
     neighbour->is_known = settle(&neighbour->engine) == STATUS_OK;
     neighbour->is_spent = !neighbour->is_known;
-    if (neighbour->is_known)
-        take_sample(&neighbour->engine);
 }
 
 static void tell(const Neighbour *neighbour, const Frame *frame, Response *response) {
@@ -352,9 +403,18 @@ static void tell(const Neighbour *neighbour, const Frame *frame, Response *respo
 static void clear(Engine *engine) {
     frame_record_clear(&engine->record);
     frame_flight_clear(&engine->flight);
+    frame_press_clear(&engine->pressing);
     frame_ode_clear(&engine->ode);
     frame_arc_clear(&engine->arc);
     frame_clear(&engine->frame);
+}
+
+static void clear_neighbour(Neighbour *neighbour) {
+    frame_ode_clear(&neighbour->engine.ode);
+    frame_clear(&neighbour->engine.frame);
+    response_clear(&neighbour->response);
+    free(neighbour->apart);
+    free(neighbour);
 }
 
 static Status solve(Engine *engine, Neighbour *neighbour) {
@@ -362,7 +422,7 @@ static Status solve(Engine *engine, Neighbour *neighbour) {
     const Plan *plan = frame->plan;
     TRY(settle(engine));
     take_sample(engine);
-    start_neighbour(neighbour, frame);
+    start_neighbour(neighbour, engine);
     while (frame->sample + 1 < plan->count) {
         TRY(step(engine));
         step_neighbour(neighbour, frame);
@@ -396,8 +456,6 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (engine.record.block != NULL)
         frame_record_finish(&engine.record, &engine.frame, response);
     clear(&engine);
-    clear(&neighbour->engine);
-    response_clear(&neighbour->response);
-    free(neighbour);
+    clear_neighbour(neighbour);
     return status;
 }

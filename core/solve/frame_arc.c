@@ -9,22 +9,71 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ROW = ROOT_DEGREE + 1, NODES = 8 };
+enum { ROW = ROOT_DEGREE + 1, NODES = 8, MODES = 4 };
+
+// s^k and its derivative.
+static void powers(size_t degree, double s, double *power, double *slope) {
+    power[0] = 1;
+    slope[0] = 0;
+    for (size_t k = 1; k <= degree; k++) {
+        power[k] = power[k - 1] * s;
+        slope[k] = (double)k * power[k - 1];
+    }
+}
 
 Status frame_arc_room(FrameArc *arc, const Frame *frame, Problem *problem) {
     const size_t n = frame->storeys, m = frame->dampers;
-    arc->block = malloc(((ROW + NODES + 2) * n + 2 * ROW * m + m) * sizeof *arc->block);
+    arc->block = calloc((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m + ARC_RULES * NODES * ROW,
+                        sizeof *arc->block);
     if (arc->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     arc->q = arc->block;
-    arc->work = arc->q + ROW * n;
+    arc->work = arc->q + (ROW + 1) * n; // an order more is written than is kept
     arc->r = arc->work + (NODES + 2) * n;
     arc->force = arc->r + ROW * m;
+    arc->slopes = arc->force + ROW * m + m;
+    for (size_t kind = 0; kind < ARC_RULES; kind++) {
+        const Quadrature *rule = &arc_rules[kind];
+        for (size_t j = 0; j < rule->count; j++) {
+            double power[ROW];
+            powers(ROOT_DEGREE, rule->node[j], power, arc->slopes + (kind * NODES + j) * ROW);
+        }
+    }
     return STATUS_OK;
 }
 
 void frame_arc_clear(FrameArc *arc) {
     free(arc->block);
+}
+
+// The elastic forces e_k of modes that damping does not couple, and -scale (e_k + share a_k).
+static void diagonal_order(size_t n, const double *restrict viscous, const double *restrict omega2,
+                           const double *restrict share, const double *restrict q, double per_time,
+                           double base, double scale, double *restrict elastic,
+                           double *restrict after) {
+    for (size_t i = 0; i < n; i++) {
+        elastic[i] = viscous[i] * (per_time * q[n + i]) + omega2[i] * q[i];
+        after[i] = -scale * (elastic[i] + share[i] * base);
+    }
+}
+
+// The elastic forces e_k of all modes, and what q_{k+2} is without the dampers.
+static void elastic_order(FrameArc *arc, const Frame *frame, size_t k, double scale, double *speed,
+                          double *elastic) {
+    const size_t n = frame->storeys;
+    const double *q = arc->q + k * n, *share = frame->modes->participation;
+    const double per_time = (double)(k + 1) / arc->length, base = arc->base[k];
+    double *after = arc->q + (k + 2) * n;
+    if (frame->diagonal != NULL) {
+        diagonal_order(n, frame->diagonal, frame->omega2, share, q, per_time, base, scale, elastic,
+                       after);
+        return;
+    }
+    for (size_t i = 0; i < n; i++)
+        speed[i] = per_time * q[n + i];
+    frame_elastic(frame, q, speed, elastic);
+    for (size_t i = 0; i < n; i++)
+        after[i] = -scale * (elastic[i] + share[i] * base);
 }
 
 // N of order k of all dampers, from the orders of r up to k + 1 and from e_k.
@@ -49,13 +98,30 @@ static void forces(FrameArc *arc, const Frame *frame, size_t k, const double *el
     }
 }
 
+// What the dampers do to order k + 2.
+static void answer(FrameArc *arc, const Frame *frame, size_t k, double scale, const double *push) {
+    const size_t n = frame->storeys, m = frame->dampers;
+    double *restrict after = arc->q + (k + 2) * n;
+    for (size_t d = 0; d < m; d++) {
+        const double force = arc->force[d * ROW + k] * scale, *shape = frame->damper[d].shape;
+        double sum = push[d];
+        for (size_t e = 0; e < m; e++)
+            sum -= frame->yield[d * m + e] * arc->force[e * ROW + k];
+        arc->r[d * ROW + k + 2] = frame->damper[d].phase == FRAME_RESTING ? 0 : sum * scale;
+        if (force != 0)
+            for (size_t i = 0; i < n; i++)
+                after[i] += shape[i] * force;
+    }
+}
+
 void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, double length) {
     const size_t n = frame->storeys, m = frame->dampers;
     arc->length = length;
     arc->rho = length * fmax(frame_rate(frame), slice->omega);
     arc->degree = arc_degree(arc->rho);
     arc_base_series(arc->base, arc->degree, slice, length);
-    double *restrict speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
+    arc->base_degree = slice->omega > 0 ? arc->degree : 1;
+    double *speed = arc->work, *elastic = arc->work + n, *push = arc->force + ROW * m;
     for (size_t i = 0; i < n; i++) {
         arc->q[i] = frame->q[i];
         arc->q[n + i] = frame->p[i] * length;
@@ -65,32 +131,12 @@ void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, doubl
         arc->r[d * ROW] = is_resting ? 0 : frame->damper[d].r;
         arc->r[d * ROW + 1] = is_resting ? 0 : frame->damper[d].w * length;
     }
-    const double *share = frame->modes->participation;
     for (size_t k = 0; k < arc->degree; k++) {
-        const double *q = arc->q + k * n, *next = q + n;
-        const double per_time = (double)(k + 1) / length;
-        for (size_t i = 0; i < n; i++)
-            speed[i] = per_time * next[i];
-        frame_elastic(frame, q, speed, elastic);
-        forces(arc, frame, k, elastic, push);
-        if (k + 2 > arc->degree)
-            break;
         const double scale = length * length / (double)((k + 1) * (k + 2));
-        double *restrict after = arc->q + (k + 2) * n;
-        for (size_t i = 0; i < n; i++)
-            after[i] = -elastic[i] - share[i] * arc->base[k];
-        for (size_t d = 0; d < m; d++) {
-            const double force = arc->force[d * ROW + k], *shape = frame->damper[d].shape;
-            double sum = push[d];
-            for (size_t e = 0; e < m; e++)
-                sum -= frame->yield[d * m + e] * arc->force[e * ROW + k];
-            arc->r[d * ROW + k + 2] = frame->damper[d].phase == FRAME_RESTING ? 0 : sum * scale;
-            if (force != 0)
-                for (size_t i = 0; i < n; i++)
-                    after[i] += shape[i] * force;
-        }
-        for (size_t i = 0; i < n; i++)
-            after[i] *= scale;
+        elastic_order(arc, frame, k, scale, speed, elastic);
+        forces(arc, frame, k, elastic, push);
+        if (k + 2 <= arc->degree)
+            answer(arc, frame, k, scale, push);
     }
 }
 
@@ -110,27 +156,34 @@ void frame_arc_cut(FrameArc *arc, const Frame *frame, double s) {
     arc->rho *= s;
 }
 
-void frame_arc_state(const FrameArc *arc, Frame *frame, double s) {
+// Several modes at once, whose sums stay in registers; small terms first, and by powers rather than
+// Horner's scheme, where s is 1.
+static inline void state_of(const FrameArc *arc, Frame *frame, size_t i, size_t many,
+                            const double *power, const double *slope) {
     const size_t n = frame->storeys;
-    for (size_t i = 0; i < n; i++)
-        frame->q[i] = frame->p[i] = 0;
-    // Small terms first; by powers rather than Horner's scheme where s is 1.
-    double power[ROW];
-    power[0] = 1;
-    for (size_t k = 1; k <= arc->degree; k++)
-        power[k] = power[k - 1] * s;
+    double q[MODES] = {0}, p[MODES] = {0};
     for (size_t k = arc->degree; k > 0; k--) {
-        const double *q = arc->q + k * n;
-        const double slope = (double)k * power[k - 1];
-        for (size_t i = 0; i < n; i++) {
-            frame->q[i] += power[k] * q[i];
-            frame->p[i] += slope * q[i];
+        const double *order = arc->q + k * n + i;
+        for (size_t j = 0; j < many; j++) {
+            q[j] += power[k] * order[j];
+            p[j] += slope[k] * order[j];
         }
     }
-    for (size_t i = 0; i < n; i++) {
-        frame->q[i] += arc->q[i];
-        frame->p[i] /= arc->length;
+    for (size_t j = 0; j < many; j++) {
+        frame->q[i + j] = q[j] + arc->q[i + j];
+        frame->p[i + j] = p[j] / arc->length;
     }
+}
+
+void frame_arc_state(const FrameArc *arc, Frame *frame, double s) {
+    const size_t n = frame->storeys;
+    double power[ROW], slope[ROW];
+    powers(arc->degree, s, power, slope);
+    size_t i = 0;
+    for (; i + MODES <= n; i += MODES)
+        state_of(arc, frame, i, MODES, power, slope);
+    for (; i < n; i++)
+        state_of(arc, frame, i, 1, power, slope);
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         if (damper->phase == FRAME_RESTING)
@@ -139,34 +192,70 @@ void frame_arc_state(const FrameArc *arc, Frame *frame, double s) {
         damper->r = damper->w = 0;
         for (size_t k = arc->degree; k > 0; k--) {
             damper->r += power[k] * r[k];
-            damper->w += (double)k * power[k - 1] * r[k];
+            damper->w += slope[k] * r[k];
         }
         damper->r += r[0];
         damper->w /= arc->length;
     }
-    frame->ground = root_value(arc->base, arc->degree, s);
+    frame->ground = root_value(arc->base, arc->base_degree, s);
 }
 
-// Speeds of all modes at the nodes of a rule, node after node, times the arc's length.
-static void speeds(const FrameArc *arc, size_t n, const Quadrature *rule, double *out) {
-    double power[NODES];
-    memset(out, 0, rule->count * n * sizeof *out);
-    for (size_t j = 0; j < rule->count; j++)
-        power[j] = 1;
+// The derivatives of s^k at a rule's nodes, node after node; after an odd one's last come zeros.
+static const double *node_slopes(const FrameArc *arc, const Quadrature *rule) {
+    return arc->slopes + (size_t)(rule - arc_rules) * NODES * ROW;
+}
+
+// The derivative of a series at a node.
+static double slope_of(const FrameArc *arc, const double *series, const double *slope) {
+    return frame_dot(series + 1, slope + 1, arc->degree);
+}
+
+// Speeds of `many` modes at two nodes, times the arc's length.
+static inline void speeds_of(const FrameArc *arc, size_t n, size_t i, size_t many,
+                             const double *slope, double *out) {
+    double a[MODES] = {0}, b[MODES] = {0};
     for (size_t k = 1; k <= arc->degree; k++) {
-        const double *q = arc->q + k * n;
-        for (size_t j = 0; j < rule->count; j++) {
-            double *restrict of = out + j * n;
-            const double factor = (double)k * power[j];
-            for (size_t i = 0; i < n; i++)
-                of[i] += factor * q[i];
-            power[j] *= rule->node[j];
+        const double *order = arc->q + k * n + i;
+        for (size_t j = 0; j < many; j++) {
+            a[j] += slope[k] * order[j];
+            b[j] += slope[ROW + k] * order[j];
         }
+    }
+    for (size_t j = 0; j < many; j++) {
+        out[i + j] = a[j];
+        out[n + i + j] = b[j];
     }
 }
 
+// Those of all modes at the nodes of a rule, node after node.
+static void speeds(const FrameArc *arc, size_t n, const Quadrature *rule, double *out) {
+    const double *slope = node_slopes(arc, rule);
+    for (size_t node = 0; node < rule->count; node += 2, slope += 2 * ROW) {
+        size_t i = 0;
+        for (; i + MODES <= n; i += MODES)
+            speeds_of(arc, n, i, MODES, slope, out + node * n);
+        for (; i < n; i++)
+            speeds_of(arc, n, i, 1, slope, out + node * n);
+    }
+}
+
+// p . D p; `force` is scratch.
+static double damping_power(const Frame *frame, const double *p, double *restrict force) {
+    const size_t n = frame->storeys;
+    if (frame->diagonal != NULL) {
+        for (size_t i = 0; i < n; i++)
+            force[i] = frame->diagonal[i] * p[i];
+        return frame_dot(force, p, n);
+    }
+    memset(force, 0, n * sizeof *force);
+    for (size_t k = 0; k < n; k++)
+        for (size_t i = 0; i < n; i++)
+            force[i] += frame->damping[k * n + i] * p[k];
+    return frame_dot(force, p, n);
+}
+
 FrameWork frame_arc_work(const FrameArc *arc, const Frame *frame) {
-    FrameWork work = {0, 0, arc->length * arc_integral(arc->base, arc->degree)};
+    FrameWork work = {0, 0, arc->length * arc_integral(arc->base, arc->base_degree)};
     if (!(arc->length > 0))
         return work;
     const size_t n = frame->storeys;
@@ -174,23 +263,14 @@ FrameWork frame_arc_work(const FrameArc *arc, const Frame *frame) {
     double *p = arc->work, *force = arc->work + NODES * n;
     speeds(arc, n, rule, p);
     for (size_t j = 0; j < rule->count; j++, p += n) {
-        if (frame->diagonal != NULL) {
-            for (size_t i = 0; i < n; i++)
-                force[i] = frame->diagonal[i] * p[i];
-        } else {
-            memset(force, 0, n * sizeof *force);
-            for (size_t k = 0; k < n; k++)
-                for (size_t i = 0; i < n; i++)
-                    force[i] += frame->damping[k * n + i] * p[k];
-        }
-        work.damping += rule->weight[j] * frame_dot(force, p, n) / arc->length;
-        const double a = root_value(arc->base, arc->degree, rule->node[j]);
+        work.damping += rule->weight[j] * damping_power(frame, p, force) / arc->length;
+        const double a = root_value(arc->base, arc->base_degree, rule->node[j]);
         if (a == 0)
             continue;
         double momentum = frame_dot(frame->carry, p, n);
         for (size_t d = 0; d < frame->dampers; d++)
             momentum += frame->damper[d].plan->mass *
-                        root_slope(frame_arc_r(arc, d), arc->degree, rule->node[j]);
+                        slope_of(arc, frame_arc_r(arc, d), node_slopes(arc, rule) + j * ROW);
         work.input -= rule->weight[j] * a * momentum;
     }
     return work;
@@ -205,7 +285,7 @@ void frame_arc_contact(const FrameArc *arc, const Frame *frame, size_t d, double
         return;
     const Quadrature *rule = arc_quadrature(arc->rho);
     for (size_t j = 0; j < rule->count; j++) {
-        const double w = root_slope(frame_arc_r(arc, d), arc->degree, rule->node[j]);
+        const double w = slope_of(arc, frame_arc_r(arc, d), node_slopes(arc, rule) + j * ROW);
         *lost += rule->weight[j] * w * w;
     }
     *lost *= damper->contact.damping / arc->length;

@@ -12,9 +12,11 @@ typedef struct FrameArc {
     double rho;                   // length * rate, the base's included, at most 1
     size_t degree;                // of q and r; forces have one less
     double base[ROOT_DEGREE + 1]; // a_g
+    size_t base_degree;           // no coefficient of a_g beyond it
     double *q;                    // order after order, each of all modes
     double *r, *force;            // damper after damper, ROOT_DEGREE + 1 each; force is N
     double *work;                 // modes x nodes of a quadrature
+    double *slopes;               // of s^k at the nodes of all rules
     double *block;
 } FrameArc;
 

@@ -9,16 +9,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TERMS = 22, NODES = 8, WORTH = 32 };
+enum { TERMS = 22, NODES = 8 };
 
 typedef long double Real;
 
 typedef struct Work {
     const Frame *frame;
-    size_t n, size;
+    const FrameDamper *contact; // or NULL
+    size_t modes;
+    size_t n, size; // n: freedoms, the damper's the last
     bool is_sine;
     Real omega, h;
-    Real *T, *F, *G; // G: two rows, of value and slope
+    Real *T, *F, *C, *G; // C: the contact's form; G: two rows, of value and slope
+    Real *share;         // what a_g does to each freedom's momentum
     Real *product;
     Real *series; // of one column: TERMS x storeys
     Real *speeds; // node after node, column after column, of all modes
@@ -41,9 +44,32 @@ static void base_series(const Work *work, bool is_slope, Real *a) {
     }
 }
 
-// The modes' series from a unit of component j of y.
-static void column_series(Work *work, size_t j) {
+// Of all freedoms.
+static void accelerate(const Work *work, const Real *at, const Real *speed, Real base, Real *out) {
     const Frame *frame = work->frame;
+    const FrameDamper *contact = work->contact;
+    const size_t n = work->modes;
+    const Real force =
+        contact == NULL ? 0
+                        : contact->contact.stiffness * at[n] + contact->contact.damping * speed[n];
+    Real push = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double *row = frame->damping + i * n;
+        Real elastic = frame->omega2[i] * at[i];
+        for (size_t l = 0; l < n; l++)
+            elastic += row[l] * speed[l];
+        out[i] = -elastic - frame->modes->participation[i] * base;
+        if (contact == NULL)
+            continue;
+        out[i] += contact->shape[i] * force;
+        push += contact->shape[i] * elastic;
+    }
+    if (contact != NULL)
+        out[n] = push + contact->lean * base - force / contact->effective_mass;
+}
+
+// The freedoms' series from a unit of component j of y.
+static void column_series(Work *work, size_t j) {
     const size_t n = work->n;
     const Real h = work->h;
     Real a[TERMS] = {0}, *c = work->series, *speed = work->pulls;
@@ -56,15 +82,11 @@ static void column_series(Work *work, size_t j) {
         base_series(work, j == 2 * n + 1, a);
     for (size_t k = 0; k + 2 < TERMS; k++) {
         const Real *now = c + k * n, *next = now + n;
-        const Real scale = h * h / (Real)((k + 1) * (k + 2));
         for (size_t i = 0; i < n; i++)
             speed[i] = (Real)(k + 1) / h * next[i];
-        for (size_t i = 0; i < n; i++) {
-            Real sum = frame->omega2[i] * now[i] + frame->modes->participation[i] * a[k];
-            for (size_t l = 0; l < n; l++)
-                sum += frame->damping[i * n + l] * speed[l];
-            c[(k + 2) * n + i] = -scale * sum;
-        }
+        accelerate(work, now, speed, a[k], c + (k + 2) * n);
+        for (size_t i = 0; i < n; i++)
+            c[(k + 2) * n + i] *= h * h / (Real)((k + 1) * (k + 2));
     }
 }
 
@@ -111,11 +133,13 @@ static void make_small(Work *work, const Quadrature *rule) {
     }
 }
 
-// F and G over h.
+// F, C and G over h.
 static void make_forms(Work *work, const Quadrature *rule) {
-    const size_t n = work->n, size = work->size;
+    const size_t n = work->n, size = work->size, modes = work->modes;
+    const Real viscous = work->contact == NULL ? 0 : work->contact->contact.damping;
     const double *damping = work->frame->damping;
     memset(work->F, 0, size * size * sizeof *work->F);
+    memset(work->C, 0, size * size * sizeof *work->C);
     memset(work->G, 0, 2 * size * sizeof *work->G);
     for (size_t node = 0; node < rule->count; node++) {
         const Real *speeds = work->speeds + node * size * n;
@@ -128,26 +152,31 @@ static void make_forms(Work *work, const Quadrature *rule) {
         for (size_t j = 0; j < size; j++) {
             const Real *p = speeds + j * n;
             Real share = 0;
-            for (size_t i = 0; i < n; i++) {
+            for (size_t i = 0; i < n; i++)
+                share += work->share[i] * p[i];
+            for (size_t i = 0; i < modes; i++) {
                 Real sum = 0;
-                for (size_t l = 0; l < n; l++)
-                    sum += damping[i * n + l] * p[l];
+                for (size_t l = 0; l < modes; l++)
+                    sum += damping[i * modes + l] * p[l];
                 work->pulls[i] = sum;
-                share += work->frame->modes->participation[i] * p[i];
             }
             work->G[j] += weight * base[0] * share;
             work->G[size + j] += weight * base[1] * share;
             for (size_t k = 0; k <= j; k++) {
+                const Real *other = speeds + k * n;
                 Real sum = 0;
-                for (size_t i = 0; i < n; i++)
-                    sum += speeds[k * n + i] * work->pulls[i];
+                for (size_t i = 0; i < modes; i++)
+                    sum += other[i] * work->pulls[i];
                 work->F[k * size + j] += weight * sum;
+                work->C[k * size + j] += weight * viscous * other[n - 1] * p[n - 1];
             }
         }
     }
     for (size_t j = 0; j < size; j++)
-        for (size_t k = 0; k < j; k++)
+        for (size_t k = 0; k < j; k++) {
             work->F[j * size + k] = work->F[k * size + j];
+            work->C[j * size + k] = work->C[k * size + j];
+        }
 }
 
 // out += a b.
@@ -170,6 +199,19 @@ static void transpose(Real *matrix, size_t size) {
         }
 }
 
+// form += (I + T)' form (I + T).
+static void form_twice(Work *work, Real *form) {
+    const size_t size = work->size;
+    Real *T = work->T, *product = work->product;
+    memcpy(product, form, size * size * sizeof *product);
+    add_product(form, T, size, size, product); // form E
+    transpose(T, size);
+    for (size_t i = 0; i < size * size; i++)
+        form[i] += product[i];
+    add_product(T, product, size, size, form);
+    transpose(T, size);
+}
+
 // Everything over twice the time.
 static void twice(Work *work) {
     const size_t size = work->size, A = 2 * work->n, bytes = size * size * sizeof(Real);
@@ -182,13 +224,9 @@ static void twice(Work *work) {
             for (size_t j = 0; j < size; j++)
                 work->G[row * size + j] += factor * product[s * size + j];
         }
-    memcpy(product, work->F, bytes);
-    add_product(work->F, T, size, size, product); // F E
-    transpose(T, size);
-    for (size_t i = 0; i < size * size; i++)
-        work->F[i] += product[i];
-    add_product(T, product, size, size, work->F);
-    transpose(T, size);
+    form_twice(work, work->F);
+    if (work->contact != NULL)
+        form_twice(work, work->C);
     memcpy(product, T, bytes);
     for (size_t i = 0; i < size * size; i++)
         product[i] *= 2;
@@ -204,65 +242,104 @@ static void fill(FrameDense *dense, const Work *work) {
             dense->gain[j * rows + i] = (double)work->T[i * size + j];
         for (size_t i = 0; i < size; i++)
             dense->loss[j * size + i] = (double)work->F[i * size + j];
+        for (size_t i = 0; i < size && dense->contact != NULL; i++)
+            dense->contact[j * size + i] = (double)work->C[i * size + j];
         for (size_t row = 0; row < 2; row++)
             dense->input[row][j] = (double)work->G[row * size + j];
     }
 }
 
 static double rate_of(const Frame *frame) {
-    return fmax(frame->rate, frame->turning);
+    return fmax(frame_rate(frame), frame->turning);
 }
 
-static Status make(FrameDense *dense, const Frame *frame, Real *room, Problem *problem) {
-    const size_t n = frame->storeys, size = dense->size;
+static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
+    const size_t size = 2 * freedoms + 2, square = size * size;
+    dense->block = malloc((2 * freedoms * size + 2 * square + 2 * size) * sizeof *dense->block);
+    if (dense->block == NULL)
+        return STATUS_NO_MEMORY;
+    dense->freedoms = freedoms;
+    dense->size = size;
+    dense->gain = dense->block;
+    dense->loss = dense->gain + 2 * freedoms * size;
+    dense->input[0] = dense->loss + square;
+    dense->input[1] = dense->input[0] + size;
+    dense->contact = is_contact ? dense->input[1] + size : NULL;
+    return STATUS_OK;
+}
+
+static Status make(FrameDense *dense, size_t levels, Work *work, Problem *problem) {
+    const Frame *frame = work->frame;
+    size_t left = 0; // doublings
+    for (; work->h * rate_of(frame) > 0.5L; work->h /= 2)
+        left++;
+    const Quadrature *rule = arc_quadrature(0.5);
+    make_small(work, rule);
+    make_forms(work, rule);
+    for (;; left--) {
+        if (left < levels) {
+            if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
+                                   frame->storeys);
+            fill(&dense[left], work);
+        }
+        if (left == 0)
+            return STATUS_OK;
+        if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
+            return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                               frame_time(frame));
+        twice(work);
+    }
+}
+
+Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
+                        const FrameDamper *contact, Problem *problem) {
+    const size_t n = frame->storeys + (contact != NULL), size = 2 * n + 2, square = size * size;
+    memset(dense, 0, levels * sizeof *dense);
+    Real *room =
+        malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
+    if (room == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
+                           frame->storeys);
     Work work = {.frame = frame,
+                 .contact = contact,
+                 .modes = frame->storeys,
                  .n = n,
                  .size = size,
                  .is_sine = frame->turning > 0,
                  .omega = frame->turning,
                  .h = frame->interval};
     work.T = room;
-    work.F = work.T + size * size;
-    work.product = work.F + size * size;
-    work.G = work.product + size * size;
-    work.pulls = work.G + 2 * size;
+    work.F = work.T + square;
+    work.C = work.F + square;
+    work.product = work.C + square;
+    work.G = work.product + square;
+    work.share = work.G + 2 * size;
+    work.pulls = work.share + n;
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
-    size_t count = 0;
-    for (; work.h * rate_of(frame) > 0.5L; work.h /= 2)
-        count++;
-    const Quadrature *rule = arc_quadrature(0.5);
-    make_small(&work, rule);
-    make_forms(&work, rule);
-    for (size_t i = 0; i < count; i++) {
-        if (!watch_advance(frame->run->watch, 0))
-            return problem_set(problem, STATUS_CANCELLED, "cancelled at t = 0 s");
-        twice(&work);
-    }
-    fill(dense, &work);
-    return STATUS_OK;
-}
-
-Status frame_dense_make(FrameDense *dense, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, size = 2 * n + 2, square = size * size;
-    memset(dense, 0, sizeof *dense);
-    if (frame->plan->count < WORTH * n || !(frame->interval * rate_of(frame) < 0x1p40))
-        return STATUS_OK;
-    Real *room =
-        malloc((3 * square + 2 * size + (1 + TERMS) * n + NODES * size * n) * sizeof *room);
-    dense->block = malloc((2 * n * size + square + 2 * size) * sizeof *dense->block);
-    if (room == NULL || dense->block == NULL) {
-        free(room);
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    }
-    dense->size = size;
-    dense->gain = dense->block;
-    dense->loss = dense->gain + 2 * n * size;
-    dense->input[0] = dense->loss + square;
-    dense->input[1] = dense->input[0] + size;
-    const Status status = make(dense, frame, room, problem);
+    const double mass = contact == NULL ? 0 : contact->plan->mass;
+    for (size_t i = 0; i < frame->storeys; i++)
+        work.share[i] =
+            frame->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
+    if (contact != NULL)
+        work.share[frame->storeys] = mass;
+    const Status status = make(dense, levels, &work, problem);
     free(room);
     return status;
+}
+
+void frame_dense_add(const double *matrix, size_t rows, const double *y, size_t size, double *out) {
+    for (size_t j = 0; j < size; j++)
+        for (size_t i = 0; i < rows; i++)
+            out[i] += matrix[j * rows + i] * y[j];
+}
+
+double frame_dense_form(const double *form, const double *y, size_t size) {
+    double sum = 0;
+    for (size_t j = 0; j < size; j++)
+        sum += y[j] * frame_dot(form + j * size, y, size);
+    return sum;
 }
 
 void frame_dense_clear(FrameDense *dense) {

@@ -11,20 +11,20 @@
 
 #include "core/math/exponential.h"
 
-enum { Q, P, A, B, SIZE };
+enum { Q, P, A, B, SIZE, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
-static void make_ground(FrameFlight *flight, double omega) {
+void frame_flight_ground(double omega, double length, double ground[2], double fall[2]) {
     const bool is_sine = omega > 0;
     long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
     system[VALUE * GROUND + SLOPE] = is_sine ? omega : 1;
     system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)omega : 0;
     system[SUM * GROUND + VALUE] = 1;
     system[FALL * GROUND + SUM] = 1;
-    exponential_increment(system, GROUND, flight->length, gain);
+    exponential_increment(system, GROUND, length, gain);
     for (int column = 0; column < 2; column++) {
-        flight->ground[column] = (double)gain[SUM * GROUND + column];
-        flight->fall[column] = (double)gain[FALL * GROUND + column];
+        ground[column] = (double)gain[SUM * GROUND + column];
+        fall[column] = (double)gain[FALL * GROUND + column];
     }
 }
 
@@ -71,9 +71,10 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
         return STATUS_OK; // a_g has its kinks inside the intervals
     if (frame->diagonal == NULL) {
-        TRY(frame_dense_make(&flight->dense, frame, problem));
-        if (flight->dense.block == NULL)
+        // Where making it would cost more than it saves there is none.
+        if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
             return STATUS_OK;
+        TRY(frame_dense_make(&flight->dense, 1, frame, NULL, problem));
     }
     double **const arrays[] = {
         &flight->q[0],     &flight->q[1],     &flight->q[2],     &flight->q[3],    &flight->p[0],
@@ -90,7 +91,7 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + (i + 4) * n + 2;
     flight->length = frame->interval;
-    make_ground(flight, frame->turning);
+    frame_flight_ground(frame->turning, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
         make_mode(flight, frame, i);
     return STATUS_OK;
@@ -99,14 +100,6 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
 void frame_flight_clear(FrameFlight *flight) {
     frame_dense_clear(&flight->dense);
     free(flight->block);
-}
-
-// out += matrix y, column after column.
-static void add_columns(const double *matrix, size_t rows, const double *y, size_t size,
-                        double *out) {
-    for (size_t j = 0; j < size; j++)
-        for (size_t i = 0; i < rows; i++)
-            out[i] += matrix[j * rows + i] * y[j];
 }
 
 static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
@@ -118,7 +111,7 @@ static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
         flight->start[2 * n] = a;
         flight->start[2 * n + 1] = b;
         memset(flight->gain_q, 0, 2 * n * sizeof *flight->gain_q); // and gain_p
-        add_columns(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
+        frame_dense_add(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
         return;
     }
     double *const *const row = flight->q, *const *const speed = flight->p;
@@ -129,18 +122,7 @@ static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
     }
 }
 
-// sqrt(p'p + q'W^2 q).
-static double size(const Frame *frame) {
-    double squares[2] = {0, 0};
-    for (size_t i = 0; i < frame->storeys; i++) {
-        squares[0] += frame->p[i] * frame->p[i];
-        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
-    }
-    return sqrt(squares[0] + squares[1]);
-}
-
-// Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
-static bool is_clear(const FrameDamper *damper, double gained, double bend, double length) {
+bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length) {
     const double sag = bend * length * length / 8;
     const double most = frame_room(damper, SIDE_RIGHT) - sag;
     const double least = sag - frame_room(damper, SIDE_LEFT);
@@ -150,10 +132,7 @@ static bool is_clear(const FrameDamper *damper, double gained, double bend, doub
 
 static void add_dense_work(const FrameFlight *flight, const Slice *slice, FrameWork *work) {
     const FrameDense *dense = &flight->dense;
-    work->damping = 0;
-    for (size_t j = 0; j < dense->size; j++)
-        work->damping +=
-            flight->start[j] * frame_dot(dense->loss + j * dense->size, flight->start, dense->size);
+    work->damping = frame_dense_form(dense->loss, flight->start, dense->size);
     work->input = -(slice->value * frame_dot(dense->input[0], flight->start, dense->size) +
                     slice->slope * frame_dot(dense->input[1], flight->start, dense->size));
 }
@@ -179,37 +158,45 @@ static void add_work(const FrameFlight *flight, const Frame *frame, const Slice 
     work->input = -(put[0] + put[1] + (a * (ib[0] * a + ib[1] * b) + ib[2] * b * b));
 }
 
+double frame_flight_shaken(const Slice *slice, double length) {
+    const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
+    return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
+}
+
 bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work) {
     const size_t n = frame->storeys;
     const double length = flight->length;
     gain(flight, frame, slice);
     const double speed = flight->ground[0] * slice->value + flight->ground[1] * slice->slope;
     const double fallen = flight->fall[0] * slice->value + flight->fall[1] * slice->slope;
-    const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
-    const double shaken = slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
+    const double shaken = frame_flight_shaken(slice, length);
     const double grown = frame->growth * length; // exp(grown) < 1 / (1 - grown)
     if (!(grown < 0.5))
         return false;
     const double most =
-        frame->dampers > 0 ? (size(frame) + length * frame->drive * shaken) / (1 - grown) : 0;
+        frame->dampers > 0 ? (frame_size(frame) + length * frame->drive * shaken) / (1 - grown) : 0;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->storey_speed = frame_dot(damper->shape, frame->p, n);
         damper->gained = length * (damper->storey_speed + damper->w) - fallen -
                          frame_dot(damper->shape, flight->gain_q, n);
-        if (!is_clear(damper, damper->gained, damper->reach * most + fabs(damper->lean) * shaken,
-                      length))
+        if (!frame_flight_is_clear(damper, damper->gained,
+                                   damper->reach * most + fabs(damper->lean) * shaken, length))
             return false;
     }
-    if (flight->dense.block != NULL)
-        add_dense_work(flight, slice, work);
-    else
-        add_work(flight, frame, slice, work);
-    work->ground = speed;
+    if (work != NULL) {
+        if (flight->dense.block != NULL)
+            add_dense_work(flight, slice, work);
+        else
+            add_work(flight, frame, slice, work);
+        work->ground = speed;
+    }
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         // Its absolute velocity stays.
-        work->input -= damper->plan->mass * speed * (damper->storey_speed + damper->w - speed / 2);
+        if (work != NULL)
+            work->input -=
+                damper->plan->mass * speed * (damper->storey_speed + damper->w - speed / 2);
         damper->r += damper->gained;
         damper->w -= speed + frame_dot(damper->shape, flight->gain_p, n);
     }

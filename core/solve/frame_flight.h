@@ -28,7 +28,15 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
 void frame_flight_clear(FrameFlight *flight);
 
 // Moves the state over the interval, if surely no stop is reached meanwhile, and says what it adds
-// up to. False: it must go by arcs, and nothing has changed.
+// up to, if `work` is not NULL. False: it must go by arcs, and nothing has changed.
 bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work);
+
+// Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
+bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length);
+// Over (value, slope): the integral of a_g over `length`, and its integral; `omega` is the base's
+// (0: linear).
+void frame_flight_ground(double omega, double length, double ground[2], double fall[2]);
+// |a_g| is not larger [m/s^2].
+double frame_flight_shaken(const Slice *slice, double length);
 
 #endif

@@ -5,11 +5,15 @@
 
 #include "core/solve/frame_state.h"
 
+enum { RECORD_BATCH = 8 };
+
 typedef struct FrameRecord {
-    size_t statistics_start;                     // the first sample that counts
-    double base_speed;                           // integral of a_g since the last sample [m/s]
-    double *last_velocity;                       // of the storeys, at the last sample
-    double *sum_displacement, *sum_acceleration; // of the storeys, of squares
+    size_t statistics_start; // the first sample that counts
+    double base_speed;       // integral of a_g since the last sample [m/s]
+    double *last_velocity;   // of each column's storey, at the last sample
+    // Sums of q_i q_k and of the modal accelerations' products, for k <= i, and the samples that
+    // are not in them yet.
+    double *squares[2], *batch[2];
     size_t count;
     double *block;
 } FrameRecord;
@@ -19,15 +23,16 @@ Status frame_record_start(FrameRecord *record, const Frame *frame, Response *res
                           Problem *problem);
 void frame_record_clear(FrameRecord *record);
 
-// What can be seen now, after frame_look; base_speed goes back to 0.
+// What can be seen now, after frame_feel; base_speed goes back to 0.
 void frame_record_take(FrameRecord *record, Frame *frame);
-void frame_record_finish(const FrameRecord *record, const Frame *frame, Response *response);
+void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response);
 
-// Takes peaks at this instant, after frame_look.
+// Takes peaks at this instant, after frame_feel; of accelerations alone.
 void frame_record_peaks(Frame *frame);
+void frame_record_acceleration(Frame *frame);
 // Statistics begin here: what came before is left out of the peaks.
 void frame_record_forget(Frame *frame);
-// Looks, and takes peaks and the energy balance.
+// Feels, and takes peaks and the energy balance.
 void frame_record_note(Frame *frame);
 
 #endif

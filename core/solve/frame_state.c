@@ -73,42 +73,20 @@ void frame_feel(Frame *frame) {
     }
 }
 
-// Adds the part of `many` modes from the i-th on to x, v and a. Several at once spare the storeys'
-// ways to memory and back.
-static inline void add_modes(Frame *frame, size_t i, size_t many) {
-    const size_t n = frame->storeys;
-    const double *shape = frame->modal + i * n;
-    const double *q = frame->q + i, *p = frame->p + i, *e = frame->elastic + i;
-    for (size_t j = 0; j < n; j++) {
-        double x = 0, v = 0, a = 0;
-        for (size_t k = 0; k < many; k++) {
-            x += shape[k * n + j] * q[k];
-            v += shape[k * n + j] * p[k];
-            a += shape[k * n + j] * e[k];
-        }
-        frame->x[j] += x;
-        frame->v[j] += v;
-        frame->a[j] -= a;
-    }
+double frame_displacement(const Frame *frame, size_t storey) {
+    return frame_dot(frame->modes->shapes + storey * frame->storeys, frame->q, frame->storeys);
 }
 
-void frame_look(Frame *frame) {
+double frame_velocity(const Frame *frame, size_t storey) {
+    return frame_dot(frame->modes->shapes + storey * frame->storeys, frame->p, frame->storeys);
+}
+
+double frame_storey_acceleration(const Frame *frame, size_t storey) {
     const size_t n = frame->storeys;
-    frame_feel(frame);
-    memset(frame->x, 0, n * sizeof *frame->x);
-    memset(frame->v, 0, n * sizeof *frame->v);
-    memset(frame->a, 0, n * sizeof *frame->a);
-    size_t i = 0;
-    for (; i + 5 <= n; i += 5)
-        add_modes(frame, i, 5);
-    for (; i < n; i++)
-        add_modes(frame, i, 1);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const double force = frame->damper[d].force;
-        if (force != 0)
-            for (size_t j = 0; j < n; j++)
-                frame->a[j] += frame->mobility[d * n + j] * force;
-    }
+    double sum = -frame_dot(frame->modes->shapes + storey * n, frame->elastic, n);
+    for (size_t d = 0; d < frame->dampers; d++)
+        sum += frame->mobility[d * n + storey] * frame->damper[d].force;
+    return sum;
 }
 
 double frame_acceleration(const Frame *frame, size_t d) {
@@ -134,6 +112,15 @@ EnergyState frame_energy(const Frame *frame) {
             energy.strain += 0.5 * damper->contact.stiffness * damper->r * damper->r;
     }
     return energy;
+}
+
+double frame_size(const Frame *frame) {
+    double squares[2] = {0, 0};
+    for (size_t i = 0; i < frame->storeys; i++) {
+        squares[0] += frame->p[i] * frame->p[i];
+        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
+    }
+    return sqrt(squares[0] + squares[1]);
 }
 
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
@@ -211,8 +198,10 @@ static void make_damper(Frame *frame, size_t d) {
                             .origin = FRAME_FROM_MIDDLE,
                             .r = planned->position,
                             .w = planned->velocity};
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < n; j++) {
         frame->mobility[d * n + j] = mobility(frame->modes, planned->storey, j);
+        damper->thrust = fmax(damper->thrust, fabs(frame->mobility[d * n + j]));
+    }
     for (size_t e = 0; e < frame->dampers; e++)
         frame->yield[d * frame->dampers + e] =
             mobility(frame->modes, planned->storey, plan->dampers[e].storey) +
@@ -252,28 +241,29 @@ static void make_damping(Frame *frame) {
         frame->diagonal = NULL;
 }
 
-// q = shapes' M x: the modes are normal.
-static void make_modal(const Frame *frame, const double *values, double *modal) {
+// q = shapes' M x: the modes are normal. `carried` is scratch.
+static void make_modal(const Frame *frame, const double *values, long double *carried,
+                       double *modal) {
     const size_t n = frame->storeys;
+    for (size_t j = 0; j < n; j++) {
+        carried[j] = 0;
+        for (size_t k = 0; k < n; k++)
+            carried[j] += (long double)frame->plan->mass[j * n + k] * values[k];
+    }
     for (size_t i = 0; i < n; i++) {
         long double sum = 0;
-        for (size_t j = 0; j < n; j++) {
-            long double carried = 0;
-            for (size_t k = 0; k < n; k++)
-                carried += (long double)frame->plan->mass[j * n + k] * values[k];
-            sum += frame->modes->shapes[j * n + i] * carried;
-        }
+        for (size_t j = 0; j < n; j++)
+            sum += frame->modes->shapes[j * n + i] * carried[j];
         modal[i] = (double)sum;
     }
 }
 
 static Status make_room(Frame *frame) {
     const size_t n = frame->storeys, m = frame->dampers;
-    double **const arrays[] = {&frame->omega2,  &frame->diagonal, &frame->carry,    &frame->q,
-                               &frame->p,       &frame->x,        &frame->v,        &frame->a,
-                               &frame->elastic, &frame->modal,    &frame->mobility, &frame->yield,
-                               &frame->hold,    &frame->scratch};
-    const size_t sizes[] = {n, n, n, n, n, n, n, n, n, n * n, m * n, m * m, m * m, m * m};
+    double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,  &frame->q,
+                               &frame->p,      &frame->elastic,  &frame->widest, &frame->mobility,
+                               &frame->yield,  &frame->hold,     &frame->scratch};
+    const size_t sizes[] = {n, n, n, n, n, n, n, m * n, m * m, m * m, m * m};
     size_t total = 0;
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
         total += sizes[i];
@@ -313,7 +303,7 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
         frame->stiff = fmax(frame->stiff, frame->omega2[i]);
         frame->carry[i] = frame->modes->participation[i];
         for (size_t j = 0; j < n; j++)
-            frame->modal[i * n + j] = frame->modes->shapes[j * n + i];
+            frame->widest[i] = fmax(frame->widest[i], fabs(frame->modes->shapes[j * n + i]));
     }
     frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
     frame->rate = fmax(fmax(sqrt(frame->stiff), frame->viscous), 1e-300);
@@ -331,8 +321,12 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
         return problem_set(
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
-    make_modal(frame, plan->displacement, frame->q);
-    make_modal(frame, plan->velocity, frame->p);
+    long double *carried = malloc(n * sizeof *carried);
+    if (carried == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    make_modal(frame, plan->displacement, carried, frame->q);
+    make_modal(frame, plan->velocity, carried, frame->p);
+    free(carried);
     base_cursor_make(&frame->base, run->base, plan->sample_rate);
     frame->ground = base_cursor_at(&frame->base, 0);
     return STATUS_OK;

@@ -22,6 +22,7 @@ typedef struct FrameDamper {
     const double *shape;   // of its storey, mode after mode
     double lean;           // r_j - 1: a_g's part in r''
     double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj) [kg]
+    double thrust;         // a force N on its storey accelerates none by more than this N [1/kg]
     double reach;          // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
 
     FramePhase phase;
@@ -31,7 +32,7 @@ typedef struct FrameDamper {
                  // from rest a moment ago
     bool is_fresh;             // the present phase has lasted for no time yet
     double r, w;               // displacement and speed relative to the storey [m], [m/s]
-    double force;              // N on the structure as of the last frame_look [N]
+    double force;              // N on the structure as of the last frame_feel [N]
     ContactParameters contact; // frozen at the touch
     LedgerRow row;             // of the present contact or rest
 
@@ -55,11 +56,13 @@ typedef struct Frame {
     Modes own_modes; // where the plan has none
     Problem *problem;
 
+    bool is_shadow; // only the motion is wanted: no peaks, no energies
+
     size_t storeys;        // and modes
     double *omega2;        // [1/s^2]
     const double *damping; // D: storeys values where it is diagonal, else storeys x storeys
     double *diagonal;      // of D, where it is diagonal
-    double *modal;         // shapes, mode after mode
+    double *widest;        // of each mode, the largest |shape| of any storey
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
     double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
@@ -74,12 +77,11 @@ typedef struct Frame {
     double *hold;     // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
     size_t resting;   // how many are
 
-    double *q, *p;     // modal displacements and speeds
-    double *x, *v, *a; // of the storeys, as of the last frame_look; a is absolute
-    double *elastic;   // D p + W^2 q, likewise
-    double ground;     // a_g now [m/s^2]
-    double *scratch;   // of frame_hold_make and frame_collide
-    double *block;     // all arrays above
+    double *q, *p;   // modal displacements and speeds
+    double *elastic; // D p + W^2 q, as of the last frame_feel
+    double ground;   // a_g now [m/s^2]
+    double *scratch; // of frame_hold_make and frame_collide
+    double *block;   // all arrays above
 
     size_t sample; // the last one passed
     double offset; // time since then [s]
@@ -123,11 +125,14 @@ double frame_relative(const FrameDamper *damper);
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
 void frame_feel(Frame *frame);
-// That, and x, v, a of all storeys.
-void frame_look(Frame *frame);
+// Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
+double frame_displacement(const Frame *frame, size_t storey);
+double frame_velocity(const Frame *frame, size_t storey);
+double frame_storey_acceleration(const Frame *frame, size_t storey);
 // r'' of a damper in flight, after frame_feel [m/s^2].
 double frame_acceleration(const Frame *frame, size_t damper);
 EnergyState frame_energy(const Frame *frame);
+double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
 
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);

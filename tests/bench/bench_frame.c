@@ -1,9 +1,10 @@
 // ns of CPU per sample of the general engine at frames of 10 and 200 storeys, 1 kHz and 5 channels
 // of the top storey and its damper. Smallest of the repeats; the plan is made apart, the modes and
-// tables of a run are in it.
+// tables of a run are in it. `bench_frame WORDS` runs the frames whose name has them.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/math/fourier.h"
 #include "core/solve/frame.h"
@@ -52,10 +53,12 @@ static Plan *make_plan(const Case *from) {
     return plan;
 }
 
-int main(void) {
+int main(int argc, char **argv) {
     fourier_start();
     printf("%-36s %10s %10s %10s %10s\n", "frame", "ns/sample", "impacts", "steps", "residual");
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        if (argc > 1 && strstr(cases[c].name, argv[1]) == NULL)
+            continue;
         Plan *plan = make_plan(&cases[c]);
         Base base = {0};
         Problem problem;

@@ -43,13 +43,12 @@ static void clear(Bench *bench) {
 // Absolute momentum and kinetic energy of everything.
 static void measure(Frame *frame, double *momentum, double *energy) {
     *momentum = 0;
-    frame_look(frame);
     for (size_t i = 0; i < 2; i++)
         for (size_t j = 0; j < 2; j++)
-            *momentum += frame->plan->mass[i * 2 + j] * frame->v[j];
+            *momentum += frame->plan->mass[i * 2 + j] * frame_velocity(frame, j);
     for (size_t d = 0; d < 3; d++)
         *momentum += frame->damper[d].plan->mass *
-                     (frame->v[frame->damper[d].plan->storey] + frame->damper[d].w);
+                     (frame_velocity(frame, frame->damper[d].plan->storey) + frame->damper[d].w);
     *energy = frame_energy(frame).kinetic;
 }
 
