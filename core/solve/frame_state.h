@@ -41,6 +41,8 @@ typedef struct FrameDamper {
     // that presses it [m/s], [m/s], [N s].
     bool is_met, is_bounced; // is_met: takes part; is_bounced: not from rest
     double closing, parting, pressed;
+    bool is_held;  // taken into `hold`
+    bool is_wrong; // by frame_collide, so far
 } FrameDamper;
 
 // In modal coordinates, x = shapes q:
@@ -129,7 +131,9 @@ EnergyState frame_energy(const Frame *frame);
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);
 
-// Makes `hold` anew: after every change of who rests.
+// Makes `hold` the inverse of `yield` between those that are held.
+void frame_hold_invert(Frame *frame);
+// That for those that rest: after every change of who does.
 void frame_hold_make(Frame *frame);
 
 #endif
