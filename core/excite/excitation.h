@@ -7,6 +7,7 @@
 #include "core/base/field.h"
 #include "core/base/watch.h"
 #include "core/excite/base.h"
+#include "core/math/fourier.h"
 
 // First member of every excitation's struct.
 typedef struct Excitation {
@@ -17,9 +18,10 @@ typedef struct Excitation {
 
 // What an excitation needs to know of the run it serves.
 typedef struct Span {
-    double duration;    // [s]
-    double sample_rate; // [Hz]
-    size_t most;        // samples at most, 0: no limit
+    double duration;          // [s]
+    double sample_rate;       // [Hz]
+    size_t most;              // samples at most, 0: no limit
+    FourierStock *transforms; // may be NULL
 } Span;
 
 typedef struct ExcitationKind {

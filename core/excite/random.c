@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "core/base/noise.h"
+#include "core/math/circle.h"
 #include "core/math/fourier.h"
 
 #define PI 3.14159265358979323846264338328
@@ -185,7 +186,7 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
                            SAMPLES_MOST, wanted);
     const RandomBlocks blocks = random_blocks(random);
     const size_t hop = blocks.length / 2;
-    Fourier *fourier = fourier_new(blocks.length, FOURIER_BACKWARD);
+    Fourier *fourier = fourier_take(span->transforms, blocks.length, FOURIER_BACKWARD);
     double *fade = malloc(hop * sizeof *fade);
     base->count = (size_t)wanted;
     base->values = malloc(base->count * sizeof *base->values);
@@ -196,12 +197,12 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
     } else {
         base->form = BASE_SAMPLED;
         base->interval = 1 / random->rate;
-        for (size_t i = 0; i < hop; i++)
-            fade[i] = sin(PI * ((double)i + 0.5) / (double)blocks.length);
+        const double step = PI / (double)blocks.length;
+        circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
         status = make_samples(random, &blocks, fourier, fade, watch, base, problem);
     }
     free(fade);
-    fourier_free(fourier);
+    fourier_put(span->transforms, fourier);
     if (status != STATUS_OK)
         base_clear(base);
     return status;

@@ -5,7 +5,11 @@
 #include <fftw3.h>
 #include <stdlib.h>
 
+enum { KEPT_SIZE = 1 << 17 };
+
 struct Fourier {
+    size_t size;
+    FourierDirection direction;
     double *real;
     fftw_complex *complex;
     fftw_plan plan;
@@ -21,6 +25,8 @@ Fourier *fourier_new(size_t size, FourierDirection direction) {
     Fourier *fourier = calloc(1, sizeof *fourier);
     if (fourier == NULL)
         return NULL;
+    fourier->size = size;
+    fourier->direction = direction;
     fourier->real = fftw_alloc_real(size);
     fourier->complex = fftw_alloc_complex(size / 2 + 1);
     if (fourier->real != NULL && fourier->complex != NULL)
@@ -55,4 +61,37 @@ double *fourier_complex(Fourier *fourier) {
 
 void fourier_run(Fourier *fourier) {
     fftw_execute(fourier->plan);
+}
+
+Fourier *fourier_take(FourierStock *stock, size_t size, FourierDirection direction) {
+    for (size_t i = 0; stock != NULL && i < FOURIER_KEPT; i++) {
+        Fourier *kept = stock->at[i];
+        if (kept != NULL && kept->size == size && kept->direction == direction) {
+            stock->at[i] = NULL;
+            return kept;
+        }
+    }
+    return fourier_new(size, direction);
+}
+
+void fourier_put(FourierStock *stock, Fourier *fourier) {
+    if (stock == NULL || fourier == NULL || fourier->size > KEPT_SIZE) {
+        fourier_free(fourier);
+        return;
+    }
+    // The others move up by one into the first free place; without one the oldest goes.
+    Fourier *moved = fourier;
+    for (size_t i = 0; i < FOURIER_KEPT && moved != NULL; i++) {
+        Fourier *next = stock->at[i];
+        stock->at[i] = moved;
+        moved = next;
+    }
+    fourier_free(moved);
+}
+
+void fourier_stock_clear(FourierStock *stock) {
+    for (size_t i = 0; i < FOURIER_KEPT; i++) {
+        fourier_free(stock->at[i]);
+        stock->at[i] = NULL;
+    }
 }

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
+#include "core/math/circle.h"
 
 #define PI 3.14159265358979323846264338328
 
@@ -20,7 +20,7 @@ enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the watch
 const char *const spectrum_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
 const char *const spectrum_detrend_names[] = {"constant", "linear", "none", NULL};
 
-// w[n] = a0 - a1 cos(2 pi n / L) + a2 cos(4 pi n / L).
+// w[n] = a0 - a1 c + a2 (2 c^2 - 1), c = cos(2 pi n / L).
 static const double window_terms[][3] = {
     [WINDOW_HANN] = {0.5, 0.5, 0},
     [WINDOW_BOXCAR] = {1, 0, 0},
@@ -46,10 +46,11 @@ static double sum_total(const Sum *sum) {
 
 static void make_window(int window, double *w, size_t length) {
     const double *a = window_terms[window];
+    circle_cosines(0, 2 * PI / (double)length, length, w);
     for (size_t n = 0; n < length; n++) {
-        const double angle = 2 * PI * (double)n / (double)length;
+        const double c = w[n];
         // A window of one sample is 1, whatever its name.
-        w[n] = length == 1 ? 1 : a[0] - a[1] * cos(angle) + a[2] * cos(2 * angle);
+        w[n] = length == 1 ? 1 : a[0] - a[1] * c + a[2] * (2 * c * c - 1);
     }
 }
 
@@ -148,7 +149,6 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
     welch->segments = (series->rows - welch->settings.overlap) / (length - welch->settings.overlap);
     welch->window = malloc(length * sizeof *welch->window);
     welch->power = malloc(welch->bins * sizeof *welch->power);
-    welch->fourier = fourier_new(length, FOURIER_FORWARD);
     spectrum->frequency = malloc(welch->bins * sizeof *spectrum->frequency);
     if (welch->window == NULL || welch->power == NULL || welch->fourier == NULL ||
         spectrum->frequency == NULL)
@@ -171,16 +171,17 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
 }
 
 Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Watch *watch, Spectrum *spectrum,
-                      Problem *problem) {
+                      const SpectrumSettings *settings, const Watch *watch, FourierStock *stock,
+                      Spectrum *spectrum, Problem *problem) {
     *spectrum = (Spectrum){0};
     TRY(check_settings(series, settings, problem));
-    Welch welch = {.settings = *settings};
+    Welch welch = {.settings = *settings,
+                   .fourier = fourier_take(stock, settings->segment, FOURIER_FORWARD)};
     const Status status =
         make_spectrum(&welch, series, units, sample_rate, watch, spectrum, problem);
     free(welch.window);
     free(welch.power);
-    fourier_free(welch.fourier);
+    fourier_put(stock, welch.fourier);
     if (status != STATUS_OK)
         spectrum_clear(spectrum);
     return status;

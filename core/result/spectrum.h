@@ -5,6 +5,7 @@
 
 #include "core/base/columns.h"
 #include "core/base/watch.h"
+#include "core/math/fourier.h"
 
 typedef enum SpectrumWindow {
     WINDOW_HANN,
@@ -31,10 +32,11 @@ typedef struct Spectrum {
 } Spectrum;
 
 // `series` holds the columns to transform, all of series->rows samples at `sample_rate` Hz.
-// `units[i]` is the density's unit of column i. Cleared by spectrum_clear; empty on failure.
+// `units[i]` is the density's unit of column i; `stock` may be NULL. Cleared by spectrum_clear;
+// empty on failure.
 Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Watch *watch, Spectrum *spectrum,
-                      Problem *problem);
+                      const SpectrumSettings *settings, const Watch *watch, FourierStock *stock,
+                      Spectrum *spectrum, Problem *problem);
 void spectrum_clear(Spectrum *spectrum);
 
 #endif

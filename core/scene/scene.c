@@ -170,7 +170,8 @@ static Status complete_excitation(Scene *scene, size_t most_samples, Problem *pr
     if (kind->complete == NULL || !is_positive(scene->duration) ||
         !is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
         return STATUS_OK;
-    const Span span = {scene->duration, scene->sample_rate, most_samples};
+    const Span span = {
+        .duration = scene->duration, .sample_rate = scene->sample_rate, .most = most_samples};
     return kind->complete(excitation, &span, "/excitation", problem);
 }
 

@@ -54,6 +54,7 @@ typedef struct Journey {
     const Simulation *simulation;
     const SimulationLimits *limits;
     const Watch *watch;
+    Workspace *workspace; // or NULL
     Plan *plan;
     Base base;
     Columns hidden;      // channels that only a spectrum wants
@@ -63,6 +64,10 @@ typedef struct Journey {
     size_t wanted_count;
     Outcome *outcome;
 } Journey;
+
+static FourierStock *stock(const Journey *journey) {
+    return journey->workspace == NULL ? NULL : &journey->workspace->transforms;
+}
 
 // What a name asks for; a bare one is of the first storey or damper.
 static RunColumn column_of(const char *name) {
@@ -124,7 +129,7 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
     return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
-                          &journey->outcome->spectrum, problem);
+                          stock(journey), &journey->outcome->spectrum, problem);
 }
 
 static void summarize(Outcome *outcome) {
@@ -173,8 +178,10 @@ static Status travel(Journey *journey, Problem *problem) {
     const Scene *scene = &simulation->scene;
     Outcome *outcome = journey->outcome;
     TRY(make_plan(simulation, &journey->plan, problem));
-    const Span span = {scene->duration, scene->sample_rate,
-                       journey->limits == NULL ? 0 : journey->limits->samples};
+    const Span span = {.duration = scene->duration,
+                       .sample_rate = scene->sample_rate,
+                       .most = journey->limits == NULL ? 0 : journey->limits->samples,
+                       .transforms = stock(journey)};
     const Excitation *excitation = scene_excitation(scene);
     Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
@@ -206,14 +213,18 @@ static Status travel(Journey *journey, Problem *problem) {
 }
 
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Outcome **outcome, Problem *problem) {
+                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      Problem *problem) {
     *outcome = NULL;
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
     atomic_init(&held->holds, 1);
-    Journey journey = {
-        .simulation = simulation, .limits = limits, .watch = watch, .outcome = &held->outcome};
+    Journey journey = {.simulation = simulation,
+                       .limits = limits,
+                       .watch = watch,
+                       .workspace = workspace,
+                       .outcome = &held->outcome};
     const Status status = travel(&journey, problem);
     free(journey.transformed.at); // its values are the other columns'
     free(journey.units);

@@ -8,6 +8,7 @@
 #include "core/result/response.h"
 #include "core/result/spectrum.h"
 #include "core/scene/scene.h"
+#include "core/solve/workspace.h"
 
 // The engine's name and version; part of every result's id. Changes whenever any bit of any result
 // may.
@@ -80,9 +81,10 @@ struct Outcome {
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
 // at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
-// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop.
+// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop. `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Outcome **outcome, Problem *problem);
+                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      Problem *problem);
 Outcome *outcome_hold(Outcome *outcome);
 void outcome_drop(Outcome *outcome);
 size_t outcome_bytes(const Outcome *outcome); // of memory, for caches

@@ -6,10 +6,11 @@
 //        +--(impulse)--> u' -> -e u' ----------------------------------> RESTING(side)
 //                                                 push becomes tensile -> FLIGHT
 //
-// Flight over a whole sample interval is one matrix step where a bound on the gap's curvature
-// proves that no stop can be reached; everything else goes by arcs (arc.h), whose polynomials
-// locate events to rounding. Time is a sample's number and an offset from it, so that short
-// contacts keep their digits late in a run.
+// What is common goes by strides (exact_stride.h): many samples of flight at once, contacts in
+// closed form, each with a proof that nothing is missed. Where there is none, flight over a whole
+// interval is one matrix step if a bound on the gap's curvature allows it, and everything else goes
+// by arcs (arc.h), whose polynomials locate events to rounding. Time is a sample's number and an
+// offset from it, so that short contacts keep their digits late in a run.
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -17,7 +18,9 @@
 #include <string.h>
 
 #include "core/solve/exact_events.h"
+#include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
+#include "core/solve/exact_stride.h"
 #include "core/solve/frame.h"
 #include "core/solve/solver.h"
 
@@ -148,7 +151,7 @@ static Status advance(Exact *exact, double length) {
 // The whole interval in one step, where no stop can be reached. False: it must go by arcs.
 static bool fly(Exact *exact) {
     Slice slice;
-    if (exact->phase != FLIGHT || exact->is_leaving ||
+    if (exact->phase != FLIGHT || exact->is_leaving || exact->lanes.run != NULL ||
         !base_cursor_interval(&exact->base, exact->sample, &slice))
         return false;
     ArcIntegrals integrals;
@@ -182,6 +185,11 @@ static Status cross(Exact *exact, double length) {
         const double before = exact->offset;
         const size_t events = exact->events;
         TRY(advance(exact, length - exact->offset));
+        // A contact that arcs have found may go on by its closed form, even over samples, but not
+        // to the last: the interval before that is the caller's.
+        if (exact->lanes.run != NULL && exact->phase == CONTACT && exact->contact_arcs == 0 &&
+            exact->sample + 2 < exact->plan->count)
+            (void)exact_press(exact, exact->plan->count - 2 - exact->sample);
         if (exact->offset == before && exact->events == events)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "the contact is too stiff to be followed: at t = %.6g s a step of "
@@ -224,7 +232,6 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
-    flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
     exact->state = (State){plan->displacement[0], plan->velocity[0], exact->damper->position,
@@ -235,6 +242,9 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
+    exact_stride_start(exact);
+    if (exact->lanes.run == NULL)
+        flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
     return STATUS_OK;
 }
 
@@ -262,24 +272,26 @@ static Status solve(Exact *exact) {
     recorder_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
     ledger_peaks(&exact->ledger, &at);
     while (exact->sample + 1 < plan->count) {
+        const size_t most = plan->count - 1 - exact->sample;
+        const size_t strode = exact_stride(exact, most < WATCH_ARCS ? most : WATCH_ARCS);
+        TRY(ledger_status(&exact->ledger, exact->problem));
+        if ((exact->arcs += strode) >= WATCH_ARCS)
+            TRY(keep_going(exact));
+        if (strode > 0 && exact->offset == 0)
+            continue;
+        exact_stride_enter(exact);
         if (!fly(exact)) {
             TRY(cross(exact, exact->interval));
         } else if (++exact->arcs >= WATCH_ARCS) {
             TRY(keep_going(exact));
         }
-        exact->sample++;
-        exact->offset = 0;
-        at = exact_moment(exact);
-        if (exact->sample == exact->recorder.statistics_start)
-            ledger_forget_peaks(&exact->ledger, &at);
-        recorder_take(&exact->recorder, exact->sample, &at,
-                      base_cursor_at(&exact->base, exact->sample));
-        ledger_peaks(&exact->ledger, &at);
+        exact_pass_sample(exact);
         if (exact->sample % 64 == 0) {
             const EnergyState energy = exact_energy(exact);
             ledger_balance(&exact->ledger, &energy);
         }
     }
+    exact_stride_enter(exact);
     // The duration may end between samples.
     TRY(cross(exact, plan->duration - (double)exact->sample / plan->sample_rate));
     exact_note(exact);

@@ -5,9 +5,22 @@
 
 void exact_note(Exact *exact) {
     const Moment at = exact_moment(exact);
-    const EnergyState energy = exact_energy(exact);
     ledger_peaks(&exact->ledger, &at);
+    if (exact->pending > 0) // not all work is in the ledger yet
+        return;
+    const EnergyState energy = exact_energy(exact);
     ledger_balance(&exact->ledger, &energy);
+}
+
+void exact_pass_sample(Exact *exact) {
+    exact->sample++;
+    exact->offset = 0;
+    const Moment at = exact_moment(exact);
+    if (exact->sample == exact->recorder.statistics_start)
+        ledger_forget_peaks(&exact->ledger, &at);
+    recorder_take(&exact->recorder, exact->sample, &at,
+                  base_cursor_at(&exact->base, exact->sample));
+    ledger_peaks(&exact->ledger, &at);
 }
 
 void exact_end_phase(Exact *exact) {

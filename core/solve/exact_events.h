@@ -10,6 +10,7 @@ bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side)
 
 void exact_touch(Exact *exact, Side side); // flight ends
 void exact_release(Exact *exact);          // contact or rest ends
+void exact_pass_sample(Exact *exact);      // the present interval's end: records the next sample
 void exact_note(Exact *exact);             // takes peaks and the energy balance at this instant
 
 // Tells the estimate of what rounding does that the present phase ends, or the run.

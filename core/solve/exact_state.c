@@ -10,7 +10,7 @@ double exact_room(const Exact *exact, Side side) {
 }
 
 // u = x-relative displacement of the free mass [m].
-static double relative(const Exact *exact) {
+double exact_relative(const Exact *exact) {
     const double stop = exact->damper->clearance / 2;
     const double origin =
         exact->origin == ORIGIN_MIDDLE ? 0 : exact_sign((Side)exact->origin) * stop;
@@ -48,7 +48,7 @@ Moment exact_moment(const Exact *exact) {
                      .acceleration = n / exact->plan->mass[0] - exact_push(exact),
                      .force = n};
     if (exact->plan->damper_count > 0) {
-        moment.damper_x = exact->state.x + relative(exact);
+        moment.damper_x = exact->state.x + exact_relative(exact);
         moment.damper_v = exact->state.v + exact->state.w;
         moment.penetration =
             exact->phase == CONTACT ? fmax(exact_sign(exact->side) * exact->state.r, 0) : 0;

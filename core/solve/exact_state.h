@@ -7,7 +7,9 @@
 #include "core/solve/cursor.h"
 #include "core/solve/flight.h"
 #include "core/solve/hold.h"
+#include "core/solve/lanes.h"
 #include "core/solve/ledger.h"
+#include "core/solve/pulse.h"
 #include "core/solve/record.h"
 #include "core/solve/solver.h"
 #include "core/solve/trust.h"
@@ -22,6 +24,12 @@ typedef struct Exact {
     Problem *problem;
     Motion flying, touching[2], resting;
     Flight flight;
+    Lanes lanes;
+    Stretch stretch;
+    Pulse pulses[2];  // by Side
+    bool has_hops;    // intervals are short enough for hop.h
+    size_t pending;   // samples whose sums wait in `stretch`
+    double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
     Phase phase;
     Side side;       // of CONTACT and RESTING
     Origin origin;   // what state.r is counted from
@@ -50,9 +58,10 @@ static inline double exact_sign(Side side) {
 
 double exact_time(const Exact *exact); // [s]
 double exact_room(const Exact *exact,
-                  Side side);           // between free mass and stop at r = 0 of the origin [m]
-double exact_push(const Exact *exact);  // s = (C v + K x) / M [m/s^2]
-double exact_force(const Exact *exact); // on the structure, positive to the right [N]
+                  Side side);              // between free mass and stop at r = 0 of the origin [m]
+double exact_relative(const Exact *exact); // u, of the free mass [m]
+double exact_push(const Exact *exact);     // s = (C v + K x) / M [m/s^2]
+double exact_force(const Exact *exact);    // on the structure, positive to the right [N]
 double exact_effective_mass(const Exact *exact); // m_e [kg]
 const Motion *exact_motion(const Exact *exact);  // of the present phase
 Moment exact_moment(const Exact *exact);

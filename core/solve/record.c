@@ -43,6 +43,12 @@ void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double b
     }
 }
 
+void recorder_sums(Recorder *recorder, size_t count, double displacement, double acceleration) {
+    recorder->sum_displacement += displacement;
+    recorder->sum_acceleration += acceleration;
+    recorder->count += count;
+}
+
 void recorder_finish(const Recorder *recorder, Response *response) {
     response->sum_squares_displacement = recorder->sum_displacement;
     response->sum_squares_acceleration = recorder->sum_acceleration;

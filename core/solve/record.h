@@ -18,6 +18,8 @@ typedef struct Recorder {
 
 void recorder_start(Recorder *recorder, const Run *run, Response *response);
 void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double base_acceleration);
+// The sums over `count` more samples, all of them where statistics count.
+void recorder_sums(Recorder *recorder, size_t count, double displacement, double acceleration);
 void recorder_finish(const Recorder *recorder, Response *response);
 
 // The base's velocity gained over a stretch [m/s].

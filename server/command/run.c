@@ -104,7 +104,7 @@ static Status scene_run(const char *path, const Simulation *simulation, const Wa
     const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
-    Status status = simulation_run(simulation, &limits, &watch, &outcome, problem);
+    Status status = simulation_run(simulation, &limits, &watch, NULL, &outcome, problem);
     bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
     if (status == STATUS_OK)

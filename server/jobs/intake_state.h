@@ -58,6 +58,7 @@ typedef struct Worker {
     Intake *intake;
     pthread_t thread;
     Computation *running; // or NULL
+    Workspace workspace;  // of its thread alone
 } Worker;
 
 struct Intake {

@@ -84,14 +84,15 @@ static void fail(Findings *findings, Status status, const Problem *problem) {
     findings->problem = bytes_take(&bytes, NULL);
 }
 
-static void run(Intake *intake, Computation *computation, Findings *findings, Problem *problem) {
+static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
+    const Intake *intake = worker->intake;
     const Watch watch = {computation, advance};
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
-    Status status =
-        simulation_run(&computation->simulation, limits, &watch, &findings->outcome, problem);
+    Status status = simulation_run(&computation->simulation, limits, &watch, &worker->workspace,
+                                   &findings->outcome, problem);
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);
@@ -274,7 +275,7 @@ void *worker_main(void *context) {
     while ((computation = next_computation(worker)) != NULL) {
         pthread_mutex_unlock(&intake->lock);
         Findings findings = {0};
-        run(intake, computation, &findings, &problem);
+        run(worker, computation, &findings, &problem);
         if (findings.status != STATUS_CANCELLED)
             finish(intake, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
@@ -287,5 +288,6 @@ void *worker_main(void *context) {
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);
+    workspace_clear(&worker->workspace);
     return NULL;
 }

@@ -20,18 +20,20 @@ static double scene_us(bool is_random, bool has_channels, double duration) {
     paper_no_psd(&simulation);
     if (!has_channels)
         paper_channels(&simulation, NULL, 0);
+    Workspace workspace = {0};
     double us = 1e300;
     Status status = simulation_complete(&simulation, NULL, NULL, &problem);
     for (int i = 0; i < BENCH_REPEATS && status == STATUS_OK; i++) {
         const int64_t start = clock_thread_cpu_ns();
         for (int j = 0; j < RUNS && status == STATUS_OK; j++) {
             Outcome *outcome = NULL;
-            status = simulation_run(&simulation, NULL, NULL, &outcome, &problem);
+            status = simulation_run(&simulation, NULL, NULL, &workspace, &outcome, &problem);
             outcome_drop(outcome);
         }
         const double here = (double)(clock_thread_cpu_ns() - start) / 1e3 / RUNS;
         us = here < us ? here : us;
     }
+    workspace_clear(&workspace);
     simulation_clear(&simulation);
     if (status == STATUS_OK)
         return us;

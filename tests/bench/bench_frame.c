@@ -65,7 +65,7 @@ int main(void) {
             paper_scene(&simulation, 0.5, 0.01, cases[c].duration);
             paper_random(&simulation, 1, 1);
             const Excitation *excitation = scene_excitation(&simulation.scene);
-            const Span span = {plan->duration, plan->sample_rate, 0};
+            const Span span = {.duration = plan->duration, .sample_rate = plan->sample_rate};
             if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
                 excitation_kind(excitation)->make(excitation, &span, NULL, &base, &problem) !=
                     STATUS_OK)

@@ -99,7 +99,7 @@ static bool our_errors(BenchScene *scene, const ReferenceAnswer *truth, Row *row
     Problem problem;
     problem_clear(&problem);
     double starts[PEER_STARTS];
-    if (simulation_run(&scene->simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+    if (simulation_run(&scene->simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         return false;
     const Impacts *impacts = &outcome->response.impacts;
     for (size_t i = 0; i < PEER_STARTS && i < impacts->count; i++)
@@ -123,7 +123,7 @@ static bool contest(const BenchCase *bench, BenchScene *scene) {
     ours.ns = times.run;
     ours.repeats = BENCH_REPEATS;
     ours.impacts = times.impacts;
-    if (!bench->has_damper) {
+    if (!bench->has_contact) {
         printf("  %-24s %10.2f %10.1f %8d\n", "exact", ours.ns, ours.ns / set, BENCH_REPEATS);
         return true;
     }

@@ -30,9 +30,11 @@ static double least(double a, double b) {
     return a < b ? a : b;
 }
 
-static Status make_base(const BenchScene *scene, Base *base, Problem *problem) {
+static Status make_base(BenchScene *scene, Base *base, Problem *problem) {
     const Scene *of = &scene->simulation.scene;
-    const Span span = {of->duration, of->sample_rate, 0};
+    const Span span = {.duration = of->duration,
+                       .sample_rate = of->sample_rate,
+                       .transforms = &scene->workspace.transforms};
     const Excitation *excitation = scene_excitation(of);
     return excitation_kind(excitation)->make(excitation, &span, NULL, base, problem);
 }
@@ -42,8 +44,8 @@ bool bench_open(const BenchCase *bench, BenchScene *scene) {
     problem_clear(&problem);
     memset(scene, 0, sizeof *scene);
     paper_scene(&scene->simulation, bench->restitution, bench->contact_time, bench->duration);
-    if (!bench->has_damper)
-        scene->simulation.scene.dampers.count = 0;
+    if (!bench->has_contact)
+        scene->simulation.scene.dampers.at[0].clearance = 100;
     if (bench->is_random)
         paper_random(&scene->simulation, 1, 1);
     if (simulation_complete(&scene->simulation, NULL, NULL, &problem) != STATUS_OK ||
@@ -65,6 +67,7 @@ void bench_close(BenchScene *scene) {
     plan_free(scene->plan);
     base_clear(&scene->base);
     free(scene->block);
+    workspace_clear(&scene->workspace);
 }
 
 double bench_memset(BenchScene *scene) {
@@ -101,11 +104,6 @@ bool bench_run(BenchScene *scene, BenchTimes *times) {
         columns[i] = (RunColumn){wanted[i], 0, scene->block + i * scene->count};
     *times = (BenchTimes){1e300, 1e300, 1e300, 1e300, 0};
     problem_clear(&problem);
-    // Without a damper there are no damper's columns: the structure's are written again.
-    if (scene->plan->damper_count == 0) {
-        columns[3].channel = CHANNEL_MEAN_ACCELERATION;
-        columns[4].channel = CHANNEL_BASE_ACCELERATION;
-    }
     for (int i = 0; i < BENCH_REPEATS; i++) {
         Plan *plan = NULL;
         Base base = {0};

@@ -10,7 +10,7 @@ enum { BENCH_CHANNELS = 5, BENCH_REPEATS = 20 };
 typedef struct BenchCase {
     const char *name;
     double restitution, contact_time;
-    bool is_random, has_damper;
+    bool is_random, has_contact;
     double duration; // [s] at 1 kHz
 } BenchCase;
 extern const BenchCase bench_cases[];
@@ -23,6 +23,7 @@ typedef struct BenchScene {
     Base base;
     size_t count; // samples
     double *block;
+    Workspace workspace;
 } BenchScene;
 
 // False, and a line printed, if it cannot be made. Cleared by bench_close, also after that.

@@ -35,7 +35,7 @@ int main(int count, char **arguments) {
     Spectrum spectrum;
     fourier_start();
     const Status status = spectrum_welch(&series, &unit, strtod(arguments[5], NULL), &settings,
-                                         NULL, &spectrum, &problem);
+                                         NULL, NULL, &spectrum, &problem);
     bool is_written = false;
     if (status == STATUS_OK)
         is_written = doubles_write(spectrum.frequency, spectrum.densities.rows) &&

@@ -191,7 +191,7 @@ Outcome *drawn_run(const ReferenceScene *scene, bool has_channels) {
     Outcome *outcome = NULL;
     problem_clear(&problem);
     if (simulation_complete(&simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_run(&simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        simulation_run(&simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         printf("  refused: %s %s %s\n", problem.detail,
                problem.count > 0 ? problem.faults[0].pointer : "",
                problem.count > 0 ? problem.faults[0].detail : "");

@@ -28,7 +28,7 @@ static Outcome *run(Simulation *simulation) {
     paper_no_psd(simulation);
     problem_clear(&problem);
     if (simulation_complete(simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_run(simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     simulation_clear(simulation);
     return outcome;

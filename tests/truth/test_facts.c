@@ -26,7 +26,7 @@ static Outcome *run(Simulation *simulation) {
     Outcome *outcome = NULL;
     problem_clear(&problem);
     if (simulation_complete(simulation, NULL, &warnings, &problem) != STATUS_OK ||
-        simulation_run(simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].pointer : "");
     warnings_clear(&warnings);
     simulation_clear(simulation);

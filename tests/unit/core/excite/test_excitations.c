@@ -12,7 +12,7 @@
 #include "tests/support/fields.h"
 
 static Problem problem;
-static const Span span = {10, 1000, 0};
+static const Span span = {.duration = 10, .sample_rate = 1000};
 
 static Excitation *excitation_new(const char *name) {
     const Kind *kind = kind_find(&excitation_kinds, name);

@@ -166,7 +166,7 @@ static void the_density_is_flat_within_the_band_and_nothing_outside(void **state
         .segment = 2048, .overlap = 1024, .window = WINDOW_BLACKMAN, .detrend = DETREND_NONE};
     const char *unit = "(m/s^2)^2/Hz";
     Spectrum spectrum;
-    assert_int_equal(spectrum_welch(&series, &unit, 100, &settings, NULL, &spectrum, NULL),
+    assert_int_equal(spectrum_welch(&series, &unit, 100, &settings, NULL, NULL, &spectrum, NULL),
                      STATUS_OK);
     const double *density = spectrum.densities.at[0].values, asked = rms * rms / 10;
     double sums[10] = {0}, counts[10] = {0}, below = 0, above = 0;

@@ -116,6 +116,28 @@ static void what_cannot_be_transformed_is_null(void **state) {
     fourier_free(NULL);
 }
 
+static void a_stock_hands_out_what_was_put_into_it(void **state) {
+    (void)state;
+    FourierStock stock = {0};
+    Fourier *first = fourier_take(&stock, 64, FOURIER_FORWARD);
+    assert_non_null(first);
+    fourier_put(&stock, first);
+    Fourier *other = fourier_take(&stock, 64, FOURIER_BACKWARD);
+    assert_non_null(other);
+    assert_ptr_not_equal(other, first);
+    assert_ptr_equal(fourier_take(&stock, 64, FOURIER_FORWARD), first);
+    fourier_put(&stock, first);
+    fourier_put(&stock, other);
+    // More than it keeps: the oldest goes, the newest stay.
+    for (size_t i = 0; i < FOURIER_KEPT - 1; i++)
+        fourier_put(&stock, fourier_new(128 + i, FOURIER_FORWARD));
+    assert_ptr_equal(fourier_take(&stock, 64, FOURIER_BACKWARD), other);
+    fourier_put(NULL, other);
+    fourier_put(&stock, NULL);
+    fourier_stock_clear(&stock);
+    assert_null(stock.at[0]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(forward_is_the_sum_with_a_negative_exponent),
@@ -123,6 +145,7 @@ int main(void) {
         cmocka_unit_test(a_transform_has_the_same_bits_whatever_was_planned_before),
         cmocka_unit_test(several_threads_may_plan_at_once),
         cmocka_unit_test(what_cannot_be_transformed_is_null),
+        cmocka_unit_test(a_stock_hands_out_what_was_put_into_it),
     };
     fourier_start();
     return cmocka_run_group_tests(tests, NULL, NULL);

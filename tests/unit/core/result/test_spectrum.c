@@ -34,7 +34,7 @@ static Columns columns_of(size_t rows) {
 
 static Spectrum welch(const Columns *columns, SpectrumSettings settings, double rate) {
     Spectrum spectrum;
-    assert_int_equal(spectrum_welch(columns, unit, rate, &settings, NULL, &spectrum, NULL),
+    assert_int_equal(spectrum_welch(columns, unit, rate, &settings, NULL, NULL, &spectrum, NULL),
                      STATUS_OK);
     return spectrum;
 }
@@ -189,7 +189,7 @@ static void settings_that_make_no_sense_are_refused(void **state) {
     Columns columns = columns_of(10);
     for (size_t i = 0; i < COUNT(bad); i++) {
         Spectrum spectrum;
-        assert_int_equal(spectrum_welch(&columns, unit, 1, &bad[i], NULL, &spectrum, NULL),
+        assert_int_equal(spectrum_welch(&columns, unit, 1, &bad[i], NULL, NULL, &spectrum, NULL),
                          STATUS_INVALID);
         assert_null(spectrum.frequency);
         assert_int_equal(spectrum.densities.count, 0);
@@ -217,13 +217,14 @@ static void the_watch_sees_progress_and_can_stop(void **state) {
     Spectrum spectrum;
     Looks looks = {.most = 1000};
     const Watch watch = {&looks, look};
-    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &watch, &spectrum, NULL),
+    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &watch, NULL, &spectrum, NULL),
                      STATUS_OK);
     assert_true(looks.count > 10 && looks.last > 0.9);
     spectrum_clear(&spectrum);
     looks = (Looks){.most = 3};
-    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &watch, &spectrum, &problem),
-                     STATUS_CANCELLED);
+    assert_int_equal(
+        spectrum_welch(&columns, unit, 1, &settings, &watch, NULL, &spectrum, &problem),
+        STATUS_CANCELLED);
     assert_int_equal(looks.count, 3);
     assert_null(spectrum.frequency);
     columns_clear(&columns);

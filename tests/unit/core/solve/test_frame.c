@@ -75,7 +75,8 @@ static const Base still = {.form = BASE_STILL};
 // A completed scene's plan and base.
 static void prepare(Simulation *simulation, Plan **plan, Base *base) {
     const Excitation *excitation = scene_excitation(&simulation->scene);
-    const Span span = {simulation->scene.duration, simulation->scene.sample_rate, 0};
+    const Span span = {.duration = simulation->scene.duration,
+                       .sample_rate = simulation->scene.sample_rate};
     assert_int_equal(simulation_complete(simulation, NULL, NULL, NULL), STATUS_OK);
     assert_int_equal(plan_new(&simulation->scene, "exact", "exact", plan, NULL), STATUS_OK);
     assert_int_equal(excitation_kind(excitation)->make(excitation, &span, NULL, base, NULL),

@@ -169,7 +169,7 @@ static Outcome *outcome_of(Simulation *simulation) {
     paper_channels(simulation, wanted, COUNT(wanted));
     paper_no_psd(simulation);
     if (simulation_complete(simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_run(simulation, NULL, NULL, &outcome, &problem) != STATUS_OK)
+        simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     simulation_clear(simulation);
     return outcome;

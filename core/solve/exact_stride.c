@@ -1,0 +1,235 @@
+// A stride: blocks of flight, a stop, its contact and the way back to a sample. Each step proves
+// that it misses nothing, or leaves state and ledger at its beginning for the arcs.
+#include "core/solve/exact_stride.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/solve/exact_events.h"
+#include "core/solve/exact_press.h"
+#include "core/solve/hop.h"
+
+enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
+
+static double largest(const double *values, size_t count) {
+    enum { SIDE_BY_SIDE = 16 };
+    double most[SIDE_BY_SIDE] = {0}, all = 0;
+    size_t i = 0;
+    for (; i + SIDE_BY_SIDE <= count; i += SIDE_BY_SIDE)
+        for (size_t j = 0; j < SIDE_BY_SIDE; j++) {
+            const double value = fabs(values[i + j]);
+            most[j] = value > most[j] ? value : most[j];
+        }
+    for (; i < count; i++)
+        all = fmax(all, fabs(values[i]));
+    for (size_t j = 0; j < SIDE_BY_SIDE; j++)
+        all = fmax(all, most[j]);
+    return all;
+}
+
+void exact_stride_start(Exact *exact) {
+    const Base *base = exact->run->base;
+    const size_t bytes = exact->plan->count * sizeof(double);
+    Stretch *stretch = &exact->stretch;
+    double *const *columns = exact->recorder.columns;
+    if (base->form != BASE_STILL && !(base->form == BASE_SAMPLED && exact->base.ratio == 1))
+        return;
+    lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
+    exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
+    for (int side = 0; side < 2 && exact->has_hops; side++) {
+        if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)
+            exact->pulses[1] = exact->pulses[0];
+        else if (exact->touching[side].contact_omega2 > 0)
+            pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+    }
+    if (base->form == BASE_SAMPLED)
+        stretch->base_most = largest(base->values, base->count);
+    memcpy(stretch->columns, columns, sizeof stretch->columns);
+    stretch->peaks = &exact->ledger.response->peaks;
+    stretch->left = stretch->right = INFINITY;
+    // What flight leaves alone: contacts write over it.
+    const bool has_damper = exact->plan->damper_count > 0;
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        const bool is_damper = i == CHANNEL_DAMPER_DISPLACEMENT || i == CHANNEL_DAMPER_VELOCITY;
+        if (columns[i] == NULL)
+            continue;
+        if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
+            i == CHANNEL_BASE_ACCELERATION || (is_damper && !has_damper)) {
+            memset(columns[i], 0, bytes);
+            stretch->columns[i] = NULL;
+        }
+    }
+    double *const column = columns[CHANNEL_BASE_ACCELERATION];
+    if (column != NULL && base->form == BASE_SAMPLED)
+        memcpy(column, base->values,
+               (base->count < exact->plan->count ? base->count : exact->plan->count) *
+                   sizeof *column);
+}
+
+// The base from the present sample on: how many intervals it goes on in one way, and its samples or
+// NULL where it is still.
+static size_t base_ahead(const Exact *exact, const double **values) {
+    const Base *base = exact->run->base;
+    *values = NULL;
+    if (base->form == BASE_STILL || exact->sample + 1 >= base->count)
+        return SIZE_MAX;
+    *values = base->values + exact->sample;
+    return base->count - 1 - exact->sample;
+}
+
+static size_t smaller(size_t a, size_t b) {
+    return a < b ? a : b;
+}
+
+// Whole intervals of flight.
+static size_t fly(Exact *exact, size_t most) {
+    Stretch *s = &exact->stretch;
+    const double *base;
+    most = smaller(most, base_ahead(exact, &base));
+    // The sample where statistics begin is not for blocks: much begins anew there.
+    if (exact->sample < exact->recorder.statistics_start)
+        most = smaller(most, exact->recorder.statistics_start - 1 - exact->sample);
+    if (exact->plan->damper_count > 0) {
+        s->left = exact_room(exact, SIDE_LEFT);
+        s->right = exact_room(exact, SIDE_RIGHT);
+        s->middle = exact_relative(exact) - exact->state.r;
+    }
+    const double z = exact->state.v + exact->state.w;
+    s->x = exact->state.x;
+    s->v = exact->state.v;
+    s->r = exact->state.r;
+    s->z = z;
+    const size_t count = lanes_fly(&exact->lanes, s, exact->sample, most, base);
+    if (count == 0)
+        return 0;
+    exact->state = (State){s->x, s->v, s->r, s->z - s->v};
+    const double gain = z - s->z;
+    exact->free_work += gain * (z - gain / 2);
+    exact->pending += count;
+    exact->sample += count;
+    exact->run->steps += (double)count;
+    exact->recorder.last_velocity = s->v;
+    if (exact->pending >= PENDING_MOST)
+        exact_stride_enter(exact);
+    return count;
+}
+
+static void take_hop(Exact *exact, const Hop *hop, double s) {
+    const ArcIntegrals integrals = hop_integrals(hop, &exact->state, s);
+    const Plan *plan = exact->plan;
+    ledger_work(&exact->ledger,
+                -plan->mass[0] * integrals.av - exact->damper->mass * (integrals.av + integrals.aw),
+                plan->damping[0] * integrals.vv);
+    recorder_base(&exact->recorder, integrals.a);
+    exact->state = hop_at(hop, s);
+    exact->run->steps++;
+}
+
+// |r''| in flight over the rest of an interval is not larger.
+static double push_most(const Exact *exact) {
+    return (exact->lanes.damping + exact->lanes.omega) *
+           (fabs(exact->state.v) + exact->lanes.omega * fabs(exact->state.x) +
+            exact->interval * exact->stretch.base_most);
+}
+
+// From a sample to the stop that is reached before the next; false where that is not clear.
+static bool reach(Exact *exact) {
+    enum { STEPS = 8 };
+    Slice slice;
+    Hop hop;
+    if (!base_cursor_interval(&exact->base, exact->sample, &slice))
+        return false;
+    hop_make(&hop, &exact->flying, &exact->state, &slice, exact->interval);
+    double slope;
+    const double end = hop_gap(&hop, 1, &slope);
+    const Side side = end > exact->state.r ? SIDE_RIGHT : SIDE_LEFT;
+    const double sign = exact_sign(side), room = exact_room(exact, side);
+    const double from = room - sign * exact->state.r, to = room - sign * end;
+    if (!(from > 0) || !(to < 0))
+        return false;
+    double s = from / (from - to), step = 1;
+    for (int i = 0; i < STEPS && fabs(step) > 1e-8; i++) {
+        const double gap = room - sign * hop_gap(&hop, s, &slope);
+        step = sign * gap / slope;
+        s += step;
+    }
+    // All the way r goes towards this stop, so that it is met once and the other not at all.
+    const double most = push_most(exact) * exact->interval * exact->interval;
+    if (!(fabs(step) <= 1e-8) || !(sign * slope > most) || !(s > 0) || !(s <= 1))
+        return false;
+    take_hop(exact, &hop, s);
+    exact->offset = s * exact->interval;
+    exact->events++;
+    exact->still_events = 0;
+    exact_touch(exact, side);
+    return true;
+}
+
+// In flight from a stop to the next sample.
+static bool depart(Exact *exact) {
+    const double length = exact->interval - exact->offset, sign = exact_sign((Side)exact->origin);
+    const double most = push_most(exact) * length, w = -sign * exact->state.w;
+    if (!(w > most) || !((w + most) * length < exact->damper->clearance) || length <= 0)
+        return false;
+    Slice slice;
+    Hop hop;
+    (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
+    hop_make(&hop, &exact->flying, &exact->state, &slice, length);
+    take_hop(exact, &hop, 1);
+    return true;
+}
+
+size_t exact_stride(Exact *exact, size_t most) {
+    if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
+        return 0;
+    size_t count = 0;
+    while (count < most) {
+        const size_t flown = fly(exact, most - count);
+        count += flown;
+        if (count == most || exact->plan->damper_count == 0)
+            break;
+        if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops ||
+            !reach(exact))
+            break;
+        if (exact->phase == CONTACT)
+            count += exact_press(exact, most - count);
+        if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||
+            !depart(exact))
+            break;
+        exact_stride_pass(exact);
+        count++;
+    }
+    return count;
+}
+
+void exact_stride_enter(Exact *exact) {
+    if (exact->pending == 0)
+        return;
+    const Plan *plan = exact->plan;
+    const Lanes *lanes = &exact->lanes;
+    double sums[LANE_SUMS], vv = 0, av = 0;
+    lanes_take_sums(&exact->stretch, sums);
+    for (int i = 0; i < LANE_SUMS; i++) {
+        vv += lanes->vv[i] * sums[i];
+        av += lanes->av[i] * sums[i];
+    }
+    ledger_work(&exact->ledger, -plan->mass[0] * av - exact->damper->mass * exact->free_work,
+                plan->damping[0] * vv);
+    if (exact->sample >= exact->recorder.statistics_start)
+        recorder_sums(&exact->recorder, exact->pending, sums[XX],
+                      lanes->damping * lanes->damping * sums[VV] +
+                          2 * lanes->damping * lanes->omega2 * sums[XV] +
+                          lanes->omega2 * lanes->omega2 * sums[XX]);
+    exact->free_work = 0;
+    exact->pending = 0;
+    if (exact->phase != FLIGHT) // a contact's work is entered at its end
+        return;
+    const EnergyState energy = exact_energy(exact);
+    ledger_balance(&exact->ledger, &energy);
+}
+
+void exact_stride_pass(Exact *exact) {
+    if (exact->sample + 1 == exact->recorder.statistics_start)
+        exact_stride_enter(exact);
+    exact_pass_sample(exact);
+}

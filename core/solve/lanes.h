@@ -1,0 +1,65 @@
+// Free flight from sample to sample, eight at once: all of them straight from the state before the
+// first, so that no sample waits for the one before. Not contacts and not parts of an interval:
+// where a stop may be reached it ends. Used by the exact solver.
+#ifndef CORE_SOLVE_LANES_H
+#define CORE_SOLVE_LANES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "core/result/channel.h"
+#include "core/result/response.h"
+#include "core/solve/arc.h"
+
+enum { LANES = 8 };
+
+// Sums over samples; with b the base at a sample and a at the one before.
+typedef enum LaneSum { XX, XV, VV, XB, XA, VB, VA, BB, AB, AA, LANE_SUMS } LaneSum;
+
+// What a stretch starts from and what it comes to.
+typedef struct Stretch {
+    double x, v, r;                 // as in State
+    double z;                       // velocity of the free mass relative to the base [m/s]
+    double left, right;             // r stays within (-left, right); INFINITY without a damper
+    double middle;                  // displacement of the free mass less x and r [m]
+    double base_most;               // |a_g| is not larger over the whole run [m/s^2]
+    double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
+    Peaks *peaks;
+    _Alignas(64) double sums[LANE_SUMS][LANES];
+} Stretch;
+
+// What the processor's vectors hold; the bytes are the same with all.
+typedef enum LanesWidth { LANES_PLAIN, LANES_AVX2, LANES_AVX512 } LanesWidth;
+
+typedef struct Lanes Lanes;
+typedef size_t LanesRun(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
+                        const double *base);
+
+// State i + 1 samples on: what x and v gain from (x, v), and from the base's samples.
+struct Lanes {
+    _Alignas(64) double x_x[LANES], x_v[LANES], v_x[LANES], v_v[LANES], time[LANES];
+    double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
+    double z_a[LANES + 1][LANES];        // displacement of the free mass
+    double speed_a[LANES + 1][LANES];    // its velocity
+    double interval;                     // [s]
+    double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
+    double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
+    LanesWidth width;
+    LanesRun *run; // NULL: the interval is too long for the structure
+};
+
+LanesWidth lanes_widest(void); // on this processor
+void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width);
+
+// Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
+// way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if
+// still.
+static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
+                               const double *base) {
+    return lanes->run(lanes, stretch, sample, count, base);
+}
+
+// The sums over all lanes, emptied.
+void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]);
+
+#endif

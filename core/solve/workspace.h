@@ -1,0 +1,15 @@
+// What a run needs and the next one can use again. Nothing of a result: the bytes of a run do not
+// depend on what its workspace served before. One per worker, used by one run at a time.
+#ifndef CORE_SOLVE_WORKSPACE_H
+#define CORE_SOLVE_WORKSPACE_H
+
+#include "core/math/fourier.h"
+
+// All zero is empty.
+typedef struct Workspace {
+    FourierStock transforms;
+} Workspace;
+
+void workspace_clear(Workspace *workspace);
+
+#endif

@@ -1,0 +1,162 @@
+// Eight samples at once against one arc after the other, and every width of vector against the
+// others.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/solve/lanes.h"
+
+enum { COUNT_MOST = 203 };
+static const double INTERVAL = 1e-3;
+
+typedef struct Flown {
+    Stretch stretch;
+    Peaks peaks;
+    double columns[CHANNEL_COUNT][COUNT_MOST + 1];
+    size_t count;
+} Flown;
+
+static Motion structure(double damping) {
+    Motion motion = {.omega2 = 640, .damping = damping, .share = 0.076};
+    motion.rate = fmax(sqrt(motion.omega2), damping);
+    return motion;
+}
+
+static void make_base(double *base) {
+    for (size_t i = 0; i <= COUNT_MOST + 1; i++)
+        base[i] = sin(0.07 * (double)i) + 0.3 * cos(1.1 * (double)(i * i % 17));
+}
+
+static void fly(const Lanes *lanes, const State *start, double room, const double *base,
+                Flown *flown) {
+    memset(flown, 0, sizeof *flown);
+    Stretch *s = &flown->stretch;
+    *s = (Stretch){.x = start->x,
+                   .v = start->v,
+                   .r = start->r,
+                   .z = start->v + start->w,
+                   .left = room,
+                   .right = room,
+                   .middle = 0.001,
+                   .base_most = base == NULL ? 0 : 1.4,
+                   .peaks = &flown->peaks};
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        if (i <= CHANNEL_DAMPER_VELOCITY)
+            s->columns[i] = flown->columns[i];
+    flown->count = lanes_fly(lanes, s, 0, COUNT_MOST, base);
+}
+
+static void lanes_agree_with_arcs(void **state) {
+    (void)state;
+    double base[COUNT_MOST + 2];
+    make_base(base);
+    for (int kind = 0; kind < 4; kind++) {
+        const bool is_still = kind % 2 == 0;
+        const Motion motion = structure(kind < 2 ? 0.8 : 0);
+        Lanes lanes;
+        lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+        assert_non_null(lanes.run);
+        const State start = {0.015, -0.1, 0.002, 0.03};
+        static Flown flown;
+        fly(&lanes, &start, 1, is_still ? NULL : base, &flown);
+        assert_int_equal(flown.count, COUNT_MOST);
+        State at = start;
+        double vv = 0, av = 0, sums[LANE_SUMS], got_vv = 0, got_av = 0, peak = 0;
+        for (size_t i = 0; i < COUNT_MOST; i++) {
+            const Slice slice = {is_still ? 0 : base[i],
+                                 is_still ? 0 : (base[i + 1] - base[i]) / INTERVAL, 0};
+            Arc arc;
+            arc_make(&arc, &motion, &at, &slice, INTERVAL);
+            const ArcIntegrals integrals = arc_integrals(&arc);
+            const double before = at.v;
+            vv += integrals.vv;
+            av += integrals.av;
+            at = arc_end(&arc);
+            const double push = motion.damping * at.v + motion.omega2 * at.x;
+            peak = fmax(peak, fabs(at.x + 0.001 + at.r));
+            assert_true(fabs(flown.columns[CHANNEL_DISPLACEMENT][i + 1] - at.x) < 1e-15);
+            assert_true(fabs(flown.columns[CHANNEL_VELOCITY][i + 1] - at.v) < 1e-14);
+            assert_true(fabs(flown.columns[CHANNEL_ACCELERATION][i + 1] + push) < 1e-12);
+            assert_true(fabs(flown.columns[CHANNEL_MEAN_ACCELERATION][i + 1] -
+                             (at.v - before + integrals.a) / INTERVAL) < 1e-11);
+            assert_true(fabs(flown.columns[CHANNEL_DAMPER_DISPLACEMENT][i + 1] -
+                             (at.x + 0.001 + at.r)) < 1e-15);
+            assert_true(fabs(flown.columns[CHANNEL_DAMPER_VELOCITY][i + 1] - (at.v + at.w)) <
+                        1e-14);
+        }
+        lanes_take_sums(&flown.stretch, sums);
+        for (int i = 0; i < LANE_SUMS; i++) {
+            got_vv += lanes.vv[i] * sums[i];
+            got_av += lanes.av[i] * sums[i];
+        }
+        assert_true(fabs(got_vv - vv) < 1e-14 * vv);
+        assert_true(fabs(got_av - av) < 1e-13 * (fabs(av) + vv));
+        assert_true(fabs(flown.peaks.damper_displacement - peak) < 1e-15);
+    }
+}
+
+static void no_width_of_vector_moves_a_bit(void **state) {
+    (void)state;
+    double base[COUNT_MOST + 2];
+    make_base(base);
+    const Motion motion = structure(0.8);
+    for (int kind = 0; kind < 4; kind++) {
+        const State start = {0.015, -0.1, 0.002, 0.03};
+        static Flown flown[3];
+        for (LanesWidth width = LANES_PLAIN; width <= lanes_widest(); width++) {
+            Lanes lanes;
+            lanes_make(&lanes, &motion, INTERVAL, width);
+            fly(&lanes, &start, kind < 2 ? 1 : 0.012, kind % 2 == 0 ? NULL : base, &flown[width]);
+            flown[width].stretch.peaks = NULL;
+            memset(flown[width].stretch.columns, 0, sizeof flown[width].stretch.columns);
+            assert_memory_equal(&flown[width], &flown[0], sizeof *flown);
+        }
+    }
+}
+
+static void lanes_end_before_a_stop(void **state) {
+    (void)state;
+    const Motion motion = structure(0.8);
+    Lanes lanes;
+    lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+    static Flown flown;
+    for (int step = 1; step < 100; step++) {
+        const double room = 0.0001 * step;
+        const State start = {0.015, 0, 0, 0};
+        fly(&lanes, &start, room, NULL, &flown);
+        // r = x(0) - x(t) until the stop is met.
+        State at = start;
+        const Slice still = {0, 0, 0};
+        size_t reached = 0;
+        for (; fabs(at.r) < room; reached++) {
+            Arc arc;
+            arc_make(&arc, &motion, &at, &still, INTERVAL);
+            at = arc_end(&arc);
+        }
+        assert_true(flown.count < reached);
+        assert_true(flown.count + 2 >= reached);
+    }
+}
+
+static void an_interval_too_long_for_the_structure_is_refused(void **state) {
+    (void)state;
+    const Motion motion = structure(0.8);
+    Lanes lanes;
+    lanes_make(&lanes, &motion, 0.02, lanes_widest());
+    assert_null(lanes.run);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lanes_agree_with_arcs),
+        cmocka_unit_test(no_width_of_vector_moves_a_bit),
+        cmocka_unit_test(lanes_end_before_a_stop),
+        cmocka_unit_test(an_interval_too_long_for_the_structure_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
