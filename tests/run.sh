@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Everything that can be checked: builds with gcc and clang, with address, undefined-behaviour and thread sanitizers,
-# unit and truth tests in each, contract and truth tests of the program. --quick: the release build only.
+# unit and truth tests in each (the core, which has no threads, not under the last), contract and truth tests of the
+# program. --quick: the release build only.
 # On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -44,7 +45,7 @@ for preset in "${presets[@]}"; do
     fi
     runner=()
     [ "$preset" != tsan ] || runner=("${still[@]}")
-    "${runner[@]}" ctest --preset "$preset" >"$log" 2>&1
+    "${runner[@]}" ctest --preset "$preset" -j "$(nproc)" >"$log" 2>&1
     # "100% tests passed, 0 tests failed out of 27"
     if read -r wrong all < <(sed -n 's/.*tests passed, \([0-9]*\) tests\{0,1\} failed out of \([0-9]*\).*/\1 \2/p' "$log"); then
         [ "$wrong" -eq 0 ] || cat "$log"

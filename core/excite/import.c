@@ -181,8 +181,7 @@ static Status choose_interval(const ImportRequest *request, const ImportHeader *
     (void)text_place(place, header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
     if (isnan(told) && isnan(request->interval))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must tell the interval of the samples; where it does not, it must be "
-                           "given");
+                           "must tell the interval of the samples, or interval must be given");
     if (!isnan(told) && !isnan(request->interval) &&
         !(fabs(told - request->interval) <= 1e-6 * told))
         return problem_add(problem, STATUS_UNREADABLE, place,
@@ -202,7 +201,7 @@ static Status choose_unit(const ImportRequest *request, const ImportHeader *head
     import->unit = header->unit;
     if (header->conflict_line != 0)
         return problem_add(problem, STATUS_UNREADABLE, text_place(place, header->conflict_line, 0),
-                           "tells another unit than line %zu, %s; it must be given",
+                           "tells another unit than line %zu, %s: unit must be given",
                            header->unit_line, import_unit_names[header->unit]);
     if (header->unit != CHOICE_ABSENT)
         return STATUS_OK;
@@ -210,9 +209,8 @@ static Status choose_unit(const ImportRequest *request, const ImportHeader *head
     import->unit = IMPORT_G;
     if (strncmp(import->layout, "at2", 3) == 0)
         return STATUS_OK;
-    return problem_add(
-        problem, STATUS_UNREADABLE, text_place(place, 1, 0),
-        "must tell the unit, g, m/s^2 or cm/s^2; where it does not, it must be given");
+    return problem_add(problem, STATUS_UNREADABLE, text_place(place, 1, 0),
+                       "must tell the unit, or unit must be given: g, m/s^2 or cm/s^2");
 }
 
 static Status convert(Numbers *numbers, const ImportHeader *header, Import *import,

@@ -139,9 +139,31 @@ static Status warn_excitation(const Scene *scene, Warnings *warnings) {
     return STATUS_OK;
 }
 
+static bool are_zero(const Reals *reals) {
+    for (size_t i = 0; i < reals->count; i++)
+        if (reals->at[i] != 0)
+            return false;
+    return true;
+}
+
+// The default excitation is free vibration from rest: a forgotten one would answer with zeros.
+static Status warn_rest(const Scene *scene, Warnings *warnings) {
+    const Excitation *excitation = scene_excitation(scene);
+    if (excitation_kind(excitation) != &excitation_free || !are_zero(&excitation->displacement) ||
+        !are_zero(&excitation->velocity))
+        return STATUS_OK;
+    for (size_t i = 0; i < scene->dampers.count; i++)
+        if (scene->dampers.at[i].velocity != 0)
+            return STATUS_OK;
+    return warnings_add(warnings, "/excitation",
+                        "is free vibration from rest: nothing will move; give an initial "
+                        "displacement or velocity, or a kind that shakes the base");
+}
+
 Status plausible_warn(const Simulation *simulation, Warnings *warnings) {
     const Scene *scene = &simulation->scene;
     TRY(warn_rows(simulation_fields, simulation, "", warnings));
+    TRY(warn_rest(scene, warnings));
     TRY(warn_times(scene, warnings));
     TRY(warn_excitation(scene, warnings));
     return warn_masses(scene, warnings);

@@ -95,10 +95,6 @@ State arc_end(const Arc *arc) {
     return (State){end.x + arc->x[0], end.v / arc->length, end.r + arc->r[0], end.w / arc->length};
 }
 
-double arc_base(const Arc *arc, double s) {
-    return root_value(arc->base, arc->degree, s);
-}
-
 double arc_integral(const double *c, size_t degree) {
     double sum = 0;
     for (size_t k = degree + 1; k-- > 0;)

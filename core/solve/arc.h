@@ -73,8 +73,7 @@ double arc_impulse(const Arc *arc);
 // Largest |n| over the arc [m/s^2] if it is above `least`, else `least`; *s is where, or untouched.
 double arc_peak_force(const Arc *arc, double least, double *s);
 
-// a_g and the state somewhere on it.
-double arc_base(const Arc *arc, double s);
+// The state somewhere on it.
 State arc_at(const Arc *arc, double s);
 
 double slice_at(const Slice *slice, double time);

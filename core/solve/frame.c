@@ -27,6 +27,9 @@ enum { NUDGE_SAMPLES = 16 };
 static const double NUDGE = 4 * DBL_EPSILON, POWER_NUDGE = 1e-12; // an integrated contact's error
 static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
 
+// An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
+static const double SHORTEST = 1e-250; // [s]
+
 static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
 
 typedef struct Engine {
@@ -193,7 +196,7 @@ static Status advance(Engine *engine, double length) {
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event);
     if (is_event)
-        frame_arc_cut(arc, frame, event.s);
+        frame_arc_cut(arc, frame, event.s * arc->length < SHORTEST ? 0 : event.s);
     if (arc->length > 0)
         pass(engine, is_event ? &event : NULL);
     if (is_event)

@@ -140,21 +140,17 @@ double frame_rate(const Frame *frame) {
 }
 
 // The inverse of `yield` among the dampers that rest, by Gauss and Jordan; it is positive definite.
-void frame_hold_make(Frame *frame) {
+static void invert_hold(Frame *frame) {
     const size_t n = frame->dampers;
     double *left = frame->scratch, *right = frame->hold;
-    frame->resting = 0;
     for (size_t i = 0; i < n; i++) {
-        const bool is_resting = frame->damper[i].phase == FRAME_RESTING;
-        frame->resting += is_resting;
+        const bool is_held = frame->damper[i].phase == FRAME_RESTING;
         for (size_t j = 0; j < n; j++) {
-            const bool is_pair = is_resting && frame->damper[j].phase == FRAME_RESTING;
-            left[i * n + j] = is_pair ? frame->yield[i * n + j] : i == j;
-            right[i * n + j] = is_resting && i == j;
+            const bool are_held = is_held && frame->damper[j].phase == FRAME_RESTING;
+            left[i * n + j] = are_held ? frame->yield[i * n + j] : i == j;
+            right[i * n + j] = is_held && i == j;
         }
     }
-    if (frame->resting == 0)
-        return;
     for (size_t k = 0; k < n; k++) {
         const double pivot = left[k * n + k];
         for (size_t j = 0; j < n; j++) {
@@ -171,6 +167,14 @@ void frame_hold_make(Frame *frame) {
             }
         }
     }
+}
+
+void frame_hold_make(Frame *frame) {
+    frame->resting = 0;
+    for (size_t d = 0; d < frame->dampers; d++)
+        frame->resting += frame->damper[d].phase == FRAME_RESTING;
+    if (frame->resting > 0)
+        invert_hold(frame);
 }
 
 // (M^-1)_jk from the modes; 0 where it is no more than rounding, lest a hit on one storey stir a

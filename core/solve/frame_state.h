@@ -44,6 +44,7 @@ typedef struct FrameDamper {
     double closing, parting, pressed;
     bool is_pressing, is_spent;
     double wanted;
+    bool is_held; // taken into `hold`
 } FrameDamper;
 
 // In modal coordinates, x = shapes q:
@@ -137,7 +138,8 @@ double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);
 
-// Makes `hold` anew: after every change of who rests.
+// Makes `hold` anew, the inverse of `yield` between those that rest: after every change of who
+// does.
 void frame_hold_make(Frame *frame);
 
 #endif

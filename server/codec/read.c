@@ -69,7 +69,7 @@ Status read_json(const char *text, size_t size, const Field *fields, void *item,
         return refuse_parse(problem, text, size, &error);
     Reader reader = {.problem = problem};
     if (json_is_object(root))
-        walk_object(&reader, root, fields, item, "", NULL);
+        walk_object(&reader, root, fields, item, "");
     else
         unreadable(problem, text, size, 0, "the document must be an object, is an array");
     const bool is_object = json_is_object(root);

@@ -11,6 +11,9 @@
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), KINDS_SHOWN = 64 };
 
+static void walk_members(Reader *reader, const json_t *object, const Field *fields, void *item,
+                         const char *pointer, const KindTable *kinds);
+
 static void read_count(Reader *reader, const json_t *value, const Field *field, uint64_t *target,
                        const char *pointer) {
     if (!json_is_number(value)) {
@@ -99,7 +102,7 @@ static void read_list(Reader *reader, const json_t *value, const Field *field, v
         pointer_index(place, sizeof place, pointer, i);
         const json_t *object = json_array_get(value, i);
         if (json_is_object(object))
-            walk_object(reader, object, field->fields, element, place, NULL);
+            walk_object(reader, object, field->fields, element, place);
         else
             refuse_type(reader, place, object, NULL, "an object");
     }
@@ -133,7 +136,7 @@ static void read_item(Reader *reader, const json_t *value, const Field *field, v
         read_text(reader, value, row, (char **)(void *)((char *)target + offset + row->offset),
                   pointer);
     } else {
-        walk_object(reader, value, field->fields, target, pointer, NULL);
+        walk_object(reader, value, field->fields, target, pointer);
     }
 }
 
@@ -180,8 +183,8 @@ static void read_variant(Reader *reader, const json_t *value, const Field *field
     variant_free(*target);
     *target = variant;
     Reader silent = {0};
-    walk_object(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
-                field->kinds->tag);
+    walk_members(is_known ? reader : &silent, value, variant->kind->fields, variant, pointer,
+                 field->kinds);
     if (silent.is_out_of_memory)
         read_no_memory(reader);
 }
@@ -234,19 +237,35 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
     }
 }
 
-// The nearest row's name, else the tag if that is near.
-static const char *nearest_key(const Field *fields, const char *tag, const char *key) {
+// Says which kinds have the key, where `own`, the default perhaps, has not.
+static void refuse_key(Reader *reader, const char *pointer, const json_t *value, const char *key,
+                       const Field *fields, const KindTable *kinds, const Kind *own) {
+    char others[sizeof((Fault){0}.detail)] = "";
+    size_t length = 0;
+    const Kind *kind;
+    for (size_t i = 0; kinds != NULL && (kind = kinds->at(i)) != NULL; i++)
+        if (length < sizeof others && fields_find(kind->fields, key, NULL) != NULL)
+            length += (size_t)snprintf(others + length, sizeof others - length, "%s%s",
+                                       length > 0 ? ", " : "", kind->name);
+    if (length > 0) {
+        refuse_value(reader, pointer, value, NULL, NULL,
+                     "unknown key of %s %s; it belongs to %s %s", kinds->tag, own->name, kinds->tag,
+                     others);
+        return;
+    }
     const char *meant = fields_nearest(fields, key);
-    return meant != NULL || tag == NULL ? meant
-                                        : texts_nearest((const char *const[]){tag, NULL}, key);
+    if (meant == NULL && kinds != NULL)
+        meant = texts_nearest((const char *const[]){kinds->tag, NULL}, key);
+    refuse_value(reader, pointer, value, NULL, meant, "unknown key");
 }
 
-void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer, const char *tag) {
+// `kinds`: those of a variant, which `item` then is and whose tag is passed over; else NULL.
+static void walk_members(Reader *reader, const json_t *object, const Field *fields, void *item,
+                         const char *pointer, const KindTable *kinds) {
     const char *key;
     json_t *value;
     json_object_foreach((json_t *)object, key, value) {
-        if (tag != NULL && strcmp(tag, key) == 0)
+        if (kinds != NULL && strcmp(kinds->tag, key) == 0)
             continue;
         size_t offset = 0;
         const Field *field = fields_find(fields, key, &offset);
@@ -255,8 +274,14 @@ void walk_object(Reader *reader, const json_t *object, const Field *fields, void
         char place[POINTER_SIZE];
         pointer_join(place, sizeof place, pointer, key);
         if (field == NULL)
-            refuse_value(reader, place, value, NULL, nearest_key(fields, tag, key), "unknown key");
+            refuse_key(reader, place, value, key, fields, kinds,
+                       kinds != NULL ? ((const Variant *)item)->kind : NULL);
         else
             read_value(reader, value, field, (char *)item + offset + field->offset, place);
     }
+}
+
+void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
+                 const char *pointer) {
+    walk_members(reader, object, fields, item, pointer, NULL);
 }

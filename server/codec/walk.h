@@ -7,8 +7,8 @@
 #include "server/codec/refuse.h"
 
 // Reads the members of `object` into `item`, which has its defaults, adding what is wrong below
-// `pointer`. Keys equal to `tag` are passed over; it may be NULL.
+// `pointer`.
 void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
-                 const char *pointer, const char *tag);
+                 const char *pointer);
 
 #endif

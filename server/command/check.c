@@ -72,7 +72,7 @@ static void modes_print(const PlanModes *modes) {
 static void plan_print(const char *path, const DryRun *run) {
     const Scene *scene = &run->simulation.scene;
     char duration[32], rate[32];
-    printf("%s is a good scene.\n\n", path);
+    printf("%s is a good scene.\n\n", scene_file_name(path));
     if (run->simulation.title != NULL)
         printf("Title: %s\n", run->simulation.title);
     printf("Result: %s\n", run->result);

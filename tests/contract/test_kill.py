@@ -14,7 +14,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 JOBS, ROUNDS = 200, 10
-RUN = 0.05  # [s] of CPU a job
+RUN = 0.02  # [s] of CPU a job
 
 
 def long_scene(number, duration):

@@ -1,5 +1,6 @@
 #include "tests/support/paper.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -71,4 +72,17 @@ void paper_channels(Simulation *simulation, const char *const *names, size_t cou
 
 void paper_no_psd(Simulation *simulation) {
     texts_free(&simulation->output.psd.channels);
+}
+
+double paper_distance(const Outcome *a, const Outcome *b, double from, double to) {
+    const double *p = a->spectrum.densities.at[0].values, *q = b->spectrum.densities.at[0].values;
+    double sum = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < a->spectrum.densities.rows; i++)
+        if (a->spectrum.frequency[i] >= from && a->spectrum.frequency[i] <= to) {
+            const double level = 10 * log10(p[i] / q[i]);
+            sum += level * level;
+            count++;
+        }
+    return sqrt(sum / (double)count);
 }

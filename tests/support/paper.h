@@ -23,4 +23,7 @@ void paper_model(Simulation *simulation, const char *model);
 void paper_channels(Simulation *simulation, const char *const *names, size_t count);
 void paper_no_psd(Simulation *simulation);
 
+// Rms distance of two outcomes' first spectra over a band [dB].
+double paper_distance(const Outcome *a, const Outcome *b, double from, double to);
+
 #endif

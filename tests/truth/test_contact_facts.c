@@ -259,20 +259,6 @@ static void parameters_are_as_sensitive_as_published(void **state) {
         assert_true(fabs(found[i] / (2 * small) - wanted[i]) < 1e-8);
 }
 
-// Rms distance of two spectra in dB over a band.
-static double distance(const Outcome *a, const Outcome *b, double from, double to) {
-    const double *p = a->spectrum.densities.at[0].values, *q = b->spectrum.densities.at[0].values;
-    double sum = 0;
-    size_t count = 0;
-    for (size_t i = 0; i < a->spectrum.densities.rows; i++)
-        if (a->spectrum.frequency[i] >= from && a->spectrum.frequency[i] <= to) {
-            const double level = 10 * log10(p[i] / q[i]);
-            sum += level * level;
-            count++;
-        }
-    return sqrt(sum / (double)count);
-}
-
 // Point samples of the acceleration catch stiff spikes at random and hide that the models agree.
 static void point_samples_of_the_acceleration_tell_less_than_means(void **state) {
     (void)state;
@@ -296,8 +282,8 @@ static void point_samples_of_the_acceleration_tell_less_than_means(void **state)
             paper_channels(&simulation, names, 1);
             outcomes[j] = run(&simulation);
         }
-        const double low = distance(outcomes[0], outcomes[1], 0.5, 15),
-                     high = distance(outcomes[0], outcomes[1], 15, 100);
+        const double low = paper_distance(outcomes[0], outcomes[1], 0.5, 15),
+                     high = paper_distance(outcomes[0], outcomes[1], 15, 100);
         printf("%s: %.1f / %.1f dB\n", cases[i].buffer->name, low, high);
         assert_true(fabs(low - cases[i].low) < 0.1 && fabs(high - cases[i].high) < 0.1);
         outcome_drop(outcomes[0]);

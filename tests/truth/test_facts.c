@@ -223,20 +223,6 @@ static void the_masri_caughey_orbit_is_reached_and_kept(void **state) {
     outcome_drop(outcome);
 }
 
-// Rms distance of two spectra in dB over a band.
-static double distance(const Outcome *a, const Outcome *b, double from, double to) {
-    const double *p = a->spectrum.densities.at[0].values, *q = b->spectrum.densities.at[0].values;
-    double sum = 0;
-    size_t count = 0;
-    for (size_t i = 0; i < a->spectrum.densities.rows; i++)
-        if (a->spectrum.frequency[i] >= from && a->spectrum.frequency[i] <= to) {
-            const double level = 10 * log10(p[i] / q[i]);
-            sum += level * level;
-            count++;
-        }
-    return sqrt(sum / (double)count);
-}
-
 static void model_distance(const PaperBuffer *buffer, bool is_random, double out[2]) {
     Outcome *outcomes[2];
     for (int i = 0; i < 2; i++) {
@@ -247,8 +233,8 @@ static void model_distance(const PaperBuffer *buffer, bool is_random, double out
         paper_model(&simulation, i == 0 ? "spring_damper" : "impulse");
         outcomes[i] = run(&simulation);
     }
-    out[0] = distance(outcomes[0], outcomes[1], 0.5, 15);
-    out[1] = distance(outcomes[0], outcomes[1], 15, 100);
+    out[0] = paper_distance(outcomes[0], outcomes[1], 0.5, 15);
+    out[1] = paper_distance(outcomes[0], outcomes[1], 15, 100);
     outcome_drop(outcomes[0]);
     outcome_drop(outcomes[1]);
 }

@@ -158,7 +158,7 @@ static void units_are_found_or_must_be_given(void **state) {
     }
     check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}), "columns", 3, 1, 0.03);
     check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, IMPORT_METRES}), "columns", 3, 1, 3);
-    bad("1\n2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}, "line 1", "must tell the unit, g, m/s^2");
+    bad("1\n2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}, "line 1", "must tell the unit, or unit must be given: g, m/s^2");
     bad("units (g)\nor m/s^2\nNPTS=2, DT=1\n1 2", &nothing, "line 2",
         "tells another unit than line 1, g");
     bad("VELOCITY TIME HISTORY IN UNITS OF CM/SEC\nNPTS=2, DT=1\n1 2", &nothing, "line 1",

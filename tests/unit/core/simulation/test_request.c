@@ -413,6 +413,25 @@ static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) 
     simulation_clear(&simulation);
 }
 
+static void a_scene_in_which_nothing_moves_gets_a_warning(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_start(&simulation, 0, 0);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_begins(warning_at("/excitation"), "is free vibration from rest: nothing will move");
+    assert_int_equal(warnings.count, 1);
+    forget_warnings();
+    scene_start(&simulation, 0, 0.1);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(warnings.count, 0);
+    scene_start(&simulation, 0, 0);
+    damper_of(&simulation)->velocity = 0.1;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(warnings.count, 0);
+    simulation_clear(&simulation);
+}
+
 static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) {
     (void)state;
     Simulation simulation;
@@ -455,6 +474,7 @@ int main(void) {
         cmocka_unit_test(titles_and_labels_have_their_limits),
         cmocka_unit_test(sixty_four_dampers_are_the_most),
         cmocka_unit_test(implausible_values_get_a_warning_each),
+        cmocka_unit_test(a_scene_in_which_nothing_moves_gets_a_warning),
         cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),
         cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
         cmocka_unit_test(accuracy_is_chosen_by_its_solver),

@@ -325,6 +325,24 @@ static void peaks_and_sums_are_the_largest_storeys(void **state) {
     plan_free(plan);
 }
 
+// Each is let go and taken by its other stop, one after the other at one instant.
+static void many_held_masses_change_stops_together(void **state) {
+    (void)state;
+    enum { HELD = 40 };
+    const double mass = 1, stiffness = 42000, damping = 0;
+    Plan *plan = frames_new(1, HELD + 1, 0.6, 1000);
+    frames_shear(plan, &mass, &stiffness, &damping);
+    for (size_t d = 0; d <= HELD; d++)
+        frames_damper(plan, d, 0, 1, d < HELD ? 0 : 0.01, d < HELD ? 0.5 : 0.9, NAN);
+    const Base base = {.form = BASE_SINE, .amplitude = 10, .omega = 8 * acos(-1)};
+    Run with = {.plan = plan, .base = &base};
+    Response response = {0};
+    assert_int_equal(frame_run(&with, &response, NULL), STATUS_OK);
+    assert_true(response.energy.residual < 1e-11);
+    response_clear(&response);
+    plan_free(plan);
+}
+
 static bool stop(void *context, double fraction) {
     (void)fraction;
     return ++*(int *)context < 3;
@@ -401,6 +419,7 @@ int main(void) {
         cmocka_unit_test(momentum_is_kept_by_everything_that_collides),
         cmocka_unit_test(peaks_and_sums_are_the_largest_storeys),
         cmocka_unit_test(a_short_pulse_costs_what_a_long_one_does),
+        cmocka_unit_test(many_held_masses_change_stops_together),
         cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -200,6 +200,39 @@ static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
     }
 }
 
+// Where all masses are heavy beside what they stand on, each impulse acts on every other one.
+static void many_heavy_masses_on_one_storey_meet_their_conditions(void **state) {
+    (void)state;
+    enum { MANY = 64 };
+    const double mass = 1, stiffness = 100, damping = 0;
+    for (int i = 0; i < 100; i++) {
+        Bench bench = {.plan = frames_new(1, MANY, 1, 100)};
+        frames_shear(bench.plan, &mass, &stiffness, &damping);
+        for (size_t d = 0; d < MANY; d++)
+            frames_damper(bench.plan, d, 0, uniform(0.5, 1) * pow(10, i % 5), 0.1, 0.5, NAN);
+        start(&bench);
+        Frame *frame = &bench.frame;
+        for (size_t d = 0; d < MANY; d++)
+            hit(frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT,
+                uniform(0, 1) < 0.4 ? 0 : uniform(0, 5), uniform(0, 1));
+        frame_collide(frame);
+        size_t pressed = 0;
+        double impulse = 0, size = 0;
+        for (size_t d = 0; d < MANY; d++) {
+            const FrameDamper *damper = &frame->damper[d];
+            assert_true(damper->pressed >= 0);
+            assert_true(-frame_sign(damper->side) * damper->w >= damper->parting - 1e-8);
+            pressed += damper->pressed > 0;
+            impulse += frame_sign(damper->side) * damper->pressed;
+            size += damper->pressed;
+        }
+        assert_true(pressed > 0 && pressed < MANY);
+        // All that the storey gets.
+        assert_true(fabs(frame->p[0] * frame->damper[0].shape[0] - impulse) < 1e-12 * size);
+        clear(&bench);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_mass_takes_its_effective_mass),
@@ -208,6 +241,7 @@ int main(void) {
         cmocka_unit_test(a_hit_is_felt_on_other_storeys_through_the_mass_matrix),
         cmocka_unit_test(random_collisions_meet_their_conditions),
         cmocka_unit_test(masses_heavier_than_their_storeys_are_no_worse),
+        cmocka_unit_test(many_heavy_masses_on_one_storey_meet_their_conditions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

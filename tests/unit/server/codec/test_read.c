@@ -196,6 +196,8 @@ static void unknown_names_come_with_the_nearest(void **state) {
     check_fault("{\"shape\": {\"shape\": \"xyz\", \"whatever\": 1}}", "/shape/shape", "\"xyz\"",
                 "must be one of round, square, is \"xyz\"");
     check_fault("{\"mas\": 1}", "/mas", "1", "unknown key");
+    check_fault("{\"shape\": {\"sides\": [1]}}", "/shape/sides", "",
+                "unknown key of shape round; it belongs to shape square");
     static const struct {
         const char *text, *pointer, *meant;
     } cases[] = {
@@ -208,6 +210,7 @@ static void unknown_names_come_with_the_nearest(void **state) {
         {"{\"shape\": {\"shap\": \"square\"}}", "/shape/shap", "shape"},
         {"{\"shape\": {\"radus\": 1}}", "/shape/radus", "radius"},
         {"{\"shape\": {\"shape\": \"square\", \"radus\": 1}}", "/shape/radus", ""},
+        {"{\"shape\": {\"shape\": \"square\", \"radius\": 1}}", "/shape/radius", ""},
         {"{\"~/\\\"\": 1}", "/~0~1\"", ""},
         {"{\"\": 1}", "/", ""},
     };
