@@ -7,6 +7,7 @@
 #include "core/solve/cursor.h"
 #include "core/solve/flight.h"
 #include "core/solve/hold.h"
+#include "core/solve/hop.h"
 #include "core/solve/lanes.h"
 #include "core/solve/ledger.h"
 #include "core/solve/pulse.h"
@@ -26,7 +27,8 @@ typedef struct Exact {
     Flight flight;
     Lanes lanes;
     Stretch stretch;
-    Pulse pulses[2];  // by Side
+    Pulse pulses[2]; // by Side
+    HopTable hops;
     bool has_hops;    // intervals are short enough for hop.h
     size_t pending;   // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]

@@ -31,6 +31,8 @@ typedef struct Pulse {
     PulseForm vv, ww;                 // integrals of the squares of v and w, less their constants'
     double sigma[2], omega[2];        // of the oscillations [1/s], [rad/s]
     double size2[2];                  // |lambda|^2
+    double rate;                      // the larger |lambda|
+    double unit, per_unit;            // of the table [s], [1/s]
     double time;                      // T_c of an isolated contact [s]
     double peak_time;                 // of its largest force
     double contact_omega;             // pi / T_c [rad/s]
@@ -53,6 +55,22 @@ static inline void pulse_multiply(const double turn[4], const double d[4], doubl
     out[1] = im1;
     out[2] = re2;
     out[3] = im2;
+}
+
+// Amplitudes a little later; |lambda time| is at most PULSE_NEAR.
+#define PULSE_NEAR 1e-3
+static inline void pulse_nudge(const Pulse *pulse, double time, double d[4]) {
+    for (int i = 0; i < 2; i++) {
+        const double s = pulse->sigma[i] * time, w = pulse->omega[i] * time;
+        const double s2 = s * s, w2 = w * w;
+        const double size = s + s2 * ((1.0 / 2 + s * (1.0 / 6)) + s2 * (1.0 / 24)); // less 1
+        const double cosine = w2 * (1.0 / 2 - w2 * (1.0 / 24));                     // 1 less it
+        const double sine = w - w * w2 * (1.0 / 6 - w2 * (1.0 / 120));
+        const double re = size - (cosine + size * cosine), im = sine + size * sine; // less 1
+        const double x = d[2 * i], y = d[2 * i + 1];
+        d[2 * i] = x + (re * x - im * y);
+        d[2 * i + 1] = y + (re * y + im * x);
+    }
 }
 
 static inline double pulse_dot(const double row[4], const double d[4]) {
