@@ -106,11 +106,14 @@ static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
     for (int mode = 0; mode < 2; mode++) {
         const Complex step = power_of_e(l[mode] * (long double)pulse->time / PULSE_TABLE_UNIT);
         const Complex whole = power_of_e(l[mode] * interval);
+        const Complex peak = power_of_e(l[mode] * pulse->peak_time);
         Complex power = 1;
         for (int i = 0; i <= PULSE_TABLE; i++, power *= step) {
             pulse->table[i][2 * mode] = (double)creall(power);
             pulse->table[i][2 * mode + 1] = (double)cimagl(power);
         }
+        pulse->peak[2 * mode] = (double)creall(peak);
+        pulse->peak[2 * mode + 1] = (double)cimagl(peak);
         pulse->interval[2 * mode] = (double)creall(whole);
         pulse->interval[2 * mode + 1] = (double)cimagl(whole);
     }
@@ -220,6 +223,10 @@ void pulse_turn(const Pulse *pulse, double time, double turn[4]) {
     }
     const int place = (int)(time * pulse->per_unit + 0.5);
     const double rest = time - place * unit;
+    if (rest == 0 || time == pulse->peak_time) { // where a search begins: T_c is a place too
+        memcpy(turn, rest == 0 ? pulse->table[place] : pulse->peak, 4 * sizeof *turn);
+        return;
+    }
     double small[4];
     for (int i = 0; i < 2; i++) {
         // |lambda rest| is at most 0.2: these are right to rounding. In pairs, not by Horner: here

@@ -39,6 +39,7 @@ typedef struct Pulse {
     double growth;                    // e^(c T_c / (2 m_e))
     double damping;                   // c / m_e
     double table[PULSE_TABLE + 1][4]; // the oscillations over i / PULSE_TABLE_UNIT of T_c
+    double peak[4];                   // over peak_time
     double interval[4];               // and over a sample interval
 } Pulse;
 
