@@ -112,6 +112,15 @@ static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
             pulse->table[i][2 * mode] = (double)creall(power);
             pulse->table[i][2 * mode + 1] = (double)cimagl(power);
         }
+        const Complex jump = complex_of(pulse->jump[2 * mode], pulse->jump[2 * mode + 1]);
+        power = 1;
+        for (int i = 0; i < PULSE_RIDE; i++) {
+            pulse->jumps[2 * mode][PULSE_RIDE + i] = (double)creall(power * jump);
+            pulse->jumps[2 * mode + 1][PULSE_RIDE + i] = (double)cimagl(power * jump);
+            power *= whole;
+            pulse->ride[2 * mode][i] = (double)creall(power);
+            pulse->ride[2 * mode + 1][i] = (double)cimagl(power);
+        }
         pulse->peak[2 * mode] = (double)creall(peak);
         pulse->peak[2 * mode + 1] = (double)cimagl(peak);
         pulse->interval[2 * mode] = (double)creall(whole);

@@ -6,7 +6,7 @@
 
 #include "core/solve/arc.h"
 
-enum { PULSE_TABLE = 40, PULSE_TABLE_UNIT = 16 };
+enum { PULSE_TABLE = 40, PULSE_TABLE_UNIT = 16, PULSE_RIDE = 8 };
 
 // Two complex amplitudes d, slow and fast, each as two reals; what can be seen is row . (d, a, s)
 // with the base's a_g = a and slope s at that time.
@@ -41,6 +41,8 @@ typedef struct Pulse {
     double table[PULSE_TABLE + 1][4]; // the oscillations over i / PULSE_TABLE_UNIT of T_c
     double peak[4];                   // over peak_time
     double interval[4];               // and over a sample interval
+    double ride[4][PULSE_RIDE];       // and over 1 to PULSE_RIDE of them
+    double jumps[4][2 * PULSE_RIDE];  // what jump comes to after as many: from the middle on
 } Pulse;
 
 void pulse_make(Pulse *pulse, const Motion *touching, double interval);
