@@ -33,6 +33,12 @@ void exact_end_phase(Exact *exact) {
         trust_rest(&exact->trust, time, &exact->state, largest);
 }
 
+// Only the force has changed.
+static void note_force(Exact *exact) {
+    ledger_acceleration(&exact->ledger,
+                        exact_force(exact) / exact->plan->mass[0] - exact_push(exact));
+}
+
 static void begin_contact(Exact *exact, Side side) {
     exact->phase = CONTACT;
     exact->contact_arcs = 0;
@@ -85,9 +91,12 @@ void exact_touch(Exact *exact, Side side) {
     exact->is_leaving = false;
     exact_note(exact);
     exact_end_phase(exact);
-    if (exact->plan->form == CONTACT_LINEAR)
+    if (exact->plan->form == CONTACT_LINEAR) {
         begin_contact(exact, side);
-    else if (exact->damper->clearance == 0)
+        note_force(exact);
+        return;
+    }
+    if (exact->damper->clearance == 0)
         begin_rest(exact, side);
     else
         bounce(exact, side);
@@ -108,7 +117,7 @@ void exact_release(Exact *exact) {
     exact->phase = FLIGHT;
     if (is_held) // between stops without clearance the other one takes over
         begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
-    exact_note(exact);
+    note_force(exact);
 }
 
 // Finds the first event on the arc. In flight `side` is the stop that is reached.
