@@ -18,8 +18,9 @@ void exact_pass_sample(Exact *exact) {
     const Moment at = exact_moment(exact);
     if (exact->sample == exact->recorder.statistics_start)
         ledger_forget_peaks(&exact->ledger, &at);
+    const bool is_base_wanted = exact->recorder.columns[CHANNEL_BASE_ACCELERATION] != NULL;
     recorder_take(&exact->recorder, exact->sample, &at,
-                  base_cursor_at(&exact->base, exact->sample));
+                  is_base_wanted ? base_cursor_at(&exact->base, exact->sample) : 0);
     ledger_peaks(&exact->ledger, &at);
 }
 
@@ -110,7 +111,7 @@ void exact_release(Exact *exact) {
     const double sign = exact_sign(exact->side);
     exact->is_leaving = exact->phase == RESTING;
     exact->state.r = 0;
-    exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
+    exact->state.w = exact->is_leaving ? 0 : (sign * exact->state.w < 0 ? exact->state.w : 0);
     ledger_close(&exact->ledger, &exact->row, exact_time(exact),
                  exact->phase == RESTING ? NAN : fabs(exact->state.w));
     const bool is_held = exact->phase == RESTING && exact->damper->clearance == 0;
