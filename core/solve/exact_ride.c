@@ -22,14 +22,14 @@ typedef struct Ride {
 } Ride;
 
 INLINE double largest(const double *values, double least) {
-    double half[RIDE / 2];
+    double most[RIDE / 2];
     for (size_t j = 0; j < RIDE / 2; j++) {
         const double a = fabs(values[j]), b = fabs(values[j + RIDE / 2]);
-        half[j] = a > b ? a : b;
+        most[j] = a > b ? a : b;
     }
-    for (size_t j = 0; j < RIDE / 2; j++)
-        least = half[j] > least ? half[j] : least;
-    return least;
+    const double a = most[0] > most[1] ? most[0] : most[1];
+    const double b = most[2] > most[3] ? most[2] : most[3], all = a > b ? a : b;
+    return all > least ? all : least;
 }
 
 // All eight straight from the beginning: what each jump of the base's slope leaves is the same, but
@@ -51,6 +51,7 @@ INLINE void turn(const Press *press, Ride *ride, const double *base) {
     }
     ride->a[0] = press->a;
     ride->s[0] = press->slope;
+    double lane[4][RIDE];
     for (int i = 0; i < 4; i += 2) {
         Eight re = LOAD(p->ride[i]) * d[i] - LOAD(p->ride[i + 1]) * d[i + 1];
         Eight im = LOAD(p->ride[i]) * d[i + 1] + LOAD(p->ride[i + 1]) * d[i];
@@ -62,12 +63,16 @@ INLINE void turn(const Press *press, Ride *ride, const double *base) {
         ride->d[i + 1][0] = d[i + 1];
         STORE(ride->d[i] + 1, re);
         STORE(ride->d[i + 1] + 1, im);
+        STORE(lane[i], re);
+        STORE(lane[i + 1], im);
     }
+    // Taken from what is at hand: a load across the stores above would wait for them.
     double bend[RIDE];
     for (int j = 0; j < RIDE; j++)
-        bend[j] = p->size2[0] * (fabs(ride->d[0][j]) + fabs(ride->d[1][j])) +
-                  p->size2[1] * (fabs(ride->d[2][j]) + fabs(ride->d[3][j]));
-    ride->bend = largest(bend, 0);
+        bend[j] = p->size2[0] * (fabs(lane[0][j]) + fabs(lane[1][j])) +
+                  p->size2[1] * (fabs(lane[2][j]) + fabs(lane[3][j]));
+    ride->bend = largest(bend, p->size2[0] * (fabs(d[0]) + fabs(d[1])) +
+                                   p->size2[1] * (fabs(d[2]) + fabs(d[3])));
 }
 
 INLINE void see(const Ride *ride, const PulseRow *row, double out[RIDE]) {
