@@ -18,8 +18,9 @@ void exact_pass_sample(Exact *exact) {
     const Moment at = exact_moment(exact);
     if (exact->sample == exact->recorder.statistics_start)
         ledger_forget_peaks(&exact->ledger, &at);
+    const bool is_base_wanted = exact->recorder.columns[CHANNEL_BASE_ACCELERATION] != NULL;
     recorder_take(&exact->recorder, exact->sample, &at,
-                  base_cursor_at(&exact->base, exact->sample));
+                  is_base_wanted ? base_cursor_at(&exact->base, exact->sample) : 0);
     ledger_peaks(&exact->ledger, &at);
 }
 
@@ -31,6 +32,12 @@ void exact_end_phase(Exact *exact) {
         trust_press(&exact->trust, exact->side, time, &exact->state, largest);
     else
         trust_rest(&exact->trust, time, &exact->state, largest);
+}
+
+// Only the force has changed.
+static void note_force(Exact *exact) {
+    ledger_acceleration(&exact->ledger,
+                        exact_force(exact) / exact->plan->mass[0] - exact_push(exact));
 }
 
 static void begin_contact(Exact *exact, Side side) {
@@ -85,9 +92,12 @@ void exact_touch(Exact *exact, Side side) {
     exact->is_leaving = false;
     exact_note(exact);
     exact_end_phase(exact);
-    if (exact->plan->form == CONTACT_LINEAR)
+    if (exact->plan->form == CONTACT_LINEAR) {
         begin_contact(exact, side);
-    else if (exact->damper->clearance == 0)
+        note_force(exact);
+        return;
+    }
+    if (exact->damper->clearance == 0)
         begin_rest(exact, side);
     else
         bounce(exact, side);
@@ -101,14 +111,14 @@ void exact_release(Exact *exact) {
     const double sign = exact_sign(exact->side);
     exact->is_leaving = exact->phase == RESTING;
     exact->state.r = 0;
-    exact->state.w = exact->is_leaving ? 0 : sign * fmin(sign * exact->state.w, 0);
+    exact->state.w = exact->is_leaving ? 0 : (sign * exact->state.w < 0 ? exact->state.w : 0);
     ledger_close(&exact->ledger, &exact->row, exact_time(exact),
                  exact->phase == RESTING ? NAN : fabs(exact->state.w));
     const bool is_held = exact->phase == RESTING && exact->damper->clearance == 0;
     exact->phase = FLIGHT;
     if (is_held) // between stops without clearance the other one takes over
         begin_rest(exact, exact->side == SIDE_RIGHT ? SIDE_LEFT : SIDE_RIGHT);
-    exact_note(exact);
+    note_force(exact);
 }
 
 // Finds the first event on the arc. In flight `side` is the stop that is reached.

@@ -69,39 +69,39 @@ static State see(const Press *press, const double d[4], double a) {
                    pulse_see(&p->r, d, a, slope), pulse_see(&p->w, d, a, slope)};
 }
 
-// The amplitudes a little later; |lambda time| is at most 1e-5.
-static void nudge(const Pulse *pulse, double time, double d[4]) {
-    for (int i = 0; i < 2; i++) {
-        const double s = pulse->sigma[i] * time, w = pulse->omega[i] * time;
-        const double re = 1 + (s + (s * s - w * w) / 2), im = w + s * w;
-        const double x = d[2 * i], y = d[2 * i + 1];
-        d[2 * i] = re * x - im * y;
-        d[2 * i + 1] = re * y + im * x;
-    }
-}
-
 enum { SEARCH_STEPS = 12, RIDE_AGAIN = 8 };
 static const double NEAR = 1e-5; // an angle whose cube is below rounding
+
+// The amplitudes at t, from those a step before where that is a short one.
+static inline void go_on(const Pulse *pulse, const double from[4], double t, double step,
+                         double d[4]) {
+    double turn[4];
+    if (fabs(step) * pulse->rate <= PULSE_NEAR) {
+        pulse_nudge(pulse, step, d);
+    } else {
+        pulse_turn(pulse, t, turn);
+        pulse_multiply(turn, from, d);
+    }
+}
 
 // p = 0 within `length` of the stretch's beginning, from a guess; false where the search leaves it.
 // *time may lie beyond `length`: then p has no zero within it.
 static bool find_release(const Press *press, double guess, double most, double *time,
                          double end[4]) {
     const Pulse *p = press->pulse;
-    double t = guess, turn[4];
+    double t = guess, step = INFINITY;
     for (int i = 0; i < SEARCH_STEPS; i++) {
         if (!(t >= 0 && t <= most))
             return false;
-        pulse_turn(p, t, turn);
-        pulse_multiply(turn, press->d, end);
+        go_on(p, press->d, t, step, end);
         const double a = press->a + press->slope * t;
         const double r = pulse_see(&p->r, end, a, press->slope);
         const double w = pulse_see(&p->w, end, a, press->slope);
         const double bend = pulse_dot(p->r_bend.d, end);
-        const double step = -2 * r * w / (2 * w * w - r * bend);
+        step = -2 * r * w / (2 * w * w - r * bend);
         t += step;
         if (fabs(step) * p->omega[1] <= NEAR) {
-            nudge(p, step, end);
+            go_on(p, press->d, t, step, end);
             *time = t;
             return t > 0;
         }
@@ -113,19 +113,20 @@ static bool find_release(const Press *press, double guess, double most, double *
 bool press_find_peak(Press *press, double guess, double length) {
     Exact *exact = press->exact;
     const Pulse *p = press->pulse;
-    double low = 0, high = length, t = guess, turn[4], d[4];
+    double low = 0, high = length, t = guess, step = INFINITY, d[4];
     for (int i = 0; i < SEARCH_STEPS; i++) {
-        if (!(t > low && t < high))
+        if (!(t > low && t < high)) {
             t = (low + high) / 2;
-        pulse_turn(p, t, turn);
-        pulse_multiply(turn, press->d, d);
+            step = INFINITY;
+        }
+        go_on(p, press->d, t, step, d);
         const double rate = press->sign * pulse_see(&p->n_rate, d, 0, press->slope);
         const double bend = press->sign * pulse_dot(p->n_bend.d, d);
         if (rate > 0)
             low = t;
         else
             high = t;
-        const double step = -rate / bend;
+        step = -rate / bend;
         if (fabs(step) * p->omega[1] <= NEAR && bend < 0) {
             const double a = press->a + press->slope * t;
             const State at = see(press, d, a);

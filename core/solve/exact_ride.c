@@ -4,7 +4,15 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-enum { RIDE = 8 };
+enum { RIDE = PULSE_RIDE };
+
+typedef double Eight __attribute__((vector_size(8 * RIDE)));
+typedef double Loose __attribute__((vector_size(8 * RIDE), aligned(8), may_alias)); // anywhere
+#define LOAD(values) (*(const Loose *)(values))
+#define STORE(values, eight) (*(Loose *)(values) = (eight))
+
+// LOAD(ones + RIDE - count) is 1 for the first `count`, and 0.
+static const double ones[2 * RIDE] = {1, 1, 1, 1, 1, 1, 1, 1};
 
 // The samples of a ride, each with the amplitudes from there on.
 typedef struct Ride {
@@ -13,31 +21,58 @@ typedef struct Ride {
     double bend; // |r''| is not larger
 } Ride;
 
+INLINE double largest(const double *values, double least) {
+    double most[RIDE / 2];
+    for (size_t j = 0; j < RIDE / 2; j++) {
+        const double a = fabs(values[j]), b = fabs(values[j + RIDE / 2]);
+        most[j] = a > b ? a : b;
+    }
+    const double a = most[0] > most[1] ? most[0] : most[1];
+    const double b = most[2] > most[3] ? most[2] : most[3], all = a > b ? a : b;
+    return all > least ? all : least;
+}
+
+// All eight straight from the beginning: what each jump of the base's slope leaves is the same, but
+// later.
 INLINE void turn(const Press *press, Ride *ride, const double *base) {
     const Pulse *p = press->pulse;
-    const double *t = p->interval, rate = press->exact->plan->sample_rate;
-    double d[4] = {press->d[0], press->d[1], press->d[2], press->d[3]}, bend = 0;
+    const double *d = press->d;
+    Eight jump = {0};
+    if (base == NULL) {
+        STORE(ride->a + 1, jump);
+        STORE(ride->s + 1, jump);
+    } else {
+        const double rate = press->exact->plan->sample_rate;
+        const Eight slope = (LOAD(base + 2) - LOAD(base + 1)) * rate;
+        jump = slope - (LOAD(base + 1) - LOAD(base)) * rate;
+        jump[0] = slope[0] - press->slope;
+        STORE(ride->a + 1, LOAD(base + 1));
+        STORE(ride->s + 1, slope);
+    }
     ride->a[0] = press->a;
     ride->s[0] = press->slope;
-    for (int j = 0;; j++) {
-        for (int i = 0; i < 4; i++)
-            ride->d[i][j] = d[i];
-        if (j == RIDE)
-            break;
-        const double here =
-            p->size2[0] * (fabs(d[0]) + fabs(d[1])) + p->size2[1] * (fabs(d[2]) + fabs(d[3]));
-        bend = here > bend ? here : bend;
-        ride->a[j + 1] = base == NULL ? 0 : base[j + 1];
-        ride->s[j + 1] = base == NULL ? 0 : (base[j + 2] - base[j + 1]) * rate;
-        const double jump = ride->s[j + 1] - ride->s[j];
-        const double re1 = t[0] * d[0] - t[1] * d[1], im1 = t[0] * d[1] + t[1] * d[0];
-        const double re2 = t[2] * d[2] - t[3] * d[3], im2 = t[2] * d[3] + t[3] * d[2];
-        d[0] = re1 + jump * p->jump[0];
-        d[1] = im1 + jump * p->jump[1];
-        d[2] = re2 + jump * p->jump[2];
-        d[3] = im2 + jump * p->jump[3];
+    double lane[4][RIDE];
+    for (int i = 0; i < 4; i += 2) {
+        Eight re = LOAD(p->ride[i]) * d[i] - LOAD(p->ride[i + 1]) * d[i + 1];
+        Eight im = LOAD(p->ride[i]) * d[i + 1] + LOAD(p->ride[i + 1]) * d[i];
+        for (int k = 0; k < RIDE && base != NULL; k++) {
+            re += LOAD(p->jumps[i] + RIDE - k) * jump[k];
+            im += LOAD(p->jumps[i + 1] + RIDE - k) * jump[k];
+        }
+        ride->d[i][0] = d[i];
+        ride->d[i + 1][0] = d[i + 1];
+        STORE(ride->d[i] + 1, re);
+        STORE(ride->d[i + 1] + 1, im);
+        STORE(lane[i], re);
+        STORE(lane[i + 1], im);
     }
-    ride->bend = bend;
+    // Taken from what is at hand: a load across the stores above would wait for them.
+    double bend[RIDE];
+    for (int j = 0; j < RIDE; j++)
+        bend[j] = p->size2[0] * (fabs(lane[0][j]) + fabs(lane[1][j])) +
+                  p->size2[1] * (fabs(lane[2][j]) + fabs(lane[3][j]));
+    ride->bend = largest(bend, p->size2[0] * (fabs(d[0]) + fabs(d[1])) +
+                                   p->size2[1] * (fabs(d[2]) + fabs(d[3])));
 }
 
 INLINE void see(const Ride *ride, const PulseRow *row, double out[RIDE]) {
@@ -62,6 +97,14 @@ INLINE size_t count_clear(Press *press, const Ride *ride) {
     double r = press->sign * exact->state.r, w = exact->state.w;
     double rate = press->sign * pulse_see(&press->pulse->n_rate, press->d, 0, press->slope);
     size_t clear = 0;
+    int near = 0, rising = 0, falling = 0;
+    for (int j = 0; j < RIDE; j++) {
+        near += !(press->sign * ride->r[j] > sag);
+        rising += press->sign * ride->rate[j] > 0;
+        falling += press->sign * ride->rate[j] < 0;
+    }
+    if (near == 0 && r > sag && (rate > 0 ? rising == RIDE : falling == RIDE))
+        return RIDE;
     for (; clear < RIDE; clear++) {
         const double next = press->sign * ride->r[clear], next_w = ride->w[clear];
         const double next_rate = press->sign * ride->rate[clear];
@@ -124,15 +167,16 @@ INLINE void see_gains(const Press *press, const Ride *ride, Gains *gains) {
 INLINE void take_sums(Press *press, const Ride *ride, size_t count) {
     const Pulse *p = press->pulse;
     const double length = (double)count * press->exact->interval;
+    const double *keep = ones + RIDE - count;
     Gains gains;
     see_gains(press, ride, &gains);
     double swing = 0, v = 0, w = 0, base = 0, work = 0;
-    for (size_t j = 0; j < count; j++) {
-        swing += gains.swing[j];
-        v += gains.v[j];
-        w += gains.w[j];
-        base += gains.base[j];
-        work += gains.work[j];
+    for (size_t j = 0; j < RIDE; j++) {
+        swing += keep[j] * gains.swing[j];
+        v += keep[j] * gains.v[j];
+        w += keep[j] * gains.w[j];
+        base += keep[j] * gains.base[j];
+        work += keep[j] * gains.work[j];
     }
     const double unit[4] = {1, 0, 0, 0};
     const double slow = swing * pulse_slow(p, unit, press->exact->interval);
@@ -144,53 +188,51 @@ INLINE void take_sums(Press *press, const Ride *ride, size_t count) {
     press->elapsed += length;
 }
 
-INLINE void put(double *const *columns, ChannelId channel, size_t sample, const double *values,
-                size_t count) {
+INLINE void put(double *const *columns, ChannelId channel, size_t sample, const double *values) {
     if (columns[channel] != NULL)
-        for (size_t j = 0; j < count; j++)
+        for (size_t j = 0; j < RIDE; j++)
             columns[channel][sample + j] = values[j];
 }
 
-INLINE double largest(const double *values, size_t count, double least) {
-    for (size_t j = 0; j < count; j++)
-        least = fabs(values[j]) > least ? fabs(values[j]) : least;
-    return least;
-}
-
+// Those behind `count` are written as zeros, which is what the force is if the contact ends
+// (0.0 makes -0 one).
 INLINE void take_samples(Press *press, const Ride *ride, size_t count) {
     Exact *exact = press->exact;
     const Motion *m = &exact->flying;
-    double acceleration[RIDE], z[RIDE], speed[RIDE], force[RIDE], depth[RIDE];
+    const double *keep = ones + RIDE - count;
+    double x[RIDE], v[RIDE], acceleration[RIDE], z[RIDE], speed[RIDE], force[RIDE], depth[RIDE];
     const double mass = exact_effective_mass(exact);
     const double middle = exact_relative(exact) - exact->state.r;
-    for (int j = 0; j < RIDE; j++) {
-        acceleration[j] =
-            m->share * ride->n[j] - (m->damping * ride->v[j] + m->omega2 * ride->x[j]);
-        z[j] = ride->x[j] + (middle + ride->r[j]);
+    for (size_t j = 0; j < RIDE; j++) {
+        x[j] = keep[j] * ride->x[j];
+        v[j] = keep[j] * ride->v[j];
+        const double own = m->damping * ride->v[j] + m->omega2 * ride->x[j];
+        acceleration[j] = keep[j] * (m->share * ride->n[j] - own);
+        z[j] = keep[j] * (ride->x[j] + (middle + ride->r[j]));
         speed[j] = ride->v[j] + ride->w[j];
-        force[j] = mass * ride->n[j];
-        depth[j] = press->sign * ride->r[j];
+        force[j] = keep[j] * (mass * ride->n[j]) + 0.0;
+        depth[j] = keep[j] * (press->sign * ride->r[j]) + 0.0;
     }
     double *const *columns = exact->recorder.columns;
     const size_t at = exact->sample + 1;
-    put(columns, CHANNEL_DISPLACEMENT, at, ride->x, count);
-    put(columns, CHANNEL_VELOCITY, at, ride->v, count);
-    put(columns, CHANNEL_ACCELERATION, at, acceleration, count);
-    put(columns, CHANNEL_DAMPER_DISPLACEMENT, at, z, count);
-    put(columns, CHANNEL_DAMPER_VELOCITY, at, speed, count);
-    put(columns, CHANNEL_PENETRATION, at, depth, count);
-    put(columns, CHANNEL_CONTACT_FORCE, at, force, count);
+    put(columns, CHANNEL_DISPLACEMENT, at, x);
+    put(columns, CHANNEL_VELOCITY, at, v);
+    put(columns, CHANNEL_ACCELERATION, at, acceleration);
+    put(columns, CHANNEL_DAMPER_DISPLACEMENT, at, z);
+    put(columns, CHANNEL_DAMPER_VELOCITY, at, speed);
+    put(columns, CHANNEL_PENETRATION, at, depth);
+    put(columns, CHANNEL_CONTACT_FORCE, at, force);
     Peaks *peaks = &exact->ledger.response->peaks;
-    peaks->displacement = largest(ride->x, count, peaks->displacement);
-    peaks->velocity = largest(ride->v, count, peaks->velocity);
-    peaks->acceleration = largest(acceleration, count, peaks->acceleration);
-    peaks->damper_displacement = largest(z, count, peaks->damper_displacement);
-    ledger_force(&exact->ledger, &exact->row, largest(force, count, 0));
+    peaks->displacement = largest(x, peaks->displacement);
+    peaks->velocity = largest(v, peaks->velocity);
+    peaks->acceleration = largest(acceleration, peaks->acceleration);
+    peaks->damper_displacement = largest(z, peaks->damper_displacement);
+    ledger_force(&exact->ledger, &exact->row, largest(force, 0));
     if (exact->sample < exact->recorder.statistics_start)
         return;
     double xx = 0, aa = 0;
-    for (size_t j = 0; j < count; j++) {
-        xx += ride->x[j] * ride->x[j];
+    for (size_t j = 0; j < RIDE; j++) {
+        xx += x[j] * x[j];
         aa += acceleration[j] * acceleration[j];
     }
     recorder_sums(&exact->recorder, count, xx, aa);

@@ -3,10 +3,13 @@
 #ifndef CORE_SOLVE_EXACT_STATE_H
 #define CORE_SOLVE_EXACT_STATE_H
 
+#include <math.h>
+
 #include "core/solve/arc.h"
 #include "core/solve/cursor.h"
 #include "core/solve/flight.h"
 #include "core/solve/hold.h"
+#include "core/solve/hop.h"
 #include "core/solve/lanes.h"
 #include "core/solve/ledger.h"
 #include "core/solve/pulse.h"
@@ -26,7 +29,8 @@ typedef struct Exact {
     Flight flight;
     Lanes lanes;
     Stretch stretch;
-    Pulse pulses[2];  // by Side
+    Pulse pulses[2]; // by Side
+    HopTable hops;
     bool has_hops;    // intervals are short enough for hop.h
     size_t pending;   // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
@@ -56,15 +60,74 @@ static inline double exact_sign(Side side) {
     return side == SIDE_RIGHT ? 1 : -1;
 }
 
-double exact_time(const Exact *exact); // [s]
-double exact_room(const Exact *exact,
-                  Side side);              // between free mass and stop at r = 0 of the origin [m]
-double exact_relative(const Exact *exact); // u, of the free mass [m]
-double exact_push(const Exact *exact);     // s = (C v + K x) / M [m/s^2]
-double exact_force(const Exact *exact);    // on the structure, positive to the right [N]
-double exact_effective_mass(const Exact *exact); // m_e [kg]
-const Motion *exact_motion(const Exact *exact);  // of the present phase
-Moment exact_moment(const Exact *exact);
-EnergyState exact_energy(const Exact *exact);
+// Room between the free mass and a stop at r = 0 of the present origin [m].
+static inline double exact_room(const Exact *exact, Side side) {
+    if (exact->origin == ORIGIN_MIDDLE)
+        return exact->damper->clearance / 2;
+    return exact->origin == (Origin)side ? 0 : exact->damper->clearance;
+}
+
+// u = x-relative displacement of the free mass [m].
+static inline double exact_relative(const Exact *exact) {
+    const double stop = exact->damper->clearance / 2;
+    const double origin =
+        exact->origin == ORIGIN_MIDDLE ? 0 : exact_sign((Side)exact->origin) * stop;
+    return exact->damper->offset + origin + exact->state.r;
+}
+
+static inline double exact_time(const Exact *exact) {
+    return (double)exact->sample / exact->plan->sample_rate + exact->offset;
+}
+
+static inline double exact_effective_mass(const Exact *exact) {
+    return exact->plan->mass[0] *
+           exact->resting.share; // 1 - share would lose digits where m is the larger
+}
+
+// s = (C v + K x) / M: what pushes the free mass to the right, seen from the structure [m/s^2].
+static inline double exact_push(const Exact *exact) {
+    return exact->flying.damping * exact->state.v + exact->flying.omega2 * exact->state.x;
+}
+
+// Contact force on the structure, positive to the right [N].
+static inline double exact_force(const Exact *exact) {
+    if (exact->phase == CONTACT)
+        return exact->damper->stops[exact->side].stiffness * exact->state.r +
+               exact->damper->stops[exact->side].damping * exact->state.w;
+    if (exact->phase == RESTING)
+        return exact_effective_mass(exact) * exact_push(exact);
+    return 0;
+}
+
+static inline Moment exact_moment(const Exact *exact) {
+    const double n = exact_force(exact);
+    Moment moment = {.x = exact->state.x,
+                     .v = exact->state.v,
+                     .acceleration = n / exact->plan->mass[0] - exact_push(exact),
+                     .force = n};
+    if (exact->plan->damper_count > 0) {
+        moment.damper_x = exact->state.x + exact_relative(exact);
+        moment.damper_v = exact->state.v + exact->state.w;
+        moment.penetration =
+            exact->phase == CONTACT ? fmax(exact_sign(exact->side) * exact->state.r, 0) : 0;
+    }
+    return moment;
+}
+
+static inline EnergyState exact_energy(const Exact *exact) {
+    const Plan *plan = exact->plan;
+    const State *state = &exact->state;
+    const double z = state->v + state->w;
+    const double k = exact->phase == CONTACT ? exact->damper->stops[exact->side].stiffness : 0;
+    return (EnergyState){
+        0.5 * plan->mass[0] * state->v * state->v + 0.5 * exact->damper->mass * z * z,
+        0.5 * plan->stiffness[0] * state->x * state->x + 0.5 * k * state->r * state->r};
+}
+
+static inline const Motion *exact_motion(const Exact *exact) {
+    return exact->phase == FLIGHT    ? &exact->flying
+           : exact->phase == CONTACT ? &exact->touching[exact->side]
+                                     : &exact->resting;
+}
 
 #endif

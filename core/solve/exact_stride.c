@@ -7,7 +7,6 @@
 
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_press.h"
-#include "core/solve/hop.h"
 
 enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
 
@@ -36,6 +35,7 @@ void exact_stride_start(Exact *exact) {
         return;
     lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
     exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
+    hop_table_make(&exact->hops, &exact->flying, exact->interval);
     for (int side = 0; side < 2 && exact->has_hops; side++) {
         if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)
             exact->pulses[1] = exact->pulses[0];
@@ -132,37 +132,49 @@ static double push_most(const Exact *exact) {
             exact->interval * exact->stretch.base_most);
 }
 
-// From a sample to the stop that is reached before the next; false where that is not clear.
-static bool reach(Exact *exact) {
+typedef enum Way { FREE, BLOCKED, UNCLEAR } Way;
+
+// From a sample to the stop that is reached before the next, or to that one.
+static Way reach(Exact *exact) {
     enum { STEPS = 8 };
     Slice slice;
     Hop hop;
     if (!base_cursor_interval(&exact->base, exact->sample, &slice))
-        return false;
-    hop_make(&hop, &exact->flying, &exact->state, &slice, exact->interval);
-    double slope;
-    const double end = hop_gap(&hop, 1, &slope);
+        return UNCLEAR;
+    hop_make(&hop, &exact->hops, &exact->state, &slice);
+    double slope, bend;
+    const double end = hop_gap(&hop, 1, &slope, &bend);
     const Side side = end > exact->state.r ? SIDE_RIGHT : SIDE_LEFT;
     const double sign = exact_sign(side), room = exact_room(exact, side);
     const double from = room - sign * exact->state.r, to = room - sign * end;
-    if (!(from > 0) || !(to < 0))
-        return false;
+    const double most = push_most(exact) * exact->interval * exact->interval;
+    if (!(from > 0))
+        return UNCLEAR;
+    if (to > 0) {
+        // Away from one stop all the way, or too far from both for the curve to reach one.
+        const double least = from < to ? from : to, other = exact->damper->clearance;
+        if (!(sign * slope > most) && !(least > most / 8 && other - from > most / 8))
+            return UNCLEAR;
+        take_hop(exact, &hop, 1);
+        return FREE;
+    }
+    // On the parabola through both ends, nearly; then each step's error is about its cube.
     double s = from / (from - to), step = 1;
-    for (int i = 0; i < STEPS && fabs(step) > 1e-8; i++) {
-        const double gap = room - sign * hop_gap(&hop, s, &slope);
-        step = sign * gap / slope;
+    s += sign * bend * s * (1 - s) / (from - to);
+    for (int i = 0; i < STEPS && fabs(step) > 3e-6; i++) {
+        const double gap = room - sign * hop_gap(&hop, s, &slope, &bend);
+        step = gap * slope / (sign * slope * slope + gap * bend);
         s += step;
     }
     // All the way r goes towards this stop, so that it is met once and the other not at all.
-    const double most = push_most(exact) * exact->interval * exact->interval;
-    if (!(fabs(step) <= 1e-8) || !(sign * slope > most) || !(s > 0) || !(s <= 1))
-        return false;
+    if (!(fabs(step) <= 3e-6) || !(sign * slope > most) || !(s > 0) || !(s <= 1))
+        return UNCLEAR;
     take_hop(exact, &hop, s);
     exact->offset = s * exact->interval;
     exact->events++;
     exact->still_events = 0;
     exact_touch(exact, side);
-    return true;
+    return BLOCKED;
 }
 
 // In flight from a stop to the next sample.
@@ -174,8 +186,8 @@ static bool depart(Exact *exact) {
     Slice slice;
     Hop hop;
     (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
-    hop_make(&hop, &exact->flying, &exact->state, &slice, length);
-    take_hop(exact, &hop, 1);
+    hop_make(&hop, &exact->hops, &exact->state, &slice);
+    take_hop(exact, &hop, length * hop.per_unit);
     return true;
 }
 
@@ -188,9 +200,16 @@ size_t exact_stride(Exact *exact, size_t most) {
         count += flown;
         if (count == most || exact->plan->damper_count == 0)
             break;
-        if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops ||
-            !reach(exact))
+        if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops)
             break;
+        const Way way = reach(exact);
+        if (way == UNCLEAR)
+            break;
+        if (way == FREE) {
+            exact_stride_pass(exact);
+            count++;
+            continue;
+        }
         if (exact->phase == CONTACT)
             count += exact_press(exact, most - count);
         if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||

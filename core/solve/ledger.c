@@ -2,12 +2,6 @@
 
 #include <stdlib.h>
 
-// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught
-// elsewhere.
-static inline double larger(double a, double b) {
-    return a > b ? a : b;
-}
-
 void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy) {
     *ledger = (Ledger){.response = response, .most = most};
     ledger->energy.initial = energy->kinetic + energy->strain;
@@ -48,19 +42,6 @@ void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Si
                            .restitution = NAN};
 }
 
-void ledger_stretch(Ledger *ledger, LedgerRow *row, double length, double impulse, double lost) {
-    row->impact.duration += length;
-    row->impact.impulse += impulse;
-    row->impact.energy_lost += lost;
-    ledger->energy.contact += lost;
-}
-
-void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude) {
-    Peaks *peaks = &ledger->response->peaks;
-    row->impact.peak_force = larger(row->impact.peak_force, magnitude);
-    peaks->contact_force = larger(peaks->contact_force, magnitude);
-}
-
 void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation) {
     Impact *open = &row->impact;
     open->end = time;
@@ -90,36 +71,19 @@ void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double
     add(ledger, &impact);
 }
 
-void ledger_work(Ledger *ledger, double input, double structural_damping) {
-    ledger->energy.input += input;
-    ledger->energy.structural_damping += structural_damping;
-}
-
 void ledger_balance(Ledger *ledger, const EnergyState *state) {
     const Energy *energy = &ledger->energy;
     const double held = state->kinetic + state->strain;
     const double balance =
         held - energy->initial - energy->input + energy->structural_damping + energy->contact;
-    ledger->largest_energy = larger(ledger->largest_energy, larger(held, fabs(energy->input)));
-    ledger->largest_balance = larger(ledger->largest_balance, fabs(balance));
-    ledger->largest_gain = larger(ledger->largest_gain, balance);
-}
-
-void ledger_peaks(Ledger *ledger, const Moment *at) {
-    Peaks *peaks = &ledger->response->peaks;
-    peaks->displacement = larger(peaks->displacement, fabs(at->x));
-    peaks->velocity = larger(peaks->velocity, fabs(at->v));
-    peaks->acceleration = larger(peaks->acceleration, fabs(at->acceleration));
-    peaks->damper_displacement = larger(peaks->damper_displacement, fabs(at->damper_x));
+    ledger->largest_energy =
+        ledger_larger(ledger->largest_energy, ledger_larger(held, fabs(energy->input)));
+    ledger->largest_balance = ledger_larger(ledger->largest_balance, fabs(balance));
+    ledger->largest_gain = ledger_larger(ledger->largest_gain, balance);
 }
 
 void ledger_forget_peaks(Ledger *ledger, const Moment *at) {
     ledger->response->peaks = (Peaks){.contact_force = fabs(at->force)};
-}
-
-void ledger_acceleration(Ledger *ledger, double acceleration) {
-    Peaks *peaks = &ledger->response->peaks;
-    peaks->acceleration = larger(peaks->acceleration, fabs(acceleration));
 }
 
 Status ledger_status(const Ledger *ledger, Problem *problem) {

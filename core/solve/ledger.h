@@ -3,6 +3,8 @@
 #ifndef CORE_SOLVE_LEDGER_H
 #define CORE_SOLVE_LEDGER_H
 
+#include <math.h>
+
 #include "core/result/response.h"
 #include "core/scene/damper.h"
 
@@ -36,25 +38,60 @@ typedef struct Ledger {
     double gain_most;    // of largest_gain over largest_energy; above it the run fails; 0: any
 } Ledger;
 
+// fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught
+// elsewhere.
+static inline double ledger_larger(double a, double b) {
+    return a > b ? a : b;
+}
+
 void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy);
 
 // A contact or rest of a damper (from 0) begins; approach NAN for a rest.
 void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Side side,
                  double approach);
 // A stretch of it: its length [s], the integral of N [N s] and the work lost [J].
-void ledger_stretch(Ledger *ledger, LedgerRow *row, double length, double impulse, double lost);
-void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude); // a candidate for the peak [N]
+static inline void ledger_stretch(Ledger *ledger, LedgerRow *row, double length, double impulse,
+                                  double lost) {
+    row->impact.duration += length;
+    row->impact.impulse += impulse;
+    row->impact.energy_lost += lost;
+    ledger->energy.contact += lost;
+}
+
+// A candidate for the peak [N].
+static inline void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude) {
+    Peaks *peaks = &ledger->response->peaks;
+    row->impact.peak_force = ledger_larger(row->impact.peak_force, magnitude);
+    peaks->contact_force = ledger_larger(peaks->contact_force, magnitude);
+}
+
 void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation);
 // An instantaneous impact of two bodies with effective mass `mass`.
 void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double approach,
                    double separation, double mass);
 
-void ledger_work(Ledger *ledger, double input, double structural_damping);
+static inline void ledger_work(Ledger *ledger, double input, double structural_damping) {
+    ledger->energy.input += input;
+    ledger->energy.structural_damping += structural_damping;
+}
+
 void ledger_balance(Ledger *ledger, const EnergyState *energy);
-void ledger_peaks(Ledger *ledger, const Moment *at);
+
+static inline void ledger_peaks(Ledger *ledger, const Moment *at) {
+    Peaks *peaks = &ledger->response->peaks;
+    peaks->displacement = ledger_larger(peaks->displacement, fabs(at->x));
+    peaks->velocity = ledger_larger(peaks->velocity, fabs(at->v));
+    peaks->acceleration = ledger_larger(peaks->acceleration, fabs(at->acceleration));
+    peaks->damper_displacement = ledger_larger(peaks->damper_displacement, fabs(at->damper_x));
+}
+
 // Statistics begin here: what came before is left out of the peaks.
 void ledger_forget_peaks(Ledger *ledger, const Moment *at);
-void ledger_acceleration(Ledger *ledger, double acceleration);
+
+static inline void ledger_acceleration(Ledger *ledger, double acceleration) {
+    Peaks *peaks = &ledger->response->peaks;
+    peaks->acceleration = ledger_larger(peaks->acceleration, fabs(acceleration));
+}
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept, STATUS_UNSTABLE once more energy
 // came out of nothing than gain_most allows.

@@ -101,14 +101,28 @@ static Complex power_of_e(Complex z) {
 }
 
 static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
+    pulse->unit = pulse->time / PULSE_TABLE_UNIT;
+    pulse->per_unit = PULSE_TABLE_UNIT / pulse->time;
     for (int mode = 0; mode < 2; mode++) {
         const Complex step = power_of_e(l[mode] * (long double)pulse->time / PULSE_TABLE_UNIT);
         const Complex whole = power_of_e(l[mode] * interval);
+        const Complex peak = power_of_e(l[mode] * pulse->peak_time);
         Complex power = 1;
         for (int i = 0; i <= PULSE_TABLE; i++, power *= step) {
             pulse->table[i][2 * mode] = (double)creall(power);
             pulse->table[i][2 * mode + 1] = (double)cimagl(power);
         }
+        const Complex jump = complex_of(pulse->jump[2 * mode], pulse->jump[2 * mode + 1]);
+        power = 1;
+        for (int i = 0; i < PULSE_RIDE; i++) {
+            pulse->jumps[2 * mode][PULSE_RIDE + i] = (double)creall(power * jump);
+            pulse->jumps[2 * mode + 1][PULSE_RIDE + i] = (double)cimagl(power * jump);
+            power *= whole;
+            pulse->ride[2 * mode][i] = (double)creall(power);
+            pulse->ride[2 * mode + 1][i] = (double)cimagl(power);
+        }
+        pulse->peak[2 * mode] = (double)creall(peak);
+        pulse->peak[2 * mode + 1] = (double)cimagl(peak);
         pulse->interval[2 * mode] = (double)creall(whole);
         pulse->interval[2 * mode + 1] = (double)cimagl(whole);
     }
@@ -191,6 +205,7 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
         pulse->sigma[i] = (double)creall(l[i]);
         pulse->omega[i] = (double)cimagl(l[i]);
         pulse->size2[i] = (double)square(l[i]);
+        pulse->rate = sqrt(pulse->size2[i]); // the fast one comes last
     }
     pulse->x.a = (double)creall(fixed[0]);
     pulse->x.s = (double)creall(fixed_slope[0]);
@@ -209,32 +224,33 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
 }
 
 void pulse_turn(const Pulse *pulse, double time, double turn[4]) {
-    const double unit = pulse->time / PULSE_TABLE_UNIT, span = PULSE_TABLE * unit;
+    const double unit = pulse->unit, span = PULSE_TABLE * unit;
     if (time > span) { // seldom: a long way at once
         pulse_turn(pulse, time - span, turn);
         pulse_multiply(pulse->table[PULSE_TABLE], turn, turn);
         return;
     }
-    const int place = (int)(time / unit + 0.5);
+    const int place = (int)(time * pulse->per_unit + 0.5);
     const double rest = time - place * unit;
+    if (rest == 0 || time == pulse->peak_time) { // where a search begins: T_c is a place too
+        memcpy(turn, rest == 0 ? pulse->table[place] : pulse->peak, 4 * sizeof *turn);
+        return;
+    }
     double small[4];
     for (int i = 0; i < 2; i++) {
-        // |lambda rest| is at most 0.2: these are right to rounding.
+        // |lambda rest| is at most 0.2: these are right to rounding. In pairs, not by Horner: here
+        // one waits for the last term.
         const double s = pulse->sigma[i] * rest, w = pulse->omega[i] * rest;
-        const double w2 = w * w;
+        const double s2 = s * s, s4 = s2 * s2, w2 = w * w, w4 = w2 * w2;
         const double size =
-            1 + s * (1 + s * (1.0 / 2 +
-                              s * (1.0 / 6 +
-                                   s * (1.0 / 24 +
-                                        s * (1.0 / 120 +
-                                             s * (1.0 / 720 +
-                                                  s * (1.0 / 5040 + s * (1.0 / 40320 +
-                                                                         s * (1.0 / 362880)))))))));
+            1 + (s + s2 * (((1.0 / 2 + s * (1.0 / 6)) + s2 * (1.0 / 24 + s * (1.0 / 120))) +
+                           s4 * ((1.0 / 720 + s * (1.0 / 5040)) +
+                                 s2 * (1.0 / 40320 + s * (1.0 / 362880)))));
         const double sine =
-            w * (1 - w2 * (1.0 / 6 - w2 * (1.0 / 120 - w2 * (1.0 / 5040 - w2 * (1.0 / 362880)))));
+            w - w * (w2 * ((1.0 / 6 - w2 * (1.0 / 120)) + w4 * (1.0 / 5040 - w2 * (1.0 / 362880))));
         const double cosine =
-            1 - w2 * (1.0 / 2 - w2 * (1.0 / 24 - w2 * (1.0 / 720 -
-                                                       w2 * (1.0 / 40320 - w2 * (1.0 / 3628800)))));
+            1 - w2 * ((1.0 / 2 - w2 * (1.0 / 24)) +
+                      w4 * ((1.0 / 720 - w2 * (1.0 / 40320)) + w4 * (1.0 / 3628800)));
         small[2 * i] = size * cosine;
         small[2 * i + 1] = size * sine;
     }

@@ -6,7 +6,7 @@
 
 #include "core/solve/arc.h"
 
-enum { PULSE_TABLE = 40, PULSE_TABLE_UNIT = 16 };
+enum { PULSE_TABLE = 40, PULSE_TABLE_UNIT = 16, PULSE_RIDE = 8 };
 
 // Two complex amplitudes d, slow and fast, each as two reals; what can be seen is row . (d, a, s)
 // with the base's a_g = a and slope s at that time.
@@ -31,13 +31,18 @@ typedef struct Pulse {
     PulseForm vv, ww;                 // integrals of the squares of v and w, less their constants'
     double sigma[2], omega[2];        // of the oscillations [1/s], [rad/s]
     double size2[2];                  // |lambda|^2
+    double rate;                      // the larger |lambda|
+    double unit, per_unit;            // of the table [s], [1/s]
     double time;                      // T_c of an isolated contact [s]
     double peak_time;                 // of its largest force
     double contact_omega;             // pi / T_c [rad/s]
     double growth;                    // e^(c T_c / (2 m_e))
     double damping;                   // c / m_e
     double table[PULSE_TABLE + 1][4]; // the oscillations over i / PULSE_TABLE_UNIT of T_c
+    double peak[4];                   // over peak_time
     double interval[4];               // and over a sample interval
+    double ride[4][PULSE_RIDE];       // and over 1 to PULSE_RIDE of them
+    double jumps[4][2 * PULSE_RIDE];  // what jump comes to after as many: from the middle on
 } Pulse;
 
 void pulse_make(Pulse *pulse, const Motion *touching, double interval);
@@ -53,6 +58,22 @@ static inline void pulse_multiply(const double turn[4], const double d[4], doubl
     out[1] = im1;
     out[2] = re2;
     out[3] = im2;
+}
+
+// Amplitudes a little later; |lambda time| is at most PULSE_NEAR.
+#define PULSE_NEAR 1e-3
+static inline void pulse_nudge(const Pulse *pulse, double time, double d[4]) {
+    for (int i = 0; i < 2; i++) {
+        const double s = pulse->sigma[i] * time, w = pulse->omega[i] * time;
+        const double s2 = s * s, w2 = w * w;
+        const double size = s + s2 * ((1.0 / 2 + s * (1.0 / 6)) + s2 * (1.0 / 24)); // less 1
+        const double cosine = w2 * (1.0 / 2 - w2 * (1.0 / 24));                     // 1 less it
+        const double sine = w - w * w2 * (1.0 / 6 - w2 * (1.0 / 120));
+        const double re = size - (cosine + size * cosine), im = sine + size * sine; // less 1
+        const double x = d[2 * i], y = d[2 * i + 1];
+        d[2 * i] = x + (re * x - im * y);
+        d[2 * i + 1] = y + (re * y + im * x);
+    }
 }
 
 static inline double pulse_dot(const double row[4], const double d[4]) {

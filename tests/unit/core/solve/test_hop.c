@@ -16,17 +16,21 @@ static void a_hop_agrees_with_an_arc(void **state) {
     const Slice slice = {1.5, -200, 0};
     Hop hop;
     Arc arc;
-    hop_make(&hop, &motion, &start, &slice, 1e-3);
+    HopTable table;
+    hop_table_make(&table, &motion, 1e-3);
+    hop_make(&hop, &table, &start, &slice);
     for (int i = 1; i <= 10; i++) {
         const double s = 0.1 * i;
         arc_make(&arc, &motion, &start, &slice, s * 1e-3);
         const State got = hop_at(&hop, s), at = arc_end(&arc);
-        double slope;
-        const double r = hop_gap(&hop, s, &slope);
+        const double push = motion.damping * at.v + motion.omega2 * at.x;
+        double slope, bend;
+        const double r = hop_gap(&hop, s, &slope, &bend);
         assert_true(fabs(got.x - at.x) < 1e-17);
         assert_true(fabs(got.v - at.v) < 1e-15);
         assert_true(fabs(got.r - at.r) < 1e-17 && fabs(r - at.r) < 1e-17);
         assert_true(fabs(got.w - at.w) < 1e-15 && fabs(slope - 1e-3 * at.w) < 1e-18);
+        assert_true(fabs(bend - 1e-6 * push / 2) < 1e-3 * fabs(bend));
         const ArcIntegrals mine = hop_integrals(&hop, &start, s), its = arc_integrals(&arc);
         assert_true(fabs(mine.vv - its.vv) < 1e-13 * its.vv);
         assert_true(fabs(mine.av - its.av) < 1e-13 * fabs(its.av));

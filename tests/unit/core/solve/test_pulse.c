@@ -76,6 +76,42 @@ static void a_pulse_agrees_with_arcs(void **state) {
     }
 }
 
+static void assert_near(const double a[4], const double b[4]) {
+    for (int k = 0; k < 4; k++)
+        assert_true(fabs(a[k] - b[k]) < 4e-15);
+}
+
+static void tables_and_nudges_are_turns(void **state) {
+    (void)state;
+    const Motion motion = contact(400, 0.3);
+    Pulse pulse;
+    pulse_make(&pulse, &motion, 1e-3);
+    double turn[4], here[4], d[4] = {0.3, -0.2, 0.5, 0.7}, later[4];
+    for (int i = 0; i < PULSE_RIDE; i++) {
+        pulse_turn(&pulse, 1e-3 * (i + 1), turn);
+        for (int k = 0; k < 4; k++)
+            here[k] = pulse.ride[k][i];
+        assert_near(turn, here);
+        pulse_multiply(turn, pulse.jump, later);
+        for (int k = 0; k < 4 && i + 1 < PULSE_RIDE; k++)
+            assert_true(fabs(pulse.jumps[k][PULSE_RIDE + i + 1] - later[k]) < 1e-19);
+        for (int k = 0; k < 4; k++)
+            assert_true(pulse.jumps[k][i] == 0);
+    }
+    for (int i = -3; i <= 3; i++) {
+        const double step = i * PULSE_NEAR / 3 / pulse.rate, from = 0.4 * pulse.time;
+        pulse_turn(&pulse, from, turn);
+        pulse_multiply(turn, d, here);
+        pulse_nudge(&pulse, step, here);
+        pulse_turn(&pulse, from + step, turn);
+        pulse_multiply(turn, d, later);
+        assert_near(here, later);
+    }
+    pulse_turn(&pulse, pulse.peak_time, turn);
+    pulse_turn(&pulse, pulse.peak_time * (1 + 1e-15), later);
+    assert_near(turn, later);
+}
+
 static void what_does_not_oscillate_twice_is_refused(void **state) {
     (void)state;
     Pulse pulse;
@@ -94,6 +130,7 @@ static void what_does_not_oscillate_twice_is_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pulse_agrees_with_arcs),
+        cmocka_unit_test(tables_and_nudges_are_turns),
         cmocka_unit_test(what_does_not_oscillate_twice_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
