@@ -34,14 +34,10 @@ void exact_stride_start(Exact *exact) {
     double *const *columns = exact->recorder.columns;
     if (base->form != BASE_STILL && !(base->form == BASE_SAMPLED && exact->base.ratio == 1))
         return;
-    lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
+    if (!exact->has_lanes)
+        lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
+    exact->has_lanes = true;
     exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
-    for (int side = 0; side < 2 && exact->has_hops; side++) {
-        if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)
-            exact->pulses[1] = exact->pulses[0];
-        else if (exact->touching[side].contact_omega2 > 0)
-            pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
-    }
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
     memcpy(stretch->columns, columns, sizeof stretch->columns);
@@ -179,6 +175,25 @@ static bool depart(Exact *exact) {
     return true;
 }
 
+static void make_pulse(Exact *exact, Side side) {
+    const ExactKey *key = &exact->key;
+    const Side other = side == SIDE_LEFT ? SIDE_RIGHT : SIDE_LEFT;
+    if (exact->has_pulse[other] && key->contact_omega2[0] == key->contact_omega2[1] &&
+        key->contact_damping[0] == key->contact_damping[1])
+        exact->pulses[side] = exact->pulses[other];
+    else
+        pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+    exact->has_pulse[side] = true;
+}
+
+size_t exact_stride_press(Exact *exact, size_t most) {
+    if (!exact->has_hops)
+        return 0;
+    if (!exact->has_pulse[exact->side])
+        make_pulse(exact, exact->side);
+    return exact_press(exact, most);
+}
+
 size_t exact_stride(Exact *exact, size_t most) {
     if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
         return 0;
@@ -192,7 +207,7 @@ size_t exact_stride(Exact *exact, size_t most) {
             !reach(exact))
             break;
         if (exact->phase == CONTACT)
-            count += exact_press(exact, most - count);
+            count += exact_stride_press(exact, most - count);
         if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||
             !depart(exact))
             break;

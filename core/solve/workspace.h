@@ -8,6 +8,7 @@
 // All zero is empty.
 typedef struct Workspace {
     FourierStock transforms;
+    struct Exact *exact; // the exact solver's, with the tables of the last system
 } Workspace;
 
 void workspace_clear(Workspace *workspace);
