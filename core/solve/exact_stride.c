@@ -32,14 +32,21 @@ void exact_stride_start(Exact *exact) {
     const size_t bytes = exact->plan->count * sizeof(double);
     Stretch *stretch = &exact->stretch;
     double *const *columns = exact->recorder.columns;
-    if (base->form != BASE_STILL && !(base->form == BASE_SAMPLED && exact->base.ratio == 1))
+    const bool is_sine = base->form == BASE_SINE;
+    if (base->form == BASE_PIECES || (base->form == BASE_SAMPLED && exact->base.ratio != 1)) {
+        exact->has_lanes = false;
+        exact->lanes.run = NULL;
         return;
+    }
     if (!exact->has_lanes)
-        lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
+        lanes_make(&exact->lanes, &exact->flying, base->omega, exact->interval, lanes_widest());
     exact->has_lanes = true;
-    exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
+    exact->has_hops = !is_sine && exact->flying.rate * exact->interval <= HOP_REACH;
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
+    if (is_sine)
+        stretch->base_most = fabs(base->amplitude);
+    stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
     stretch->peaks = &exact->ledger.response->peaks;
     stretch->left = stretch->right = INFINITY;
@@ -50,7 +57,7 @@ void exact_stride_start(Exact *exact) {
         if (columns[i] == NULL)
             continue;
         if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
-            i == CHANNEL_BASE_ACCELERATION || (is_damper && !has_damper)) {
+            (i == CHANNEL_BASE_ACCELERATION && !is_sine) || (is_damper && !has_damper)) {
             memset(columns[i], 0, bytes);
             stretch->columns[i] = NULL;
         }
@@ -67,7 +74,7 @@ void exact_stride_start(Exact *exact) {
 static size_t base_ahead(const Exact *exact, const double **values) {
     const Base *base = exact->run->base;
     *values = NULL;
-    if (base->form == BASE_STILL || exact->sample + 1 >= base->count)
+    if (base->form != BASE_SAMPLED || exact->sample + 1 >= base->count)
         return SIZE_MAX;
     *values = base->values + exact->sample;
     return base->count - 1 - exact->sample;

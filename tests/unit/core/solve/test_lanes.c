@@ -59,7 +59,7 @@ static void lanes_agree_with_arcs(void **state) {
         const bool is_still = kind % 2 == 0;
         const Motion motion = structure(kind < 2 ? 0.8 : 0);
         Lanes lanes;
-        lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+        lanes_make(&lanes, &motion, 0, INTERVAL, lanes_widest());
         assert_non_null(lanes.run);
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown;
@@ -110,7 +110,7 @@ static void no_width_of_vector_moves_a_bit(void **state) {
         static Flown flown[3];
         for (LanesWidth width = LANES_PLAIN; width <= lanes_widest(); width++) {
             Lanes lanes;
-            lanes_make(&lanes, &motion, INTERVAL, width);
+            lanes_make(&lanes, &motion, 0, INTERVAL, width);
             fly(&lanes, &start, kind < 2 ? 1 : 0.012, kind % 2 == 0 ? NULL : base, &flown[width]);
             flown[width].stretch.peaks = NULL;
             memset(flown[width].stretch.columns, 0, sizeof flown[width].stretch.columns);
@@ -123,7 +123,7 @@ static void lanes_end_before_a_stop(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+    lanes_make(&lanes, &motion, 0, INTERVAL, lanes_widest());
     static Flown flown;
     for (int step = 1; step < 100; step++) {
         const double room = 0.0001 * step;
@@ -147,7 +147,7 @@ static void an_interval_too_long_for_the_structure_is_refused(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, 0.02, lanes_widest());
+    lanes_make(&lanes, &motion, 0, 0.02, lanes_widest());
     assert_null(lanes.run);
 }
 
