@@ -22,6 +22,7 @@
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
 #include "core/solve/frame.h"
+#include "core/solve/refine.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
@@ -212,8 +213,7 @@ static void keep_tables(Exact *exact) {
                           .base_omega = exact->run->base->omega};
     if (memcmp(&key, &exact->key, sizeof key) == 0)
         return;
-    exact->has_lanes = exact->has_flight = false;
-    exact->has_pulse[SIDE_LEFT] = exact->has_pulse[SIDE_RIGHT] = false;
+    exact_forget(exact);
     exact->key = key;
 }
 
@@ -326,8 +326,6 @@ static Status start(Exact *exact, Run *run, Response *response, Problem *problem
     TRY(prepare(exact, run, response, problem));
     const Status status = solve(exact);
     recorder_finish(&exact->recorder, response);
-    free(exact->holds[SIDE_LEFT]);
-    free(exact->holds[SIDE_RIGHT]);
     return status;
 }
 
@@ -336,12 +334,12 @@ static __attribute__((noinline)) Status start_alone(Run *run, Response *response
                                                     Problem *problem) {
     Exact exact;
     memset(&exact, 0, sizeof exact);
-    return start(&exact, run, response, problem);
+    const Status status = start(&exact, run, response, problem);
+    exact_forget(&exact);
+    return status;
 }
 
-static Status exact_run(Run *run, Response *response, Problem *problem) {
-    if (!plan_is_single(run->plan))
-        return frame_run(run, response, problem);
+static Status run_on_grid(Run *run, Response *response, Problem *problem) {
     Workspace *workspace = run->workspace;
     if (workspace == NULL)
         return start_alone(run, response, problem);
@@ -353,6 +351,25 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
         memset(workspace->exact, 0, sizeof(Exact));
     }
     return start(workspace->exact, run, response, problem);
+}
+
+static Status exact_run(Run *run, Response *response, Problem *problem) {
+    if (!plan_is_single(run->plan))
+        return frame_run(run, response, problem);
+    // A base whose samples are further apart than the output's goes by strides once it has them.
+    const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
+    Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;
+    double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
+    if (values == NULL)
+        return run_on_grid(run, response, problem);
+    const Base refined = refine_base(run->base, run->plan->sample_rate, fine, values);
+    Run own = *run;
+    own.base = &refined;
+    const Status status = run_on_grid(&own, response, problem);
+    run->steps = own.steps;
+    workspace_tidy(workspace);
+    workspace_clear(&none);
+    return status;
 }
 
 const Solver solver_exact = {

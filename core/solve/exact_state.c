@@ -1,6 +1,16 @@
 #include "core/solve/exact_state.h"
 
 #include <math.h>
+#include <stdlib.h>
+
+void exact_forget(Exact *exact) {
+    exact->has_lanes = exact->has_flight = false;
+    for (int side = 0; side < 2; side++) {
+        exact->has_pulse[side] = false;
+        free(exact->holds[side]);
+        exact->holds[side] = NULL;
+    }
+}
 
 // Room between the free mass and a stop at r = 0 of the present origin [m].
 double exact_room(const Exact *exact, Side side) {

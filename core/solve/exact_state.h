@@ -47,7 +47,6 @@ typedef struct Exact {
     Ledger ledger;
     LedgerRow row; // of the present contact or rest
     Recorder recorder;
-    Hold *holds[2];      // by Side; made when a contact first lasts long
     size_t contact_arcs; // since it began
     size_t arcs;         // since the watch was asked
     size_t events;       // all so far
@@ -59,8 +58,12 @@ typedef struct Exact {
     Flight flight;
     Lanes lanes;
     Pulse pulses[2]; // by Side
+    Hold *holds[2];  // by Side; made when a contact first lasts long
     Trust trust;     // its tables
 } Exact;
+
+// Forgets all tables. The Exact itself stays.
+void exact_forget(Exact *exact);
 
 // +1 for the right stop, -1 for the left.
 static inline double exact_sign(Side side) {

@@ -62,11 +62,12 @@ void exact_stride_start(Exact *exact) {
             stretch->columns[i] = NULL;
         }
     }
+    // From its last sample on the base is still.
     double *const column = columns[CHANNEL_BASE_ACCELERATION];
+    const size_t given = base->count > 0 ? base->count - 1 : 0;
     if (column != NULL && base->form == BASE_SAMPLED)
         memcpy(column, base->values,
-               (base->count < exact->plan->count ? base->count : exact->plan->count) *
-                   sizeof *column);
+               (given < exact->plan->count ? given : exact->plan->count) * sizeof *column);
 }
 
 // The base from the present sample on: how many intervals it goes on in one way, and its samples or
