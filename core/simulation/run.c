@@ -190,6 +190,7 @@ static Status travel(Journey *journey, Problem *problem) {
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
+               .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
                .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};

@@ -22,6 +22,7 @@
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
 #include "core/solve/frame.h"
+#include "core/solve/refine.h"
 #include "core/solve/solver.h"
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
@@ -189,7 +190,7 @@ static Status cross(Exact *exact, double length) {
         // to the last: the interval before that is the caller's.
         if (exact->lanes.run != NULL && exact->phase == CONTACT && exact->contact_arcs == 0 &&
             exact->sample + 2 < exact->plan->count)
-            (void)exact_press(exact, exact->plan->count - 2 - exact->sample);
+            (void)exact_stride_press(exact, exact->plan->count - 2 - exact->sample);
         if (exact->offset == before && exact->events == events)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "the contact is too stiff to be followed: at t = %.6g s a step of "
@@ -200,9 +201,25 @@ static Status cross(Exact *exact, double length) {
     return STATUS_OK;
 }
 
+// Tables of another system are forgotten.
+static void keep_tables(Exact *exact) {
+    const Motion *left = &exact->touching[SIDE_LEFT], *right = &exact->touching[SIDE_RIGHT];
+    const ExactKey key = {.omega2 = exact->flying.omega2,
+                          .damping = exact->flying.damping,
+                          .share = exact->flying.share,
+                          .contact_omega2 = {left->contact_omega2, right->contact_omega2},
+                          .contact_damping = {left->contact_damping, right->contact_damping},
+                          .interval = exact->interval,
+                          .base_omega = exact->run->base->omega};
+    if (memcmp(&key, &exact->key, sizeof key) == 0)
+        return;
+    exact_forget(exact);
+    exact->key = key;
+}
+
 static Status prepare(Exact *exact, Run *run, Response *response, Problem *problem) {
     const Plan *plan = run->plan;
-    memset(exact, 0, offsetof(Exact, trust));
+    memset(exact, 0, offsetof(Exact, key));
     exact->run = run;
     exact->plan = plan;
     exact->damper = plan->dampers;
@@ -231,6 +248,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
         return problem_set(
             problem, STATUS_UNSTABLE,
             "the scene's masses and stiffnesses are too far apart for double precision");
+    keep_tables(exact);
     base_cursor_make(&exact->base, run->base, plan->sample_rate);
     exact->phase = FLIGHT;
     exact->origin = ORIGIN_MIDDLE;
@@ -243,8 +261,10 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
     exact_stride_start(exact);
-    if (exact->lanes.run == NULL)
+    if (exact->lanes.run == NULL && !exact->has_flight) {
         flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
+        exact->has_flight = true;
+    }
     return STATUS_OK;
 }
 
@@ -302,15 +322,53 @@ static Status solve(Exact *exact) {
     return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
 }
 
+static Status start(Exact *exact, Run *run, Response *response, Problem *problem) {
+    TRY(prepare(exact, run, response, problem));
+    const Status status = solve(exact);
+    recorder_finish(&exact->recorder, response);
+    return status;
+}
+
+// Without a workspace: all on the stack.
+static __attribute__((noinline)) Status start_alone(Run *run, Response *response,
+                                                    Problem *problem) {
+    Exact exact;
+    memset(&exact, 0, sizeof exact);
+    const Status status = start(&exact, run, response, problem);
+    exact_forget(&exact);
+    return status;
+}
+
+static Status run_on_grid(Run *run, Response *response, Problem *problem) {
+    Workspace *workspace = run->workspace;
+    if (workspace == NULL)
+        return start_alone(run, response, problem);
+    if (workspace->exact == NULL) {
+        // Its vectors want their alignment.
+        const size_t room = (sizeof(Exact) + 63) / 64 * 64;
+        if ((workspace->exact = aligned_alloc(64, room)) == NULL)
+            return start_alone(run, response, problem);
+        memset(workspace->exact, 0, sizeof(Exact));
+    }
+    return start(workspace->exact, run, response, problem);
+}
+
 static Status exact_run(Run *run, Response *response, Problem *problem) {
     if (!plan_is_single(run->plan))
         return frame_run(run, response, problem);
-    Exact exact;
-    TRY(prepare(&exact, run, response, problem));
-    const Status status = solve(&exact);
-    recorder_finish(&exact.recorder, response);
-    free(exact.holds[SIDE_LEFT]);
-    free(exact.holds[SIDE_RIGHT]);
+    // A base whose samples are further apart than the output's goes by strides once it has them.
+    const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
+    Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;
+    double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
+    if (values == NULL)
+        return run_on_grid(run, response, problem);
+    const Base refined = refine_base(run->base, run->plan->sample_rate, fine, values);
+    Run own = *run;
+    own.base = &refined;
+    const Status status = run_on_grid(&own, response, problem);
+    run->steps = own.steps;
+    workspace_tidy(workspace);
+    workspace_clear(&none);
     return status;
 }
 

@@ -20,17 +20,20 @@
 typedef enum Phase { FLIGHT, CONTACT, RESTING } Phase;
 typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN_MIDDLE } Origin;
 
+// All that the tables are made from.
+typedef struct ExactKey {
+    double omega2, damping, share;
+    double contact_omega2[2], contact_damping[2]; // by Side
+    double interval, base_omega;
+} ExactKey;
+
 typedef struct Exact {
     Run *run;
     const Plan *plan;
     const PlanDamper *damper; // all zero where there is none
     Problem *problem;
     Motion flying, touching[2], resting;
-    Flight flight;
-    Lanes lanes;
     Stretch stretch;
-    Pulse pulses[2]; // by Side
-    HopTable hops;
     bool has_hops;    // intervals are short enough for hop.h
     size_t pending;   // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
@@ -47,13 +50,24 @@ typedef struct Exact {
     Ledger ledger;
     LedgerRow row; // of the present contact or rest
     Recorder recorder;
-    Hold *holds[2];      // by Side; made when a contact first lasts long
     size_t contact_arcs; // since it began
     size_t arcs;         // since the watch was asked
     size_t events;       // all so far
     size_t still_events; // in a row, without time passing
-    Trust trust;         // last: it is large, and cleans itself
+    // From here on what the next run of the same system finds ready; a run begins with all above
+    // empty. Each is made when it is first needed.
+    ExactKey key;
+    bool has_lanes, has_flight, has_pulse[2];
+    Flight flight;
+    Lanes lanes;
+    HopTable hops;   // with the lanes
+    Pulse pulses[2]; // by Side
+    Hold *holds[2];  // by Side; made when a contact first lasts long
+    Trust trust;     // its tables
 } Exact;
+
+// Forgets all tables. The Exact itself stays.
+void exact_forget(Exact *exact);
 
 // +1 for the right stop, -1 for the left.
 static inline double exact_sign(Side side) {

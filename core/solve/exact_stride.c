@@ -31,19 +31,23 @@ void exact_stride_start(Exact *exact) {
     const size_t bytes = exact->plan->count * sizeof(double);
     Stretch *stretch = &exact->stretch;
     double *const *columns = exact->recorder.columns;
-    if (base->form != BASE_STILL && !(base->form == BASE_SAMPLED && exact->base.ratio == 1))
+    const bool is_sine = base->form == BASE_SINE;
+    if (base->form == BASE_PIECES || (base->form == BASE_SAMPLED && exact->base.ratio != 1)) {
+        exact->has_lanes = false;
+        exact->lanes.run = NULL;
         return;
-    lanes_make(&exact->lanes, &exact->flying, exact->interval, lanes_widest());
-    exact->has_hops = exact->flying.rate * exact->interval <= HOP_REACH;
-    hop_table_make(&exact->hops, &exact->flying, exact->interval);
-    for (int side = 0; side < 2 && exact->has_hops; side++) {
-        if (side > 0 && memcmp(&exact->touching[0], &exact->touching[1], sizeof(Motion)) == 0)
-            exact->pulses[1] = exact->pulses[0];
-        else if (exact->touching[side].contact_omega2 > 0)
-            pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
     }
+    if (!exact->has_lanes) {
+        lanes_make(&exact->lanes, &exact->flying, base->omega, exact->interval, lanes_widest());
+        hop_table_make(&exact->hops, &exact->flying, exact->interval);
+    }
+    exact->has_lanes = true;
+    exact->has_hops = !is_sine && exact->flying.rate * exact->interval <= HOP_REACH;
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
+    if (is_sine)
+        stretch->base_most = fabs(base->amplitude);
+    stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
     stretch->peaks = &exact->ledger.response->peaks;
     stretch->left = stretch->right = INFINITY;
@@ -54,16 +58,17 @@ void exact_stride_start(Exact *exact) {
         if (columns[i] == NULL)
             continue;
         if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
-            i == CHANNEL_BASE_ACCELERATION || (is_damper && !has_damper)) {
+            (i == CHANNEL_BASE_ACCELERATION && !is_sine) || (is_damper && !has_damper)) {
             memset(columns[i], 0, bytes);
             stretch->columns[i] = NULL;
         }
     }
+    // From its last sample on the base is still.
     double *const column = columns[CHANNEL_BASE_ACCELERATION];
+    const size_t given = base->count > 0 ? base->count - 1 : 0;
     if (column != NULL && base->form == BASE_SAMPLED)
         memcpy(column, base->values,
-               (base->count < exact->plan->count ? base->count : exact->plan->count) *
-                   sizeof *column);
+               (given < exact->plan->count ? given : exact->plan->count) * sizeof *column);
 }
 
 // The base from the present sample on: how many intervals it goes on in one way, and its samples or
@@ -71,7 +76,7 @@ void exact_stride_start(Exact *exact) {
 static size_t base_ahead(const Exact *exact, const double **values) {
     const Base *base = exact->run->base;
     *values = NULL;
-    if (base->form == BASE_STILL || exact->sample + 1 >= base->count)
+    if (base->form != BASE_SAMPLED || exact->sample + 1 >= base->count)
         return SIZE_MAX;
     *values = base->values + exact->sample;
     return base->count - 1 - exact->sample;
@@ -191,6 +196,25 @@ static bool depart(Exact *exact) {
     return true;
 }
 
+static void make_pulse(Exact *exact, Side side) {
+    const ExactKey *key = &exact->key;
+    const Side other = side == SIDE_LEFT ? SIDE_RIGHT : SIDE_LEFT;
+    if (exact->has_pulse[other] && key->contact_omega2[0] == key->contact_omega2[1] &&
+        key->contact_damping[0] == key->contact_damping[1])
+        exact->pulses[side] = exact->pulses[other];
+    else
+        pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+    exact->has_pulse[side] = true;
+}
+
+size_t exact_stride_press(Exact *exact, size_t most) {
+    if (!exact->has_hops)
+        return 0;
+    if (!exact->has_pulse[exact->side])
+        make_pulse(exact, exact->side);
+    return exact_press(exact, most);
+}
+
 size_t exact_stride(Exact *exact, size_t most) {
     if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
         return 0;
@@ -211,7 +235,7 @@ size_t exact_stride(Exact *exact, size_t most) {
             continue;
         }
         if (exact->phase == CONTACT)
-            count += exact_press(exact, most - count);
+            count += exact_stride_press(exact, most - count);
         if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||
             !depart(exact))
             break;

@@ -10,6 +10,10 @@ void exact_stride_start(Exact *exact);
 // From the present sample over as many as go by strides, at most `most`; returns how many.
 size_t exact_stride(Exact *exact, size_t most);
 
+// The present contact, from here on, as far as it goes by its closed form; returns how many samples
+// it has passed, at most `most`.
+size_t exact_stride_press(Exact *exact, size_t most);
+
 // Records the sample at the end of the present interval; what waits is entered where statistics
 // begin.
 void exact_stride_pass(Exact *exact);

@@ -34,10 +34,91 @@ static Impulse impulse_at(long double omega2, long double damping, long double t
     return out;
 }
 
+// One-interval map less the identity.
+static void make_step(long double omega2, long double damping, long double h,
+                      long double step[2][2]) {
+    const Impulse one = impulse_at(omega2, damping, h);
+    step[0][0] = -omega2 * one.I1;
+    step[0][1] = one.S;
+    step[1][0] = -omega2 * one.S;
+    step[1][1] = -damping * one.S - omega2 * one.I1;
+}
+
+// What x and v have become from rest after time t under a_g = cos (column 0) or sin of omega t: a
+// Taylor series.
+static void force_by_sine(long double omega2, long double damping, long double omega, long double t,
+                          long double out[2][2]) {
+    for (int column = 0; column < 2; column++) {
+        long double base[2] = {column == 0, column == 1 ? omega * t : 0}; // terms of a_g
+        long double term[2] = {0, 0};                                     // of x
+        long double x = 0, v = 0;
+        for (int k = 0; k < SERIES; k++) {
+            const long double next =
+                -(damping * t * (k + 1) * term[1] + omega2 * t * t * term[0] + t * t * base[0]) /
+                ((k + 1) * (k + 2));
+            x += next;
+            v += (k + 2) * next / t;
+            term[0] = term[1];
+            term[1] = next;
+            const long double after = -omega * omega * t * t * base[0] / ((k + 1) * (k + 2));
+            base[0] = base[1];
+            base[1] = after;
+        }
+        out[0][column] = x;
+        out[1][column] = v;
+    }
+}
+
+static void turn_by_sine(long double angle, long double out[2]) {
+    long double term = 1;
+    out[0] = out[1] = 0;
+    for (int k = 0; k < SERIES; k++, term *= angle / k)
+        out[k % 2] += k % 4 < 2 ? term : -term;
+}
+
+// From rest under a sine, after 1 to 8 intervals.
+static void follow_sine(long double omega2, long double damping, long double omega, long double h,
+                        double x[2][LANES], double v[2][LANES]) {
+    long double step[2][2], force[2][2], one[2], at[2][2] = {{0}}, turn[2] = {1, 0};
+    make_step(omega2, damping, h, step);
+    force_by_sine(omega2, damping, omega, h, force);
+    turn_by_sine(omega * h, one);
+    for (int j = 0; j < LANES; j++) {
+        for (int column = 0; column < 2; column++) {
+            // The sine as this interval's start sees it.
+            const long double cosine = column == 0 ? turn[0] : turn[1];
+            const long double sine = column == 0 ? -turn[1] : turn[0];
+            const long double top = at[0][column], low = at[1][column];
+            at[0][column] +=
+                step[0][0] * top + step[0][1] * low + force[0][0] * cosine + force[0][1] * sine;
+            at[1][column] +=
+                step[1][0] * top + step[1][1] * low + force[1][0] * cosine + force[1][1] * sine;
+            x[column][j] = (double)at[0][column];
+            v[column][j] = (double)at[1][column];
+        }
+        const long double c = turn[0], s = turn[1];
+        turn[0] = c * one[0] - s * one[1];
+        turn[1] = s * one[0] + c * one[1];
+    }
+}
+
+static void make_sine(Lanes *lanes, const Motion *flying, double interval) {
+    const long double omega = lanes->base_omega;
+    follow_sine(flying->omega2, flying->damping, omega, interval, lanes->x_s, lanes->v_s);
+    follow_sine(0, 0, omega, interval, lanes->z_s, lanes->speed_s);
+    for (int j = 0; j < LANES; j++) {
+        long double turn[2];
+        turn_by_sine(omega * interval * (j + 1), turn);
+        lanes->turn[0][j] = (double)turn[0];
+        lanes->turn[1][j] = (double)turn[1];
+    }
+}
+
 static void make_powers(Lanes *lanes, const Motion *flying, double interval) {
     const long double W = flying->omega2, D = flying->damping, h = interval;
     const Impulse one = impulse_at(W, D, h);
-    const long double step[2][2] = {{-W * one.I1, one.S}, {-W * one.S, -D * one.S - W * one.I1}};
+    long double step[2][2];
+    make_step(W, D, h, step);
     // Powers less the identity, and what the base's two ends give over one interval, carried on.
     long double power[2][2] = {{step[0][0], step[0][1]}, {step[1][0], step[1][1]}};
     long double first[2] = {one.I2 / h - one.I1, one.I1 / h - one.S};
@@ -88,8 +169,18 @@ static void make_forms(Lanes *lanes, const Motion *flying, double interval) {
     for (int i = 0; i < 5; i++) {
         const Impulse back = impulse_at(W, -(long double)D, (long double)interval * node[i]);
         const double S = (double)back.S, I1 = (double)back.I1;
-        const double x = W * S, v = 1 + D * S - W * I1, a = I1 / interval, b = S - a;
-        const double h = weight[i] * interval, from = node[i], to = 1 - node[i];
+        const double x = W * S, v = 1 + D * S - W * I1, h = weight[i] * interval;
+        double a = I1 / interval, b = S - a, from = node[i], to = 1 - node[i];
+        if (lanes->base_omega > 0) {
+            long double force[2][2], turn[2];
+            force_by_sine(W, -(long double)D, lanes->base_omega, (long double)interval * node[i],
+                          force);
+            turn_by_sine((long double)lanes->base_omega * interval * node[i], turn);
+            b = (double)-force[1][0];
+            a = (double)force[1][1];
+            to = (double)turn[0];
+            from = (double)-turn[1];
+        }
         const double vv[LANE_SUMS] = {x * x,     2 * x * v, v * v, 2 * x * b, 2 * x * a,
                                       2 * v * b, 2 * v * a, b * b, 2 * a * b, a * a};
         const double av[LANE_SUMS] = {
@@ -146,10 +237,16 @@ INLINE void look_for_peaks(const Lanes *t, Stretch *s, size_t count, const doubl
             *peaks[i] = larger(most[i][j], *peaks[i]);
 }
 
+// a_g's integrals over intervals that end at `count` samples: from b and a there (LaneSum) under a
+// sine, else from a_g itself, from the sample before on, or NULL if it is still.
 static void store_means(const Lanes *t, double *column, size_t count, double before,
-                        const double *v, const double *a) {
+                        const double *v, const double *b, const double *a) {
     for (size_t j = 0; j < count; j++) {
-        const double base = a == NULL ? 0 : t->interval * (a[j] + a[j + 1]) / 2;
+        double base = 0;
+        if (t->base_omega > 0)
+            base = t->speed_s[1][0] * a[j] - t->speed_s[0][0] * b[j];
+        else if (b != NULL)
+            base = t->interval * (a[j] + b[j]) / 2;
         column[j] = (v[j] - (j == 0 ? before : v[j - 1]) + base) / t->interval;
     }
 }
@@ -158,25 +255,42 @@ static void store_means(const Lanes *t, double *column, size_t count, double bef
 typedef struct Group {
     struct {
         double x, v, r, z;
+        double b, a; // of a sine
     } state[GROUP + 1];
     _Alignas(64) double x[GROUP * LANES], v[GROUP * LANES], r[GROUP * LANES];
+    double b[GROUP * LANES], a[GROUP * LANES]; // of a sine
 } Group;
 
-// What single samples add; a is NULL where the base is still.
-static void add_samples(Stretch *s, size_t count, const double *x, const double *v,
+typedef enum BaseKind { STILL, LINEAR, SINE } BaseKind;
+
+static void start_group(const Stretch *s, Group *group, size_t sample, BaseKind kind) {
+    group->state[0].x = s->x;
+    group->state[0].v = s->v;
+    group->state[0].r = s->r;
+    group->state[0].z = s->z;
+    if (kind != SINE)
+        return;
+    Slice slice;
+    (void)base_cursor_interval(s->base, sample, &slice);
+    group->state[0].b = slice.value;
+    group->state[0].a = slice.slope;
+}
+
+// What single samples add; b is NULL where the base is still.
+static void add_samples(Stretch *s, size_t count, const double *x, const double *v, const double *b,
                         const double *a) {
     for (size_t j = 0; j < count; j++) {
         s->sums[XX][j] += x[j] * x[j];
         s->sums[XV][j] += x[j] * v[j];
         s->sums[VV][j] += v[j] * v[j];
-        if (a == NULL)
+        if (b == NULL)
             continue;
-        s->sums[XB][j] += x[j] * a[j + 1];
+        s->sums[XB][j] += x[j] * b[j];
         s->sums[XA][j] += x[j] * a[j];
-        s->sums[VB][j] += v[j] * a[j + 1];
+        s->sums[VB][j] += v[j] * b[j];
         s->sums[VA][j] += v[j] * a[j];
-        s->sums[BB][j] += a[j + 1] * a[j + 1];
-        s->sums[AB][j] += a[j] * a[j + 1];
+        s->sums[BB][j] += b[j] * b[j];
+        s->sums[AB][j] += a[j] * b[j];
         s->sums[AA][j] += a[j] * a[j];
     }
 }
@@ -184,7 +298,11 @@ static void add_samples(Stretch *s, size_t count, const double *x, const double 
 // The last intervals before the end, fewer than a block.
 static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size_t sample,
                                                 size_t most, const double *base) {
-    double a[LANES + 1] = {0}, x[LANES], v[LANES], r[LANES], z[LANES];
+    double a[LANES + 1] = {0}, b[LANES] = {0}, x[LANES], v[LANES], r[LANES], z[LANES];
+    const BaseKind kind = t->base_omega > 0 ? SINE : base != NULL ? LINEAR : STILL;
+    Slice sine = {0, 0, 0};
+    if (kind == SINE)
+        (void)base_cursor_interval(s->base, sample, &sine);
     if (base != NULL)
         memcpy(a, base, (most + 1) * sizeof *a);
     for (int j = 0; j < LANES; j++) {
@@ -194,6 +312,16 @@ static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size
             dv += t->v_a[i][j] * a[i];
             dz += t->z_a[i][j] * a[i];
             speed += t->speed_a[i][j] * a[i];
+        }
+        if (kind == SINE) {
+            dx = t->x_s[0][j] * sine.value + t->x_s[1][j] * sine.slope;
+            dv = t->v_s[0][j] * sine.value + t->v_s[1][j] * sine.slope;
+            dz = t->z_s[0][j] * sine.value + t->z_s[1][j] * sine.slope;
+            speed = t->speed_s[0][j] * sine.value + t->speed_s[1][j] * sine.slope;
+            b[j] = t->turn[0][j] * sine.value + t->turn[1][j] * sine.slope;
+            a[j] = t->turn[0][j] * sine.slope - t->turn[1][j] * sine.value;
+        } else {
+            b[j] = a[j + 1];
         }
         dx += t->x_x[j] * s->x + t->x_v[j] * s->v;
         dv += t->v_x[j] * s->x + t->v_v[j] * s->v;
@@ -224,11 +352,13 @@ static __attribute__((noinline)) size_t careful(const Lanes *t, Stretch *s, size
             columns[CHANNEL_DAMPER_DISPLACEMENT][at] = x[j] + (s->middle + r[j]);
         if (columns[CHANNEL_DAMPER_VELOCITY] != NULL)
             columns[CHANNEL_DAMPER_VELOCITY][at] = z[j];
+        if (columns[CHANNEL_BASE_ACCELERATION] != NULL)
+            columns[CHANNEL_BASE_ACCELERATION][at] = b[j];
     }
-    add_samples(s, count, x, v, base == NULL ? NULL : a);
+    add_samples(s, count, x, v, kind == STILL ? NULL : b, a);
     if (s->columns[CHANNEL_MEAN_ACCELERATION] != NULL)
         store_means(t, s->columns[CHANNEL_MEAN_ACCELERATION] + sample + 1, count, s->v, v,
-                    base == NULL ? NULL : a);
+                    kind == STILL ? NULL : b, a);
     look_for_peaks(t, s, count, x, v, r);
     s->x = x[count - 1];
     s->v = v[count - 1];
@@ -292,16 +422,20 @@ static LanesRun *run_of(LanesWidth width) {
     return run_plain;
 }
 
-void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width) {
+void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double interval,
+                LanesWidth width) {
     memset(lanes, 0, sizeof *lanes);
     const double omega = sqrt(flying->omega2);
-    if (!(LANES * interval * (omega > flying->damping ? omega : flying->damping) <= 1))
+    if (!(LANES * interval * larger(larger(omega, flying->damping), base_omega) <= 1))
         return;
+    lanes->base_omega = base_omega;
     lanes->interval = interval;
     lanes->omega2 = flying->omega2;
     lanes->damping = flying->damping;
     lanes->omega = omega;
     make_powers(lanes, flying, interval);
+    if (base_omega > 0)
+        make_sine(lanes, flying, interval);
     make_forms(lanes, flying, interval);
     lanes->width = width;
     lanes->run = run_of(width);

@@ -9,11 +9,12 @@
 
 #include "core/result/channel.h"
 #include "core/result/response.h"
-#include "core/solve/arc.h"
+#include "core/solve/cursor.h"
 
 enum { LANES = 8 };
 
-// Sums over samples; with b the base at a sample and a at the one before.
+// Sums over samples; with b the base at a sample and a at the one before, or under a sine its other
+// half: a_g is b cos + a sin from there on.
 typedef enum LaneSum { XX, XV, VV, XB, XA, VB, VA, BB, AB, AA, LANE_SUMS } LaneSum;
 
 // What a stretch starts from and what it comes to.
@@ -23,6 +24,7 @@ typedef struct Stretch {
     double left, right;             // r stays within (-left, right); INFINITY without a damper
     double middle;                  // displacement of the free mass less x and r [m]
     double base_most;               // |a_g| is not larger over the whole run [m/s^2]
+    const BaseCursor *base;         // of a sine
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
     Peaks *peaks;
     _Alignas(64) double sums[LANE_SUMS][LANES];
@@ -41,6 +43,10 @@ struct Lanes {
     double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
     double z_a[LANES + 1][LANES];        // displacement of the free mass
     double speed_a[LANES + 1][LANES];    // its velocity
+    double x_s[2][LANES], v_s[2][LANES]; // what they gain from a sine of value and slope
+    double z_s[2][LANES], speed_s[2][LANES];
+    double turn[2][LANES];               // its cosine and sine
+    double base_omega;                   // of a sine, or 0 [rad/s]
     double interval;                     // [s]
     double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
@@ -49,11 +55,13 @@ struct Lanes {
 };
 
 LanesWidth lanes_widest(void); // on this processor
-void lanes_make(Lanes *lanes, const Motion *flying, double interval, LanesWidth width);
+// `base_omega` is a sine's; 0: the base is still or linear.
+void lanes_make(Lanes *lanes, const Motion *flying, double base_omega, double interval,
+                LanesWidth width);
 
 // Flies from `sample` over at most `count` intervals, as far as surely no stop is reached on the
 // way, and returns how many. `base` is a_g at `sample` and after (count + 1 of them), NULL if
-// still.
+// still or a sine.
 static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
                                const double *base) {
     return lanes->run(lanes, stretch, sample, count, base);

@@ -8,6 +8,7 @@
 #include "core/excite/base.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
+#include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {
@@ -27,6 +28,7 @@ typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Watch *watch;
+    Workspace *workspace;     // or NULL
     const RunColumn *columns; // what is wanted, each once
     size_t column_count;
     double statistics_from; // [s]

@@ -24,21 +24,23 @@ enum { X, V, R, W, SIZE };
 static const double SWING_STEP = 0.2, CONTACT_STEP = 0.05;
 static const double ROUNDING = DBL_EPSILON;
 
-// n steps of D and what is left.
-static uint64_t divide(double length, double step, double *rest) {
-    const double most = (double)(UINT64_C(1) << TRUST_LEVELS) - 1;
-    const double count = length / step + 0.5;
-    const uint64_t n = (uint64_t)(!(count < most) ? most : count > 0 ? count : 0);
-    *rest = length - (double)n * step;
-    if (!(count < most))
+// n steps of D, of which there are `frequency` in a second, and what is left.
+static inline uint64_t divide(double length, double frequency, double step, double *rest) {
+    const double most = 4294967295; // 2^TRUST_LEVELS - 1
+    const double count = length * frequency + 0.5;
+    if (!(count < most)) {
         *rest = 0;
-    return n;
+        return (uint64_t)most;
+    }
+    const int64_t n = count > 0 ? (int64_t)count : 0;
+    *rest = length - (double)n * step;
+    return (uint64_t)n;
 }
 
 static void swing_levels(TrustSwing *swing, int levels) {
     if (swing->levels == 0) {
         // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
-        const double h = SWING_STEP / swing->rate;
+        const double h = swing->step;
         for (int column = 0; column < 2; column++) {
             double x = column == 0, v = column == 1, term_x = x, term_v = v;
             for (int i = 1; i < 12; i++) {
@@ -64,7 +66,7 @@ static void swing_levels(TrustSwing *swing, int levels) {
 
 static void swing_go(TrustSwing *swing, double (*y)[TRUST_LANES], double length) {
     double h;
-    uint64_t n = divide(length, SWING_STEP / swing->rate, &h);
+    uint64_t n = divide(length, swing->rate * (1 / SWING_STEP), swing->step, &h);
     const double half = h * h / 2;
     for (int i = 0; i < TRUST_LANES; i++) {
         const double x = y[X][i], v = y[V][i], a = -swing->omega2 * x - swing->damping * v;
@@ -86,33 +88,40 @@ static void swing_go(TrustSwing *swing, double (*y)[TRUST_LANES], double length)
     }
 }
 
-// A y in the coordinates (x, V, r, W).
-static void contact_slope(const TrustContact *contact, const double *y, double *slope) {
-    const double v = y[V] + contact->motion.share * contact->motion.contact_damping * y[R];
-    const double push = contact->motion.omega2 * y[X] + contact->motion.damping * v;
-    const double spring = contact->motion.contact_omega2 * y[R];
-    slope[X] = v;
-    slope[V] = contact->motion.share * spring - push;
-    slope[R] = y[W] - contact->motion.contact_damping * y[R];
-    slope[W] = push - spring;
+// A y in the coordinates (x, V, r, W), all lanes.
+static inline void contact_slope(const TrustContact *contact,
+                                 const double (*restrict y)[TRUST_LANES],
+                                 double (*restrict slope)[TRUST_LANES]) {
+    const Motion *m = &contact->motion;
+    const double fling = m->share * m->contact_damping;
+    for (int i = 0; i < TRUST_LANES; i++) {
+        const double v = y[V][i] + fling * y[R][i];
+        const double push = m->omega2 * y[X][i] + m->damping * v;
+        const double spring = m->contact_omega2 * y[R][i];
+        slope[X][i] = v;
+        slope[V][i] = m->share * spring - push;
+        slope[R][i] = y[W][i] - m->contact_damping * y[R][i];
+        slope[W][i] = push - spring;
+    }
 }
 
 static void contact_levels(TrustContact *contact, int levels) {
     if (contact->levels == 0) {
-        const double h = CONTACT_STEP / contact->motion.rate;
-        for (int column = 0; column < SIZE; column++) {
-            double term[SIZE] = {0}, sum[SIZE] = {0};
-            term[column] = sum[column] = 1;
-            for (int i = 1; i < 12; i++) {
-                double slope[SIZE];
-                contact_slope(contact, term, slope);
-                for (int row = 0; row < SIZE; row++) {
-                    term[row] = h / i * slope[row];
-                    sum[row] += term[row];
-                }
-            }
+        const double h = contact->step;
+        // A Taylor series, each lane a column.
+        _Static_assert((int)TRUST_LANES == (int)SIZE, "a lane for each column");
+        double term[SIZE][TRUST_LANES] = {{0}}, slope[SIZE][TRUST_LANES];
+        for (int i = 0; i < SIZE; i++)
+            term[i][i] = 1;
+        memcpy(contact->power[0], term, sizeof term);
+        for (int i = 1; i < 12; i++) {
+            const double share = h / i;
+            contact_slope(contact, (const double(*)[TRUST_LANES])term, slope);
             for (int row = 0; row < SIZE; row++)
-                contact->power[0][row][column] = sum[row];
+                for (int column = 0; column < SIZE; column++) {
+                    term[row][column] = share * slope[row][column];
+                    contact->power[0][row][column] += term[row][column];
+                }
         }
         contact->levels = 1;
     }
@@ -126,63 +135,90 @@ static void contact_levels(TrustContact *contact, int levels) {
     }
 }
 
+// Two lanes at once.
+typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
+
+typedef struct Pairs {
+    Pair x, v, r, w;
+} Pairs;
+
+static inline Pairs pairs_slope(const Motion *m, const Pairs *y) {
+    const Pair v = y->v + m->share * m->contact_damping * y->r;
+    const Pair push = m->omega2 * y->x + m->damping * v, spring = m->contact_omega2 * y->r;
+    return (Pairs){v, m->share * spring - push, y->w - m->contact_damping * y->r, push - spring};
+}
+
 static void contact_go(TrustContact *contact, double (*y)[TRUST_LANES], double length) {
     double h;
-    uint64_t n = divide(length, CONTACT_STEP / contact->motion.rate, &h);
-    for (int i = 0; i < TRUST_LANES; i++) {
-        const double at[SIZE] = {y[X][i], y[V][i], y[R][i], y[W][i]};
-        double first[SIZE], second[SIZE], third[SIZE];
-        contact_slope(contact, at, first);
-        contact_slope(contact, first, second);
-        contact_slope(contact, second, third);
-        for (int row = 0; row < SIZE; row++)
-            y[row][i] = at[row] + h * (first[row] + h / 2 * (second[row] + h / 3 * third[row]));
-    }
-    for (int level = 0; n > 0; level++, n >>= 1) {
-        if (level >= contact->levels)
-            contact_levels(contact, level + 1);
-        if ((n & 1) == 0)
-            continue;
-        const double(*const p)[4] = (const double(*)[4])contact->power[level];
-        double to[SIZE][TRUST_LANES];
-        for (int row = 0; row < SIZE; row++)
-            for (int i = 0; i < TRUST_LANES; i++)
-                to[row][i] = p[row][0] * y[0][i] + p[row][1] * y[1][i] + p[row][2] * y[2][i] +
-                             p[row][3] * y[3][i];
-        memcpy(y, to, sizeof to);
+    const uint64_t n = divide(length, contact->motion.rate * (1 / CONTACT_STEP), contact->step, &h);
+    int levels = 0;
+    while (n >> levels > 0)
+        levels++;
+    if (levels > contact->levels)
+        contact_levels(contact, levels);
+    const double half = h * h / 2, sixth = half * h * (1.0 / 3);
+    for (int lane = 0; lane < TRUST_LANES; lane += 2) {
+        Pair *const at[SIZE] = {(Pair *)&y[X][lane], (Pair *)&y[V][lane], (Pair *)&y[R][lane],
+                                (Pair *)&y[W][lane]};
+        Pairs now = {*at[X], *at[V], *at[R], *at[W]};
+        const Pairs first = pairs_slope(&contact->motion, &now);
+        const Pairs second = pairs_slope(&contact->motion, &first);
+        const Pairs third = pairs_slope(&contact->motion, &second);
+        now.x += h * first.x + (half * second.x + sixth * third.x);
+        now.v += h * first.v + (half * second.v + sixth * third.v);
+        now.r += h * first.r + (half * second.r + sixth * third.r);
+        now.w += h * first.w + (half * second.w + sixth * third.w);
+        for (int level = 0; level < levels; level++) {
+            if ((n >> level & 1) == 0)
+                continue;
+            const double(*const p)[4] = (const double(*)[4])contact->power[level];
+            const Pairs from = now;
+            now.x = (p[0][0] * from.x + p[0][1] * from.v) + (p[0][2] * from.r + p[0][3] * from.w);
+            now.v = (p[1][0] * from.x + p[1][1] * from.v) + (p[1][2] * from.r + p[1][3] * from.w);
+            now.r = (p[2][0] * from.x + p[2][1] * from.v) + (p[2][2] * from.r + p[2][3] * from.w);
+            now.w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
+        }
+        *at[X] = now.x;
+        *at[V] = now.v;
+        *at[R] = now.r;
+        *at[W] = now.w;
     }
 }
 
 // Adds `size` to each lane, with signs of its own.
 static inline void scatter(Trust *trust, int row, double size) {
-    static const double signs[2] = {-1, 1};
+    static const double signs[16][TRUST_LANES] = {
+        {-1, -1, -1, -1}, {-1, -1, -1, 1}, {-1, -1, 1, -1}, {-1, -1, 1, 1},
+        {-1, 1, -1, -1},  {-1, 1, -1, 1},  {-1, 1, 1, -1},  {-1, 1, 1, 1},
+        {1, -1, -1, -1},  {1, -1, -1, 1},  {1, -1, 1, -1},  {1, -1, 1, 1},
+        {1, 1, -1, -1},   {1, 1, -1, 1},   {1, 1, 1, -1},   {1, 1, 1, 1}};
+    const double *sign = signs[trust->signs >> (60 - row * TRUST_LANES) & 15];
     for (int i = 0; i < TRUST_LANES; i++)
-        trust->y[row][i] += signs[trust->signs >> (63 - row * TRUST_LANES - i) & 1] * size;
+        trust->y[row][i] += sign[i] * size;
 }
 
 // One rounding of what a stretch of this length held, `speed` being the relative one.
 static void round_off(Trust *trust, double length, const State *state) {
     const double reach = trust->reach;
-    const double size = fabs(state->x) + reach * fabs(state->v);
+    const double speed = fabs(state->w), own_speed = fabs(state->v);
+    const double size = fabs(state->x) + reach * own_speed;
     // Systematic ones, of the structure's own numbers, grow for as long as it remembers.
     const double lasting = length < trust->memory ? length : trust->memory;
-    const double own = ROUNDING * size * (1 + lasting / reach);
-    const double speed = fabs(state->w);
+    const double own = ROUNDING * (size + lasting * trust->rate * size);
     trust->signs = trust->signs * 6364136223846793005U + 1442695040888963407U;
     scatter(trust, X, own);
-    scatter(trust, V, own / reach);
+    scatter(trust, V, own * trust->rate);
     scatter(trust, R, ROUNDING * speed * length);
     scatter(trust, W,
-            ROUNDING *
-                (speed +
-                 (trust->flying.omega2 * size + trust->flying.damping * fabs(state->v)) * length));
+            ROUNDING * (speed + (trust->flying.omega2 * size + trust->flying.damping * own_speed) *
+                                    length));
 }
 
 // The end of a stretch: what it adds, and how far the estimate is now.
 static void judge(Trust *trust, double time, const State *state, double largest) {
     const double length = time - trust->time;
     round_off(trust, length, state);
-    const double known = fmax(fabs(state->x), largest);
+    const double here = fabs(state->x), known = here > largest ? here : largest;
     if (known > trust->largest)
         trust->largest = known;
     for (int i = 0; i < TRUST_LANES; i++) {
@@ -202,21 +238,35 @@ void trust_start(Trust *trust, const Motion *flying, const Motion *touching, con
                  const State *state, double size, bool is_driven, double duration) {
     const double rate = fmax(fmax(sqrt(flying->omega2), flying->damping), 1 / duration);
     TrustSwing *const swings[2] = {&trust->flying, &trust->resting};
+    // What an earlier run of the same system has made is still right.
     for (int i = 0; i < 2; i++) {
+        TrustSwing *swing = swings[i];
         const double free = i == 0 ? 1 : 1 - resting->share; // M / (M + m) while the mass rests
-        swings[i]->omega2 = free * flying->omega2;
-        swings[i]->damping = free * flying->damping;
-        swings[i]->rate = rate;
-        swings[i]->levels = 0;
+        const double omega2 = free * flying->omega2, damping = free * flying->damping;
+        if (swing->omega2 == omega2 && swing->damping == damping && swing->rate == rate)
+            continue;
+        swing->omega2 = omega2;
+        swing->damping = damping;
+        swing->rate = rate;
+        swing->step = SWING_STEP / rate;
+        swing->levels = 0;
     }
     for (int side = 0; side < 2; side++) {
-        trust->touching[side].motion = touching[side];
-        trust->touching[side].motion.rate = fmax(touching[side].rate, rate);
+        const Motion *now = &touching[side], *then = &trust->touching[side].motion;
+        const double most = fmax(now->rate, rate);
+        if (then->omega2 == now->omega2 && then->damping == now->damping &&
+            then->share == now->share && then->contact_omega2 == now->contact_omega2 &&
+            then->contact_damping == now->contact_damping && then->rate == most)
+            continue;
+        trust->touching[side].motion = *now;
+        trust->touching[side].motion.rate = most;
+        trust->touching[side].step = CONTACT_STEP / most;
         trust->touching[side].levels = 0;
     }
     trust->is_spent = false;
     trust->time = 0;
     trust->share = flying->share;
+    trust->rate = rate;
     trust->reach = 1 / rate;
     trust->memory = flying->damping > 0 ? 2 / flying->damping : duration;
     trust->phase = is_driven ? flying->rate : rate;

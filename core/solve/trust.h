@@ -17,12 +17,14 @@ enum { TRUST_LANES = 4, TRUST_LEVELS = 32 };
 // exp(A D) to the powers 1, 2, 4 ...; made as they are needed.
 typedef struct TrustSwing { // of the structure alone
     double omega2, damping, rate;
+    double step; // D [s]
     int levels;
     double power[TRUST_LEVELS][2][2];
 } TrustSwing;
 
 typedef struct TrustContact { // of both bodies
     Motion motion;
+    double step; // D [s]
     int levels;
     double power[TRUST_LEVELS][4][4];
 } TrustContact;
@@ -31,7 +33,8 @@ typedef struct Trust {
     bool is_spent;  // the estimate has reached the motion's own size: nothing is left to carry
     double time;    // of the last event [s]
     double share;   // m / (M + m) [-]
-    double reach;   // a velocity lasts for about this long as a displacement [s]
+    double rate;    // the structure's [1/s]
+    double reach;   // 1 / rate: a velocity lasts for about this long as a displacement [s]
     double memory;  // the structure remembers for about this long [s]
     double phase;   // by how much a rounded rate turns the phase in a second, in roundings [1/s]
     double lasting; // and for how long [s]
@@ -45,7 +48,7 @@ typedef struct Trust {
 } Trust;
 
 // `touching` by Side. `size` is the clearance [m]; `is_driven`: the base is a sine. Writes all that
-// is read later.
+// is read later, but keeps the tables of a system that it finds again.
 void trust_start(Trust *trust, const Motion *flying, const Motion *touching, const Motion *resting,
                  const State *state, double size, bool is_driven, double duration);
 

@@ -1,5 +1,39 @@
 #include "core/solve/workspace.h"
 
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "core/solve/exact_state.h"
+
+enum { KEPT_MOST = 1 << 18 }; // values
+
+double *workspace_values(Workspace *workspace, size_t count) {
+    if (count > workspace->room) {
+        free(workspace->values);
+        workspace->room = 0;
+        workspace->values =
+            count > SIZE_MAX / sizeof(double) ? NULL : malloc(count * sizeof(double));
+        if (workspace->values != NULL)
+            workspace->room = count;
+    }
+    return workspace->values;
+}
+
+void workspace_tidy(Workspace *workspace) {
+    if (workspace->room <= KEPT_MOST)
+        return;
+    free(workspace->values);
+    workspace->values = NULL;
+    workspace->room = 0;
+}
+
 void workspace_clear(Workspace *workspace) {
     fourier_stock_clear(&workspace->transforms);
+    if (workspace->exact != NULL)
+        exact_forget(workspace->exact);
+    free(workspace->exact);
+    workspace->exact = NULL;
+    free(workspace->values);
+    workspace->values = NULL;
+    workspace->room = 0;
 }

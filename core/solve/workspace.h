@@ -8,7 +8,15 @@
 // All zero is empty.
 typedef struct Workspace {
     FourierStock transforms;
+    struct Exact *exact; // the exact solver's, with the tables of the last system
+    double *values;      // scratch
+    size_t room;
 } Workspace;
+
+// Room for `count` values, until the next call; NULL: no memory.
+double *workspace_values(Workspace *workspace, size_t count);
+// Gives back what is too large to be kept for the next run.
+void workspace_tidy(Workspace *workspace);
 
 void workspace_clear(Workspace *workspace);
 

@@ -115,7 +115,11 @@ bool bench_run(BenchScene *scene, BenchTimes *times) {
         if (status == STATUS_OK)
             status = make_base(scene, &base, &problem);
         times->base = least(times->base, since(planned) / (double)scene->count);
-        Run run = {.plan = plan, .base = &base, .columns = columns, .column_count = BENCH_CHANNELS};
+        Run run = {.plan = plan,
+                   .base = &base,
+                   .workspace = &scene->workspace,
+                   .columns = columns,
+                   .column_count = BENCH_CHANNELS};
         const int64_t ready = clock_thread_cpu_ns();
         if (status == STATUS_OK)
             status = solver_exact.run(&run, &response, &problem);

@@ -5,19 +5,48 @@
 
 #include <cmocka.h>
 
+#include <stdlib.h>
 #include <string.h>
 
+#include "core/excite/pulse.h"
+#include "core/excite/record.h"
 #include "core/math/fourier.h"
 #include "tests/support/paper.h"
+#include "tests/support/scenes.h"
 
-static Outcome *run(bool is_random, double duration, Workspace *workspace) {
+typedef enum BaseChoice { FREE, RANDOM, SINE, RECORD, HALF_SINE, KINDS } BaseChoice;
+
+static void choose_base(Simulation *simulation, BaseChoice kind) {
+    if (kind == RANDOM)
+        paper_random(simulation, 1, 1);
+    if (kind == SINE)
+        paper_sine(simulation, 1, 1);
+    if (kind == HALF_SINE) {
+        scene_choose(&simulation->scene.excitation, &excitation_kinds, "half_sine");
+        ExcitationPulse *pulse = (ExcitationPulse *)(void *)simulation->scene.excitation;
+        pulse->amplitude = 2;
+        pulse->length = 0.5;
+    }
+    if (kind == RECORD) { // coarser than the output
+        enum { COUNT = 300 };
+        scene_choose(&simulation->scene.excitation, &excitation_kinds, "record");
+        ExcitationRecord *record = (ExcitationRecord *)(void *)simulation->scene.excitation;
+        record->interval = 0.005;
+        record->samples.at = malloc(COUNT * sizeof *record->samples.at);
+        assert_non_null(record->samples.at);
+        record->samples.count = COUNT;
+        for (int i = 0; i < COUNT; i++)
+            record->samples.at[i] = 0.01 * ((i * i) % 97 - 48);
+    }
+}
+
+static Outcome *run(BaseChoice kind, double duration, Workspace *workspace) {
     Simulation simulation;
     Problem problem;
     Outcome *outcome;
     problem_clear(&problem);
     paper_scene(&simulation, 0.61, 0.025, duration);
-    if (is_random)
-        paper_random(&simulation, 1, 1);
+    choose_base(&simulation, kind);
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(simulation_run(&simulation, NULL, NULL, workspace, &outcome, &problem),
                      STATUS_OK);
@@ -35,11 +64,12 @@ static void assert_same(const Columns *a, const Columns *b) {
 static void a_workspace_leaves_no_trace_in_a_run(void **state) {
     (void)state;
     Workspace workspace = {0};
-    for (int i = 0; i < 6; i++) {
-        const bool is_random = i % 2 == 1;
+    for (int i = 0; i < 4 * KINDS; i++) {
+        // Each kind after itself and after others.
+        const BaseChoice kind = (BaseChoice)(i < 2 * KINDS ? i / 2 : i % KINDS);
         const double duration = 3 + i / 2 % 2;
-        Outcome *fresh = run(is_random, duration, NULL);
-        Outcome *used = run(is_random, duration, &workspace);
+        Outcome *fresh = run(kind, duration, NULL);
+        Outcome *used = run(kind, duration, &workspace);
         assert_same(&fresh->response.series, &used->response.series);
         assert_same(&fresh->spectrum.densities, &used->spectrum.densities);
         assert_int_equal(fresh->response.impacts.count, used->response.impacts.count);
@@ -47,6 +77,10 @@ static void a_workspace_leaves_no_trace_in_a_run(void **state) {
             assert_true(fresh->response.impacts.at[k].start == used->response.impacts.at[k].start &&
                         fresh->response.impacts.at[k].impulse ==
                             used->response.impacts.at[k].impulse);
+        assert_memory_equal(&fresh->response.peaks, &used->response.peaks,
+                            sizeof fresh->response.peaks);
+        assert_memory_equal(&fresh->summary.error_estimate, &used->summary.error_estimate,
+                            sizeof fresh->summary.error_estimate);
         assert_memory_equal(&fresh->response.energy, &used->response.energy,
                             sizeof fresh->response.energy);
         outcome_drop(fresh);

@@ -32,8 +32,13 @@ static void make_base(double *base) {
         base[i] = sin(0.07 * (double)i) + 0.3 * cos(1.1 * (double)(i * i % 17));
 }
 
+static const Base sine = {.form = BASE_SINE, .amplitude = 1.4, .omega = 7};
+
+// `base` does not matter where the lanes are a sine's.
 static void fly(const Lanes *lanes, const State *start, double room, const double *base,
                 Flown *flown) {
+    static BaseCursor cursor;
+    base_cursor_make(&cursor, &sine, 1 / INTERVAL);
     memset(flown, 0, sizeof *flown);
     Stretch *s = &flown->stretch;
     *s = (Stretch){.x = start->x,
@@ -43,7 +48,8 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
                    .left = room,
                    .right = room,
                    .middle = 0.001,
-                   .base_most = base == NULL ? 0 : 1.4,
+                   .base_most = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
+                   .base = &cursor,
                    .peaks = &flown->peaks};
     for (int i = 0; i < CHANNEL_COUNT; i++)
         if (i <= CHANNEL_DAMPER_VELOCITY)
@@ -55,21 +61,24 @@ static void lanes_agree_with_arcs(void **state) {
     (void)state;
     double base[COUNT_MOST + 2];
     make_base(base);
-    for (int kind = 0; kind < 4; kind++) {
-        const bool is_still = kind % 2 == 0;
-        const Motion motion = structure(kind < 2 ? 0.8 : 0);
+    for (int kind = 0; kind < 6; kind++) {
+        const bool is_still = kind < 4 && kind % 2 == 0, is_sine = kind >= 4;
+        const Motion motion = structure(kind < 2 || kind == 4 ? 0.8 : 0);
         Lanes lanes;
-        lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+        lanes_make(&lanes, &motion, is_sine ? sine.omega : 0, INTERVAL, lanes_widest());
         assert_non_null(lanes.run);
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown;
-        fly(&lanes, &start, 1, is_still ? NULL : base, &flown);
+        fly(&lanes, &start, 1, is_still || is_sine ? NULL : base, &flown);
         assert_int_equal(flown.count, COUNT_MOST);
         State at = start;
         double vv = 0, av = 0, sums[LANE_SUMS], got_vv = 0, got_av = 0, peak = 0;
         for (size_t i = 0; i < COUNT_MOST; i++) {
-            const Slice slice = {is_still ? 0 : base[i],
-                                 is_still ? 0 : (base[i + 1] - base[i]) / INTERVAL, 0};
+            const double phase = sine.omega * INTERVAL * (double)i;
+            const Slice slice = is_sine ? (Slice){1.4 * sin(phase), 1.4 * cos(phase), sine.omega}
+                                : is_still
+                                    ? (Slice){0, 0, 0}
+                                    : (Slice){base[i], (base[i + 1] - base[i]) / INTERVAL, 0};
             Arc arc;
             arc_make(&arc, &motion, &at, &slice, INTERVAL);
             const ArcIntegrals integrals = arc_integrals(&arc);
@@ -105,14 +114,16 @@ static void no_width_of_vector_moves_a_bit(void **state) {
     double base[COUNT_MOST + 2];
     make_base(base);
     const Motion motion = structure(0.8);
-    for (int kind = 0; kind < 4; kind++) {
+    for (int kind = 0; kind < 6; kind++) {
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown[3];
         for (LanesWidth width = LANES_PLAIN; width <= lanes_widest(); width++) {
             Lanes lanes;
-            lanes_make(&lanes, &motion, INTERVAL, width);
-            fly(&lanes, &start, kind < 2 ? 1 : 0.012, kind % 2 == 0 ? NULL : base, &flown[width]);
+            lanes_make(&lanes, &motion, kind < 4 ? 0 : sine.omega, INTERVAL, width);
+            fly(&lanes, &start, kind < 2 || kind == 4 ? 1 : 0.012,
+                kind % 2 == 0 || kind > 3 ? NULL : base, &flown[width]);
             flown[width].stretch.peaks = NULL;
+            flown[width].stretch.base = NULL;
             memset(flown[width].stretch.columns, 0, sizeof flown[width].stretch.columns);
             assert_memory_equal(&flown[width], &flown[0], sizeof *flown);
         }
@@ -123,7 +134,7 @@ static void lanes_end_before_a_stop(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, INTERVAL, lanes_widest());
+    lanes_make(&lanes, &motion, 0, INTERVAL, lanes_widest());
     static Flown flown;
     for (int step = 1; step < 100; step++) {
         const double room = 0.0001 * step;
@@ -147,7 +158,7 @@ static void an_interval_too_long_for_the_structure_is_refused(void **state) {
     (void)state;
     const Motion motion = structure(0.8);
     Lanes lanes;
-    lanes_make(&lanes, &motion, 0.02, lanes_widest());
+    lanes_make(&lanes, &motion, 0, 0.02, lanes_widest());
     assert_null(lanes.run);
 }
 
