@@ -32,7 +32,4 @@ typedef struct Base {
 
 void base_clear(Base *base);
 
-// a_g at time t >= 0 [m/s^2]; right-continuous at the end of the samples.
-double base_at(const Base *base, double time);
-
 #endif

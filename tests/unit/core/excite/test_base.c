@@ -6,6 +6,7 @@
 #include <cmocka.h>
 
 #include "core/excite/base.h"
+#include "tests/support/base_at.h"
 
 static void a_still_base_stays_still(void **state) {
     (void)state;

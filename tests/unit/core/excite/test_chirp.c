@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/excite/chirp.h"
+#include "tests/support/base_at.h"
 #include "tests/support/fields.h"
 
 static const double TURN = 6.283185307179586;

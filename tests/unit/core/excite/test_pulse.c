@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/excite/pulse.h"
+#include "tests/support/base_at.h"
 #include "tests/support/fields.h"
 
 static const Span span = {.duration = 10, .sample_rate = 1000};

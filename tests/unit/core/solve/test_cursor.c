@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/solve/cursor.h"
+#include "tests/support/base_at.h"
 
 static double values[] = {0.5, -1, 2, 4, -3};
 

@@ -8,6 +8,7 @@
 #include <math.h>
 
 #include "core/solve/refine.h"
+#include "tests/support/base_at.h"
 
 static double given[4] = {1, -2, 0.5, 4};
 static const Base coarse = {.form = BASE_SAMPLED, .values = given, .count = 4, .interval = 0.005};

@@ -1,0 +1,292 @@
+// Flight of all masses over a whole sample interval is one step where bounds on the gaps' curvature
+// prove that no stop can be reached (frame_flight.h); a mass pressed to a stiff stop that it surely
+// does not leave has long steps too (frame_press.h); everything else goes by arcs (frame_arc.h),
+// whose polynomials locate events to rounding. Time is a sample's number and an offset from it, so
+// that short contacts keep their digits late in a run.
+#include "core/solve/frame_engine.h"
+
+#include <float.h>
+#include <math.h>
+
+enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
+
+// An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
+static const double SHORTEST = 1e-250; // [s]
+
+static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
+
+Status frame_engine_check(FrameEngine *engine) {
+    const Frame *frame = &engine->frame;
+    engine->work = 0;
+    const EnergyState energy = frame_energy(frame);
+    double sum = energy.kinetic + energy.strain;
+    for (size_t i = 0; i < frame->storeys; i++)
+        sum += fabs(frame->q[i]);
+    for (size_t d = 0; d < frame->dampers; d++)
+        sum += fabs(frame->damper[d].r);
+    if (!isfinite(sum))
+        return problem_set(frame->problem, STATUS_UNSTABLE,
+                           "the motion left what double precision can hold at t = %.6g s",
+                           frame_time(frame));
+    if (frame->run->steps_most > 0 && frame->run->steps > frame->run->steps_most)
+        return problem_set(frame->problem, STATUS_LIMIT,
+                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
+                           frame->run->steps_most, frame_time(frame), frame->plan->duration);
+    if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
+        return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                           frame_time(frame));
+    return STATUS_OK;
+}
+
+// Counts a step of about `each` multiplications per mode. In steps of the single engine it is one
+// for each mode and damper, as simulation_cost foresees.
+static Status count_step(FrameEngine *engine, double each) {
+    const Frame *frame = &engine->frame;
+    const double n = (double)frame->storeys, m = (double)frame->dampers;
+    const double pairs = frame->diagonal != NULL ? 0 : n * n;
+    frame->run->steps += n * (1 + m) + pairs / 4;
+    engine->work += each * (n * (1 + m) + pairs);
+    return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
+}
+
+static void take_work(FrameEngine *engine, const FrameWork *work) {
+    ledger_work(&engine->frame.ledger, work->input, work->damping);
+    engine->record.base_speed += work->ground;
+}
+
+// What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
+static void take_contact(FrameEngine *engine, size_t d) {
+    Frame *frame = &engine->frame;
+    FrameDamper *damper = &frame->damper[d];
+    const FrameArc *arc = &engine->arc;
+    double s = -1, impulse, lost;
+    const double peak =
+        arc_largest(frame_arc_force(arc, d), arc->degree - 1, damper->row.impact.peak_force, &s);
+    ledger_force(&frame->ledger, &damper->row, peak);
+    if (s > 0) {
+        frame_arc_state(arc, frame, s);
+        frame_feel(frame);
+        frame_record_acceleration(frame);
+    }
+    frame_arc_contact(arc, frame, d, &impulse, &lost);
+    ledger_stretch(&frame->ledger, &damper->row, arc->length, impulse, lost);
+}
+
+// After an arc: has the gap of a mass released from rest opened beyond rounding yet? Where the arc
+// ends by closing it, the speed stays.
+static void leave(FrameDamper *damper, bool is_hit) {
+    const double sign = frame_sign((Side)damper->origin);
+    if (sign * damper->r < 0)
+        damper->leaving = 0;
+    else if (!is_hit || sign * damper->w < 0)
+        damper->r = damper->w = 0;
+}
+
+// Takes what lies on the arc and moves to its end, where `hit` (or none) has its event.
+static void pass(FrameEngine *engine, const FrameEvent *hit) {
+    Frame *frame = &engine->frame;
+    const FrameArc *arc = &engine->arc;
+    if (!frame->is_shadow) {
+        const FrameWork work = frame_arc_work(arc, frame);
+        take_work(engine, &work);
+    }
+    for (size_t d = 0; d < frame->dampers && !frame->is_shadow; d++)
+        if (frame->damper[d].row.is_open)
+            take_contact(engine, d);
+    frame_arc_state(arc, frame, 1);
+    frame->offset += arc->length;
+    frame->still_events = 0;
+    for (size_t d = 0; d < frame->dampers; d++) {
+        FrameDamper *damper = &frame->damper[d];
+        damper->is_fresh = false;
+        if (damper->leaving > 0)
+            leave(damper, hit != NULL && hit->damper == d);
+    }
+}
+
+static Status happen(Frame *frame, const FrameEvent *event) {
+    const size_t most = STILL_EVENTS * frame->dampers;
+    frame->events++;
+    if (++frame->still_events > most)
+        return problem_set(frame->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events at one instant, t = %.17g s", most,
+                           frame_time(frame));
+    frame_happen(frame, event);
+    return ledger_status(&frame->ledger, frame->problem);
+}
+
+// The longest arc: a half-sine of the base is fast only while it lasts.
+static double arc_most(const Frame *frame, const Slice *slice) {
+    return 1 / fmax(frame_rate(frame), slice->omega);
+}
+
+// One step of contact under a power law, at most `length` long.
+static Status press(FrameEngine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameOdeStep step;
+    TRY(frame_ode_step(&engine->ode, slice, length, &step, frame->problem));
+    ledger_work(&frame->ledger, step.input, step.damping);
+    engine->record.base_speed += step.ground;
+    frame->offset += step.length;
+    frame->ground = slice_at(slice, step.length);
+    frame->still_events = 0;
+    frame_record_note(frame);
+    if (step.is_event)
+        TRY(happen(frame, &step.event));
+    frame->run->steps += PRESS_STEPS; // it takes as long as so many arcs
+    return count_step(engine, PRESS_WORK);
+}
+
+// A long step of contact. False: it must go by arcs.
+static bool hold(FrameEngine *engine, const Slice *slice, double length) {
+    Frame *frame = &engine->frame;
+    FrameWork work;
+    if (slice->omega > 0 && frame->turning == 0)
+        return false; // its steps know no such base
+    const double taken =
+        frame_press_step(&engine->pressing, frame, slice, length, frame->is_shadow ? NULL : &work);
+    if (taken == 0)
+        return false;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
+    frame->offset += taken;
+    frame->ground = slice_at(slice, taken);
+    return true;
+}
+
+// One arc, at most `length` long, up to its end or the first event.
+static Status advance(FrameEngine *engine, double length) {
+    Frame *frame = &engine->frame;
+    FrameArc *arc = &engine->arc;
+    Slice slice;
+    const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &slice);
+    frame->ground = slice.value;
+    if (frame_ode_serves(&engine->ode))
+        return press(engine, &slice, fmin(length, knot));
+    if (hold(engine, &slice, fmin(length, knot)))
+        return count_step(engine, PRESS_WORK);
+    frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), arc_most(frame, &slice)));
+    FrameEvent event;
+    const bool is_event = frame_find_event(frame, arc, &event);
+    if (is_event)
+        frame_arc_cut(arc, frame, event.s * arc->length < SHORTEST ? 0 : event.s);
+    if (arc->length > 0)
+        pass(engine, is_event ? &event : NULL);
+    if (is_event)
+        TRY(happen(frame, &event));
+    return count_step(engine, 2 * (double)arc->degree);
+}
+
+Status frame_engine_cross(FrameEngine *engine, double length) {
+    Frame *frame = &engine->frame;
+    // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
+    const double clock = 2 * DBL_EPSILON * length;
+    while (length - frame->offset > clock) {
+        const double before = frame->offset;
+        const size_t events = frame->events;
+        TRY(advance(engine, length - frame->offset));
+        if (frame->offset == before && frame->events == events)
+            return problem_set(frame->problem, STATUS_UNSTABLE,
+                               "the contact is too stiff to be followed: at t = %.6g s a step of "
+                               "1/%.6g s is below the clock's resolution",
+                               frame_time(frame), frame_rate(frame));
+    }
+    return STATUS_OK;
+}
+
+// The whole interval in one step. False: it must go by arcs.
+static bool fly(FrameEngine *engine) {
+    Frame *frame = &engine->frame;
+    Slice slice;
+    FrameWork work;
+    if (engine->flight.length == 0 || !base_cursor_interval(&frame->base, frame->sample, &slice))
+        return false;
+    for (size_t d = 0; d < frame->dampers; d++)
+        if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
+            return false;
+    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
+        return false;
+    if (!frame->is_shadow)
+        take_work(engine, &work);
+    return true;
+}
+
+Status frame_engine_settle(FrameEngine *engine) {
+    Frame *frame = &engine->frame;
+    for (bool is_event = true; is_event;) {
+        Slice slice;
+        FrameEvent event;
+        (void)base_cursor_slice(&frame->base, 0, 0, &slice);
+        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, arc_most(frame, &slice)));
+        is_event = frame_find_event(frame, &engine->arc, &event) && event.s == 0 &&
+                   frame->damper[event.damper].phase == FRAME_FLIGHT;
+        if (is_event)
+            TRY(happen(frame, &event));
+    }
+    return STATUS_OK;
+}
+
+void frame_engine_take_sample(FrameEngine *engine) {
+    Frame *frame = &engine->frame;
+    if (frame->is_shadow)
+        return;
+    frame->ground = base_cursor_at(&frame->base, frame->sample);
+    frame_feel(frame);
+    if (frame->sample == engine->record.statistics_start && frame->sample > 0)
+        frame_record_forget(frame);
+    frame_record_take(&engine->record, frame);
+    frame_record_peaks(frame);
+    if (frame->sample % 64 == 0) {
+        const EnergyState energy = frame_energy(frame);
+        ledger_balance(&frame->ledger, &energy);
+    }
+}
+
+Status frame_engine_step(FrameEngine *engine) {
+    Frame *frame = &engine->frame;
+    if (fly(engine))
+        TRY(count_step(engine, FLIGHT_WORK));
+    else
+        TRY(frame_engine_cross(engine, frame->interval));
+    frame->sample++;
+    frame->offset = 0;
+    frame_engine_take_sample(engine);
+    return STATUS_OK;
+}
+
+Status frame_engine_make(FrameEngine *engine, Run *run, Response *response, Problem *problem) {
+    Frame *frame = &engine->frame;
+    TRY(frame_make(frame, run, problem));
+    TRY(frame_arc_room(&engine->arc, frame, problem));
+    TRY(frame_flight_make(&engine->flight, frame, problem));
+    TRY(frame_press_make(&engine->pressing, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, problem));
+    TRY(frame_record_start(&engine->record, frame, response, problem));
+    const EnergyState energy = frame_energy(frame);
+    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    frame->ledger.gain_most = LEDGER_GAIN_EXACT;
+    return STATUS_OK;
+}
+
+Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
+                           Response *response) {
+    Frame *frame = &engine->frame;
+    TRY(frame_make(frame, run, NULL));
+    TRY(frame_ode_make(&engine->ode, frame, NULL));
+    engine->arc = of->arc;
+    engine->flight = of->flight;
+    engine->pressing = of->pressing;
+    frame->is_shadow = true;
+    const EnergyState energy = frame_energy(frame);
+    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    return STATUS_OK;
+}
+
+void frame_engine_clear(FrameEngine *engine) {
+    frame_record_clear(&engine->record);
+    frame_flight_clear(&engine->flight);
+    frame_press_clear(&engine->pressing);
+    frame_ode_clear(&engine->ode);
+    frame_arc_clear(&engine->arc);
+    frame_clear(&engine->frame);
+}

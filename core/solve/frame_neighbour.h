@@ -1,0 +1,32 @@
+// How far a run of the general engine can be trusted: the same run a few roundings away, sample by
+// sample beside it until the two have parted. Not the single engine's way, which is trust.h. Used
+// by frame.c.
+#ifndef CORE_SOLVE_FRAME_NEIGHBOUR_H
+#define CORE_SOLVE_FRAME_NEIGHBOUR_H
+
+#include "core/solve/frame_engine.h"
+
+// All zero is empty.
+typedef struct FrameNeighbour {
+    FrameEngine engine;
+    Run run;
+    Response response;
+    bool is_spent;         // parted, or failed: nothing is left to follow
+    bool is_known;         // never failed
+    double largest, worst; // displacement, and difference of displacements, so far [m]
+    double horizon;        // [s]; NAN: not reached
+    double *apart;         // scratch, of all modes
+} FrameNeighbour;
+
+// Beside an engine that has settled. A failure only leaves the run without an estimate. Cleared by
+// frame_neighbour_clear, also if it was never started.
+void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine);
+void frame_neighbour_clear(FrameNeighbour *neighbour);
+
+// Follows the run to the sample it has just reached.
+void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame);
+
+// Error estimate and horizon, into the response.
+void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, Response *response);
+
+#endif
