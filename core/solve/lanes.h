@@ -13,7 +13,7 @@
 
 enum { LANES = 8 };
 
-// Sums over samples; with b the base at a sample and a at the one before, or under a sine its other
+// Sums over samples: with b the base at a sample and a at the one before, or under a sine its other
 // half: a_g is b cos + a sin from there on.
 typedef enum LaneSum { XX, XV, VV, XB, XA, VB, VA, BB, AB, AA, LANE_SUMS } LaneSum;
 
@@ -58,12 +58,9 @@ struct Lanes {
     // What i + 1 samples on a_g at samples 0 to LANES has given.
     double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
     double z_a[LANES + 1][LANES], speed_a[LANES + 1][LANES];
-    // What i - LANES + 1 blocks on is left of what x and v were given; 0 before.
-    double x_left[2][2 * LANES], v_left[2][2 * LANES];
-    double one_left[2 * LANES], time_left[2 * LANES]; // and of the free mass
-    double base_omega;                                // of a sine, or 0 [rad/s]
-    double interval, per_interval;                    // [s], [1/s]
-    double omega2, damping, omega;                    // of the structure: K / M, C / M, sqrt(K / M)
+    double base_omega;                   // of a sine, or 0 [rad/s]
+    double interval, per_interval;       // [s], [1/s]
+    double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
     LanesWidth width;
     LanesRun *run; // NULL: the interval is too long for the structure

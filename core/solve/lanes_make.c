@@ -175,20 +175,6 @@ static void make_base(Lanes *lanes) {
     }
 }
 
-// What is left of a block's gain 0 to 7 blocks on.
-static void make_left(Lanes *lanes) {
-    const LanesMap *block = &lanes->block;
-    for (int j = 0; j < LANES; j++) {
-        const int at = LANES - 1 + j;
-        lanes->x_left[0][at] = j == 0 ? 1 : 1 + block->x_x[j - 1];
-        lanes->x_left[1][at] = j == 0 ? 0 : block->x_v[j - 1];
-        lanes->v_left[0][at] = j == 0 ? 0 : block->v_x[j - 1];
-        lanes->v_left[1][at] = j == 0 ? 1 : 1 + block->v_v[j - 1];
-        lanes->one_left[at] = 1;
-        lanes->time_left[at] = j == 0 ? 0 : block->time[j - 1];
-    }
-}
-
 // Integrals over an interval in terms of its end: time runs backwards, damping drives. Gauss-
 // Legendre with five points, right to rounding for intervals this short.
 static void make_forms(Lanes *lanes) {
@@ -228,11 +214,9 @@ void lanes_make_tables(Lanes *lanes) {
     make_step(lanes->omega2, lanes->damping, lanes->interval, step);
     make_map(&lanes->sample, step, lanes->interval);
     make_map(&lanes->block, step, (long double)LANES * lanes->interval);
-    if (lanes->base_omega > 0) {
+    if (lanes->base_omega > 0)
         make_sine(lanes);
-    } else {
+    else
         make_base(lanes);
-        make_left(lanes);
-    }
     make_forms(lanes);
 }
