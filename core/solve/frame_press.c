@@ -176,7 +176,7 @@ static bool others_are_clear(const FramePress *press, Frame *frame, const FrameD
         damper->storey_speed = frame_dot(damper->shape, frame->p, n);
         damper->gained = length * (damper->storey_speed + damper->w) - fallen -
                          frame_dot(damper->shape, press->gained, n);
-        if (!frame_flight_is_clear(damper, damper->gained, bend, length))
+        if (!frame_flight_is_clear(damper, damper->r, damper->r + damper->gained, bend, length))
             return false;
     }
     return true;

@@ -23,11 +23,11 @@ double frame_room(const FrameDamper *damper, Side side) {
     return damper->origin == (FrameOrigin)side ? 0 : damper->plan->clearance;
 }
 
-double frame_relative(const FrameDamper *damper) {
+double frame_middle(const FrameDamper *damper) {
     const double stop = damper->plan->clearance / 2;
     const double origin =
         damper->origin == FRAME_FROM_MIDDLE ? 0 : frame_sign((Side)damper->origin) * stop;
-    return damper->plan->offset + origin + damper->r;
+    return damper->plan->offset + origin;
 }
 
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
@@ -114,13 +114,21 @@ EnergyState frame_energy(const Frame *frame) {
     return energy;
 }
 
+double frame_size_of(const Frame *frame, const double *q, const double *p) {
+    double squares[4] = {0, 0, 0, 0};
+    size_t i = 0;
+    for (; i + 2 <= frame->storeys; i += 2)
+        for (size_t j = 0; j < 2; j++) {
+            squares[j] += p[i + j] * p[i + j];
+            squares[2 + j] += frame->omega2[i + j] * q[i + j] * q[i + j];
+        }
+    if (i < frame->storeys)
+        squares[0] += p[i] * p[i] + frame->omega2[i] * q[i] * q[i];
+    return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
+}
+
 double frame_size(const Frame *frame) {
-    double squares[2] = {0, 0};
-    for (size_t i = 0; i < frame->storeys; i++) {
-        squares[0] += frame->p[i] * frame->p[i];
-        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
-    }
-    return sqrt(squares[0] + squares[1]);
+    return frame_size_of(frame, frame->q, frame->p);
 }
 
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
@@ -315,6 +323,9 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     frame->turning = run->base->omega * frame->interval <= 4 || run->base->form == BASE_SINE
                          ? run->base->omega
                          : 0;
+    const long double turn = (long double)frame->turning * frame->interval;
+    frame->turned[0] = (double)cosl(turn);
+    frame->turned[1] = (double)sinl(turn);
     bool is_sound = isfinite(frame->rate) && isfinite(run->base->omega);
     for (size_t d = 0; d < frame->dampers; d++) {
         make_damper(frame, d);

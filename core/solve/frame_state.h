@@ -36,7 +36,8 @@ typedef struct FrameDamper {
     ContactParameters contact; // frozen at the touch
     LedgerRow row;             // of the present contact or rest
 
-    // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
+    // Of a long step beside another's contact (frame_press.c): speed of the storey before it, and
+    // what r gains.
     double storey_speed, gained;
     // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
     // that presses it [m/s], [m/s], [N s]; the rest is frame_collide's own.
@@ -67,6 +68,7 @@ typedef struct Frame {
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
     double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
+    double turned[2];      // cosine and sine of what it turns in one of them
     double stiff, viscous; // largest of W^2 and of D
     double drive;          // |participation|
     double growth;         // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
@@ -119,8 +121,8 @@ double frame_time(const Frame *frame); // [s]
 double frame_clock(const Frame *frame);
 // Between free mass and stop at r = 0 of the present origin [m].
 double frame_room(const FrameDamper *damper, Side side);
-// Displacement of the free mass relative to its storey [m].
-double frame_relative(const FrameDamper *damper);
+// Displacement of the free mass relative to its storey at r = 0 [m].
+double frame_middle(const FrameDamper *damper);
 
 // out = D p + W^2 q.
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
@@ -134,6 +136,7 @@ double frame_storey_acceleration(const Frame *frame, size_t storey);
 double frame_acceleration(const Frame *frame, size_t damper);
 EnergyState frame_energy(const Frame *frame);
 double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
+double frame_size_of(const Frame *frame, const double *q, const double *p);
 
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);

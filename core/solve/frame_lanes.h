@@ -1,0 +1,49 @@
+// The general engine's long loops over modes, eight at once, by whatever vectors the processor has.
+// Not their physics: frame_flight.h, frame_record.h. Used by core/solve/frame*.c.
+#ifndef CORE_SOLVE_FRAME_LANES_H
+#define CORE_SOLVE_FRAME_LANES_H
+
+#include <stddef.h>
+
+enum { FRAME_LANES = 8 };
+
+// Values of all modes, filled up with zeros to whole vectors.
+static inline size_t frame_lanes_padded(size_t modes) {
+    return (modes + FRAME_LANES - 1) / FRAME_LANES * FRAME_LANES;
+}
+
+// What q and p of each mode gain in a step from (q, p, a, b).
+typedef struct FrameGains {
+    double *q[4], *p[4];
+} FrameGains;
+enum { FRAME_SUMS = 7 }; // over (q q, q p, p p, q a, q b, p a, p b)
+
+// Rows are of `padded` values each, one after the other. The bytes are the same with all vectors.
+typedef struct FrameLanes {
+    // Rows 1 to count of q and p, and of what they have gained since row 0, from the one before
+    // each; a and b have one value a step.
+    void (*fly)(const FrameGains *gains, size_t padded, size_t count, const double *a,
+                const double *b, double *q, double *p, double *moved, double *sped);
+    // sums (FRAME_SUMS rows) += those over rows 0 to count - 1.
+    void (*sum)(size_t padded, size_t count, const double *a, const double *b, const double *q,
+                const double *p, double *sums);
+    // out = first x + second y, row after row.
+    void (*mix)(size_t padded, size_t count, const double *first, const double *x,
+                const double *second, const double *y, double *out);
+    // out[k] = row . rows[k].
+    void (*dot)(size_t padded, size_t count, const double *row, const double *rows, double *out);
+    // The largest magnitude of each column.
+    void (*largest)(size_t padded, size_t count, const double *rows, double *out);
+    // squares (row i has `padded` values, those beyond column i are of no use) += rows' rows, of
+    // the first `modes` columns.
+    void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);
+    // out (`rows` values) += matrix y, column after column of `rows` values.
+    void (*multiply)(const double *matrix, size_t rows, const double *y, size_t columns,
+                     double *out);
+} FrameLanes;
+
+enum { FRAME_LANES_KINDS = 3 };
+extern const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS]; // the narrowest vectors first
+size_t frame_lanes_widest(void);                              // that this processor has
+
+#endif
