@@ -236,14 +236,14 @@ static void twice(Work *work) {
 }
 
 static void fill(FrameDense *dense, const Work *work) {
-    const size_t size = work->size, rows = 2 * work->n;
+    const size_t size = work->size, gains = 2 * work->n;
     for (size_t j = 0; j < size; j++) {
-        for (size_t i = 0; i < rows; i++)
-            dense->gain[j * rows + i] = (double)work->T[i * size + j];
+        for (size_t i = 0; i < gains; i++)
+            dense->gain[j * dense->rows + i] = (double)work->T[i * size + j];
         for (size_t i = 0; i < size; i++)
-            dense->loss[j * size + i] = (double)work->F[i * size + j];
+            dense->loss[j * dense->rows + i] = (double)work->F[i * size + j];
         for (size_t i = 0; i < size && dense->contact != NULL; i++)
-            dense->contact[j * size + i] = (double)work->C[i * size + j];
+            dense->contact[j * dense->rows + i] = (double)work->C[i * size + j];
         for (size_t row = 0; row < 2; row++)
             dense->input[row][j] = (double)work->G[row * size + j];
     }
@@ -254,15 +254,16 @@ static double rate_of(const Frame *frame) {
 }
 
 static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
-    const size_t size = 2 * freedoms + 2, square = size * size;
-    dense->block = malloc((2 * freedoms * size + 2 * square + 2 * size) * sizeof *dense->block);
+    const size_t size = 2 * freedoms + 2, rows = frame_lanes_padded(size);
+    dense->block = calloc((is_contact ? 3 : 2) * rows * size + 2 * size, sizeof *dense->block);
     if (dense->block == NULL)
         return STATUS_NO_MEMORY;
     dense->freedoms = freedoms;
     dense->size = size;
+    dense->rows = rows;
     dense->gain = dense->block;
-    dense->loss = dense->gain + 2 * freedoms * size;
-    dense->input[0] = dense->loss + square;
+    dense->loss = dense->gain + rows * size;
+    dense->input[0] = dense->loss + rows * size;
     dense->input[1] = dense->input[0] + size;
     dense->contact = is_contact ? dense->input[1] + size : NULL;
     return STATUS_OK;
@@ -329,17 +330,10 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
     return status;
 }
 
-void frame_dense_add(const double *matrix, size_t rows, const double *y, size_t size, double *out) {
-    for (size_t j = 0; j < size; j++)
-        for (size_t i = 0; i < rows; i++)
-            out[i] += matrix[j * rows + i] * y[j];
-}
-
-double frame_dense_form(const double *form, const double *y, size_t size) {
-    double sum = 0;
-    for (size_t j = 0; j < size; j++)
-        sum += y[j] * frame_dot(form + j * size, y, size);
-    return sum;
+double frame_dense_form(const FrameDense *dense, const FrameLanes *lanes, const double *form,
+                        const double *y, double *scratch) {
+    lanes->multiply(form, dense->rows, y, dense->size, scratch);
+    return frame_dot(y, scratch, dense->size);
 }
 
 void frame_dense_clear(FrameDense *dense) {

@@ -87,7 +87,9 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
         arrays[8 + i] = &flight->loss[i];
     const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
     const size_t padded = frame_lanes_padded(n);
-    flight->block = calloc((count + FRAME_SUMS) * padded + 2 * (2 * n + 2), sizeof *flight->block);
+    flight->block =
+        calloc((count + FRAME_SUMS) * padded + 2 * n + 2 + frame_lanes_padded(2 * n + 2),
+               sizeof *flight->block);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     for (size_t i = 0; i < count; i++)
@@ -117,8 +119,7 @@ static void fly_dense(const FrameFlight *flight, FrameTrail *trail, size_t n, si
         memcpy(start + n, trail->p + now, n * sizeof *start);
         start[2 * n] = trail->a[k];
         start[2 * n + 1] = trail->b[k];
-        memset(gained, 0, 2 * n * sizeof *gained);
-        trail->lanes->multiply(flight->dense.gain, 2 * n, start, 2 * n + 2, gained);
+        trail->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
         for (size_t i = 0; i < n; i++) {
             trail->q[next + i] = trail->q[now + i] + gained[i];
             trail->p[next + i] = trail->p[now + i] + gained[n + i];
@@ -163,9 +164,7 @@ static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, s
         memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
         start[2 * n] = trail->a[k];
         start[2 * n + 1] = trail->b[k];
-        memset(pulled, 0, dense->size * sizeof *pulled);
-        trail->lanes->multiply(dense->loss, dense->size, start, dense->size, pulled);
-        work->damping += frame_dot(pulled, start, dense->size);
+        work->damping += frame_dense_form(dense, trail->lanes, dense->loss, start, pulled);
         work->input -= trail->a[k] * frame_dot(dense->input[0], start, dense->size) +
                        trail->b[k] * frame_dot(dense->input[1], start, dense->size);
     }

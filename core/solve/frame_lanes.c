@@ -116,29 +116,42 @@ INLINE void square(size_t modes, size_t padded, size_t count, const double *rows
         }
 }
 
+// `many` vectors of rows from row i on; even and odd columns apart, so that no sum waits long.
+INLINE void multiply_some(const double *matrix, size_t rows, size_t i, size_t many, const double *y,
+                          size_t columns, double *out) {
+    Vector even[4], odd[4];
+    for (size_t l = 0; l < many; l++) {
+        even[l] = LOAD(matrix + i + l * LANES) * y[0];
+        odd[l] = LOAD(matrix + rows + i + l * LANES) * y[1];
+    }
+    for (size_t j = 2; j < columns; j += 2)
+        for (size_t l = 0; l < many; l++) {
+            const double *at = matrix + j * rows + i + l * LANES;
+            even[l] += LOAD(at) * y[j];
+            odd[l] += LOAD(at + rows) * y[j + 1];
+        }
+    for (size_t l = 0; l < many; l++)
+        STORE(out + i + l * LANES) = even[l] + odd[l];
+}
+
 INLINE void multiply(const double *matrix, size_t rows, const double *y, size_t columns,
                      double *out) {
-    enum { MANY = 4 };
     size_t i = 0;
-    for (; i + MANY * LANES <= rows; i += MANY * LANES) {
-        Vector s[MANY];
-        for (size_t l = 0; l < MANY; l++)
-            s[l] = LOAD(out + i + l * LANES);
-        for (size_t j = 0; j < columns; j++)
-            for (size_t l = 0; l < MANY; l++)
-                s[l] += LOAD(matrix + j * rows + i + l * LANES) * y[j];
-        for (size_t l = 0; l < MANY; l++)
-            STORE(out + i + l * LANES) = s[l];
+    for (; i + 4 * LANES <= rows; i += 4 * LANES)
+        multiply_some(matrix, rows, i, 4, y, columns, out);
+    switch ((rows - i) / LANES) {
+    case 3:
+        multiply_some(matrix, rows, i, 3, y, columns, out);
+        break;
+    case 2:
+        multiply_some(matrix, rows, i, 2, y, columns, out);
+        break;
+    case 1:
+        multiply_some(matrix, rows, i, 1, y, columns, out);
+        break;
+    default:
+        break;
     }
-    for (; i + LANES <= rows; i += LANES) {
-        Vector s = LOAD(out + i);
-        for (size_t j = 0; j < columns; j++)
-            s += LOAD(matrix + j * rows + i) * y[j];
-        STORE(out + i) = s;
-    }
-    for (; i < rows; i++)
-        for (size_t j = 0; j < columns; j++)
-            out[i] += matrix[j * rows + i] * y[j];
 }
 
 // clang-format off

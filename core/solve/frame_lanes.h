@@ -37,7 +37,8 @@ typedef struct FrameLanes {
     // squares (row i has `padded` values, those beyond column i are of no use) += rows' rows, of
     // the first `modes` columns.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);
-    // out (`rows` values) += matrix y, column after column of `rows` values.
+    // out = matrix y, column after column of `rows` values, whole vectors; an even number of
+    // columns.
     void (*multiply)(const double *matrix, size_t rows, const double *y, size_t columns,
                      double *out);
 } FrameLanes;

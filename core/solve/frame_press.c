@@ -7,25 +7,32 @@
 //   (s - (c / m_e) s' m_e / k) m_e / k   with   N = m_e s,
 // and the size of what is left of r grows by no more than s strays from that line. Of its bend what
 // N does through the structure's damping, coupling = shape . D shape, is kept apart, for N is fast.
+//
+// A softer contact, one that does not get far in a step, lasts where r at both ends is further from
+// 0 than r'' can bend it; and where N surely only rises or falls its peak is at an end.
 #include "core/solve/frame_press.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+enum { FEW_STOREYS = 24 }; // a step takes less than a single arc
+
 Status frame_press_make(FramePress *press, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, size = 2 * (n + 1) + 2;
+    const size_t n = frame->storeys, size = frame_lanes_padded(2 * (n + 1) + 2);
     memset(press, 0, sizeof *press);
     if (frame->plan->form != CONTACT_LINEAR || frame->dampers == 0)
         return STATUS_OK;
     press->stops = calloc(2 * frame->dampers, sizeof *press->stops);
-    press->block = calloc(2 * size + n, sizeof *press->block);
+    press->block = calloc(3 * size + n, sizeof *press->block);
+    press->lanes = &frame_lanes_kinds[frame_lanes_widest()];
     if (press->stops == NULL || press->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     press->count = 2 * frame->dampers;
     press->start = press->block;
     press->gained = press->start + size;
-    press->elastic = press->gained + size;
+    press->pulled = press->gained + size;
+    press->elastic = press->pulled + size;
     for (size_t i = 0; i < PRESS_LEVELS; i++) {
         press->length[i] = ldexp(frame->interval, -(int)i);
         frame_flight_ground(frame->turning, press->length[i], press->ground[i], press->fall[i]);
@@ -62,7 +69,11 @@ static FrameDamper *find_alone(const Frame *frame) {
 
 // A step takes some products for each two modes, an arc more of them for each mode.
 static bool is_worth(const Frame *frame, double arcs) {
-    return arcs > 2 + (double)frame->storeys / 30;
+    return frame->storeys <= FEW_STOREYS || arcs > 2 + (double)frame->storeys / 30;
+}
+
+static double size_of(const double *values, size_t count) {
+    return sqrt(frame_dot(values, values, count));
 }
 
 // Makes the stop's transitions when arcs have cost about as much as it does. False: there is none.
@@ -89,17 +100,43 @@ static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper 
         stop->damped[i] = frame_dot(row, damper->shape, frame->storeys);
         stop->bent[i] = frame->omega2[i] * damper->shape[i];
     }
+    stop->wide = size_of(damper->shape, frame->storeys);
+    stop->most_damped = size_of(stop->damped, frame->storeys);
+    stop->most_bent = size_of(stop->bent, frame->storeys);
+    stop->coupling = frame_dot(damper->shape, stop->damped, frame->storeys);
     return true;
 }
 
 // What holds over the whole step.
 typedef struct Bounds {
-    double size;                // V
-    double shaken;              // |a_g|
-    double force;               // |N|
-    double ride[2], ride_force; // r of a mass that is merely pressed, at both ends; least N, signed
-    double stir, stir_force;    // how far r and N are from these
+    double size, pull; // V, and |p'| without N
+    double shaken;     // |a_g|
+    double shaking;    // |a_g'|
+    double push;       // |s|
+    double most;       // E
+    double force;      // |N|
 } Bounds;
+
+// False: there are none.
+static bool find_bounds(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
+                        const Slice *slice, double h, Bounds *at) {
+    const double omega = sqrt(damper->contact.stiffness / damper->effective_mass);
+    const double hard = damper->contact.stiffness / omega + damper->contact.damping;
+    const double lean = fabs(damper->lean), size = hypot(damper->w, omega * damper->r);
+    const double left = 1 - h * (frame->growth + h * stop->wide * hard * damper->reach);
+    if (!(left > 0.25))
+        return false;
+    at->shaken = frame_flight_shaken(slice, h);
+    at->shaking = slice->omega > 0 ? slice->omega * at->shaken : fabs(slice->slope);
+    at->size = (frame_size(frame) + h * (frame->drive * at->shaken +
+                                         stop->wide * hard * (size + h * lean * at->shaken))) /
+               left;
+    at->pull = (frame->viscous + sqrt(frame->stiff)) * at->size + frame->drive * at->shaken;
+    at->push = lean * at->shaken + damper->reach * at->size;
+    at->most = size + h * at->push;
+    at->force = hard * at->most;
+    return isfinite(at->force);
+}
 
 // s' now; p' but for what N does to it is -elastic - participation a_g.
 static double change_now(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
@@ -113,54 +150,52 @@ static double change_now(const FramePressStop *stop, const Frame *frame, const F
     return sum;
 }
 
-// False: there are none. `elastic` and s are those at the start.
-static bool find_bounds(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
+// s at the start, with `elastic` and N there.
+static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
                         const Slice *slice, const double *elastic, double s, double h, Bounds *at) {
-    const size_t n = frame->storeys;
     const double r = damper->r, w = damper->w, sign = frame_sign(damper->side);
     const double k = damper->contact.stiffness, c = damper->contact.damping;
     const double mass = damper->effective_mass, omega2 = k / mass, omega = sqrt(omega2);
-    const double hard = k / omega + c, lean = fabs(damper->lean);
-    const double wide = sqrt(frame_dot(damper->shape, damper->shape, n));
-    const double bent = sqrt(frame_dot(stop->bent, stop->bent, n));
-    const double damped = sqrt(frame_dot(stop->damped, stop->damped, n));
-    const double coupling = frame_dot(damper->shape, stop->damped, n);
-    const double shaken = frame_flight_shaken(slice, h);
-    const double shaking = slice->omega > 0 ? slice->omega * shaken : fabs(slice->slope);
-    const double left = 1 - h * (frame->growth + h * wide * hard * damper->reach);
-    if (!(left > 0.25))
-        return false;
-    const double size = hypot(w, omega * r);
-    at->shaken = shaken;
-    at->size = (frame_size(frame) +
-                h * (frame->drive * shaken + wide * hard * (size + h * lean * shaken))) /
-               left;
-    const double push = lean * shaken + damper->reach * at->size; // |s|
-    const double most = size + h * push, force = hard * most;
-    const double now = k * r + c * w;
-    const double slope = change_now(stop, frame, damper, slice, elastic, coupling * now);
-    const double pull = (frame->viscous + sqrt(frame->stiff)) * at->size + frame->drive * shaken;
-    const double bow = lean * slice->omega * shaking + bent * (pull + wide * force) +
-                       damped * (frame->viscous * (pull + wide * force) + frame->stiff * at->size +
-                                 frame->drive * shaking); // |s''| without N'
-    const double stray = coupling * (force + fabs(now));
-    const double start = (s - c / mass * slope / omega2) / omega2;
+    const double hard = k / omega + c, now = k * r + c * w;
+    const double slope = change_now(stop, frame, damper, slice, elastic, stop->coupling * now);
+    const double pull = at->pull + stop->wide * at->force;
+    const double bow = fabs(damper->lean) * slice->omega * at->shaking + stop->most_bent * pull +
+                       stop->most_damped * (frame->viscous * pull + frame->stiff * at->size +
+                                            frame->drive * at->shaking); // |s''| without N'
+    const double stray = stop->coupling * (at->force + fabs(now));
+    // r of a mass that is merely pressed, at both ends, and its least N; how far from these.
+    const double start = (s - c / mass * slope / omega2) / omega2, end = start + h * slope / omega2;
+    const double least = mass * fmin(sign * s, sign * (s + h * slope));
     const double stirred =
         hypot(w - slope / omega2, omega * (r - start)) + h * h / 2 * (stray + h / 3 * bow);
-    at->ride[0] = start;
-    at->ride[1] = start + h * slope / omega2;
-    at->ride_force = mass * fmin(sign * s, sign * (s + h * slope));
-    at->stir = stirred / omega;
-    at->stir_force = hard * stirred;
-    at->force = fmin(force, mass * fmax(fabs(s), fabs(s + h * slope)) + at->stir_force);
-    return isfinite(stirred);
+    at->force = fmin(at->force, mass * fmax(fabs(s), fabs(s + h * slope)) + hard * stirred);
+    // A force that may be the largest so far is to be seen where it is so.
+    if (!frame->is_shadow && at->force > damper->row.impact.peak_force)
+        return false;
+    if (frame->plan->separation == SEPARATION_ZERO_FORCE)
+        return least > hard * stirred;
+    return fmin(sign * start, sign * end) > stirred / omega;
 }
 
-static bool surely_lasts(const Frame *frame, const FrameDamper *damper, const Bounds *at) {
-    const double sign = frame_sign(damper->side);
+// s at the start; r and w gain `moved` and `sped`.
+static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
+                       double s, double moved, double sped, double h, const Bounds *at) {
+    const double sign = frame_sign(damper->side), mass = damper->effective_mass;
+    const double k = damper->contact.stiffness, c = damper->contact.damping;
+    const double r = sign * damper->r, w = sign * damper->w;
+    const double now = k * r + c * w, then = now + sign * (k * moved + c * sped);
+    const double bend = at->push + at->force / mass; // |r''|
+    const double change = stop->most_damped * (at->pull + stop->wide * at->force) +
+                          stop->most_bent * at->size + fabs(damper->lean) * at->shaking; // |s'|
+    const double lift = k * bend + c * (change + (k * at->most + c * bend) / mass);      // |N''|
+    const double rise = k * w + c * (sign * s - now / mass);                             // N'
+    const double sag = h * h / 8;
+    if (!frame->is_shadow && !(fabs(rise) > h * lift) &&
+        !(fmax(fabs(now), fabs(then)) + sag * lift <= damper->row.impact.peak_force))
+        return false;
     if (frame->plan->separation == SEPARATION_ZERO_FORCE)
-        return at->ride_force > at->stir_force;
-    return fmin(sign * at->ride[0], sign * at->ride[1]) > at->stir;
+        return fmin(now, then) > sag * lift;
+    return fmin(r, r + sign * moved) > sag * bend;
 }
 
 // Whether all others stay in flight; they are ready to be moved then.
@@ -186,7 +221,7 @@ static void add_work(const FramePress *press, const FrameDense *dense, Frame *fr
                      FrameDamper *alone, const Slice *slice, double length, FrameWork *work) {
     const size_t n = frame->storeys;
     const double *start = press->start, *gained = press->gained;
-    work->damping = frame_dense_form(dense->loss, start, dense->size);
+    work->damping = frame_dense_form(dense, press->lanes, dense->loss, start, press->pulled);
     work->input = -(slice->value * frame_dot(dense->input[0], start, dense->size) +
                     slice->slope * frame_dot(dense->input[1], start, dense->size));
     for (size_t d = 0; d < frame->dampers; d++) {
@@ -202,7 +237,7 @@ static void add_work(const FramePress *press, const FrameDense *dense, Frame *fr
                          alone->contact.damping * (alone->w + gained[2 * n + 1]);
     ledger_force(&frame->ledger, &alone->row, fabs(force));
     ledger_stretch(&frame->ledger, &alone->row, length, impulse,
-                   frame_dense_form(dense->contact, start, dense->size));
+                   frame_dense_form(dense, press->lanes, dense->contact, start, press->pulled));
 }
 
 // What (q, r, p, w) gain over one level's length.
@@ -216,8 +251,7 @@ static void find_gained(FramePress *press, const FrameDense *dense, const Frame 
     start[freedoms + n] = alone->w;
     start[2 * freedoms] = slice->value;
     start[2 * freedoms + 1] = slice->slope;
-    memset(press->gained, 0, 2 * freedoms * sizeof *press->gained);
-    frame_dense_add(dense->gain, 2 * freedoms, start, dense->size, press->gained);
+    press->lanes->multiply(dense->gain, dense->rows, start, dense->size, press->gained);
 }
 
 static void move(const FramePress *press, Frame *frame, FrameDamper *alone, double ground) {
@@ -252,17 +286,20 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
     const double s =
         alone->lean * slice->value + frame_dot(alone->shape, press->elastic, frame->storeys);
     const double rate = frame_rate(frame);
+    const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
     for (size_t i = 0; i < PRESS_LEVELS && is_worth(frame, press->length[i] * rate); i++) {
         const FrameDense *dense = &stop->levels[i];
         const double h = press->length[i];
+        const bool is_soft = h * omega < 1;
         Bounds at;
-        // A force that may be the largest so far is to be seen where it is so.
         if (h > length * (1 + 1e-15) || dense->block == NULL ||
-            !find_bounds(stop, frame, alone, slice, press->elastic, s, h, &at) ||
-            !surely_lasts(frame, alone, &at) ||
-            (!frame->is_shadow && at.force > alone->row.impact.peak_force))
+            !find_bounds(stop, frame, alone, slice, h, &at) ||
+            (!is_soft && !stiff_lasts(stop, frame, alone, slice, press->elastic, s, h, &at)))
             continue;
         find_gained(press, dense, frame, alone, slice);
+        if (is_soft && !soft_lasts(stop, frame, alone, s, press->gained[frame->storeys],
+                                   press->gained[2 * frame->storeys + 1], h, &at))
+            continue;
         const double *ground = press->ground[i], *fall = press->fall[i];
         const double fallen = fall[0] * slice->value + fall[1] * slice->slope;
         if (!others_are_clear(press, frame, alone, &at, h, fallen))

@@ -15,7 +15,9 @@ typedef struct FramePressStop {
     double spent;     // on arcs, in products
     bool is_given_up; // no memory for it
     FrameDense levels[PRESS_LEVELS];
-    double *damped, *bent; // D shape, W^2 shape
+    double *damped, *bent;               // D shape, W^2 shape
+    double wide, most_damped, most_bent; // |shape|, |D shape|, |W^2 shape|
+    double coupling;                     // shape . D shape
 } FramePressStop;
 
 typedef struct FramePress {
@@ -23,7 +25,8 @@ typedef struct FramePress {
     size_t count;
     double length[PRESS_LEVELS];                           // the interval, its half, ...
     double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as FrameFlight's
-    double *start, *gained, *elastic;                      // scratch
+    double *start, *gained, *pulled, *elastic;             // scratch
+    const FrameLanes *lanes;
     double *block;
 } FramePress;
 
