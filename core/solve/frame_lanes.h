@@ -24,7 +24,7 @@ typedef struct FrameLanes {
     // each; a and b have one value a step.
     void (*fly)(const FrameGains *gains, size_t padded, size_t count, const double *a,
                 const double *b, double *q, double *p, double *moved, double *sped);
-    // sums (FRAME_SUMS rows) += those over rows 0 to count - 1.
+    // FRAME_SUMS rows of sums over rows 0 to count - 1.
     void (*sum)(size_t padded, size_t count, const double *a, const double *b, const double *q,
                 const double *p, double *sums);
     // out = first x + second y, row after row.
@@ -34,8 +34,8 @@ typedef struct FrameLanes {
     void (*dot)(size_t padded, size_t count, const double *row, const double *rows, double *out);
     // The largest magnitude of each column.
     void (*largest)(size_t padded, size_t count, const double *rows, double *out);
-    // squares (row i has `padded` values, those beyond column i are of no use) += rows' rows, of
-    // the first `modes` columns.
+    // squares += rows' rows, of the first `modes` columns: row after row, whole vectors of rows,
+    // those beyond the diagonal being of no use.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);
     // out = matrix y, column after column of `rows` values, whole vectors; an even number of
     // columns.
