@@ -110,8 +110,9 @@ void frame_flight_clear(FrameFlight *flight) {
 }
 
 // Rows 1 to count of the trail.
-static void fly_dense(const FrameFlight *flight, FrameTrail *trail, size_t n, size_t count) {
-    const size_t padded = trail->padded;
+static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+                      size_t count) {
+    const size_t n = frame->storeys, padded = trail->padded;
     double *start = flight->start, *gained = flight->gained;
     for (size_t k = 0; k < count; k++) {
         const size_t now = k * padded, next = now + padded;
@@ -119,7 +120,7 @@ static void fly_dense(const FrameFlight *flight, FrameTrail *trail, size_t n, si
         memcpy(start + n, trail->p + now, n * sizeof *start);
         start[2 * n] = trail->a[k];
         start[2 * n + 1] = trail->b[k];
-        trail->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
+        frame->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
         for (size_t i = 0; i < n; i++) {
             trail->q[next + i] = trail->q[now + i] + gained[i];
             trail->p[next + i] = trail->p[now + i] + gained[n + i];
@@ -141,9 +142,9 @@ static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame
             flight->ground[0] * slices[k].value + flight->ground[1] * slices[k].slope;
     }
     if (flight->dense.block != NULL)
-        fly_dense(flight, trail, n, count);
+        fly_dense(flight, trail, frame, count);
     else
-        trail->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
+        frame->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
                           trail->p, trail->moved, trail->sped);
 }
 
@@ -155,8 +156,9 @@ bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, do
     return from < most && to < most && from > least && to > least;
 }
 
-static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, size_t n,
+static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
                            size_t count, FrameWork *work) {
+    const size_t n = frame->storeys;
     const FrameDense *dense = &flight->dense;
     double *start = flight->start, *pulled = flight->gained;
     for (size_t k = 0; k < count; k++) {
@@ -164,18 +166,19 @@ static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, s
         memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
         start[2 * n] = trail->a[k];
         start[2 * n + 1] = trail->b[k];
-        work->damping += frame_dense_form(dense, trail->lanes, dense->loss, start, pulled);
+        work->damping += frame_dense_form(dense, frame->lanes, dense->loss, start, pulled);
         work->input -= trail->a[k] * frame_dot(dense->input[0], start, dense->size) +
                        trail->b[k] * frame_dot(dense->input[1], start, dense->size);
     }
 }
 
-static void add_work(const FrameFlight *flight, const FrameTrail *trail, size_t n, size_t count,
-                     FrameWork *work) {
+static void add_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                     size_t count, FrameWork *work) {
+    const size_t n = frame->storeys;
     const size_t padded = trail->padded;
     double *sums = flight->sums;
     memset(sums, 0, FRAME_SUMS * padded * sizeof *sums);
-    trail->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
+    frame->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
     for (size_t j = 0; j < FRAME_SUMS; j++)
         work->damping += frame_dot(flight->loss[j], sums + j * padded, n);
     // The sums' last four are over (q value, q slope, p value, p slope).
@@ -195,14 +198,14 @@ double frame_flight_shaken(const Slice *slice, double length) {
 }
 
 // Of one damper along the trail: rows 1 to count of r and z. Its absolute velocity stays.
-static void follow(const FrameFlight *flight, FrameTrail *trail, const FrameDamper *damper,
-                   size_t d, size_t n, size_t count, const Slice *slices) {
+static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *frame, size_t d,
+                   size_t count, const Slice *slices) {
+    const FrameDamper *damper = &frame->damper[d];
     double *r = trail->r + d * TRAIL_ROWS, *z = trail->z + d * TRAIL_ROWS, far = damper->r;
     double moved[TRAIL_ROWS];
-    trail->lanes->dot(trail->padded, count, trail->shapes + d * trail->padded,
-                      trail->moved + trail->padded, moved);
+    frame->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
     r[0] = damper->r;
-    z[0] = frame_dot(damper->shape, trail->p, n) + damper->w;
+    z[0] = frame_dot(damper->shape, trail->p, frame->storeys) + damper->w;
     for (size_t k = 0; k < count; k++) {
         far += flight->length * z[k] -
                (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
@@ -250,7 +253,7 @@ size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, co
     const size_t n = frame->storeys;
     fly(flight, trail, frame, slices, count);
     for (size_t d = 0; d < frame->dampers; d++)
-        follow(flight, trail, &frame->damper[d], d, n, count, slices);
+        follow(flight, trail, frame, d, count, slices);
     if (frame->dampers > 0)
         count = count_clear(flight, trail, frame, slices, count);
     if (count == 0)
@@ -258,9 +261,9 @@ size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, co
     if (work != NULL) {
         *work = (FrameWork){0};
         if (flight->dense.block != NULL)
-            add_dense_work(flight, trail, n, count, work);
+            add_dense_work(flight, trail, frame, count, work);
         else
-            add_work(flight, trail, n, count, work);
+            add_work(flight, trail, frame, count, work);
     }
     const size_t end = count * trail->padded;
     double speed = 0;

@@ -11,11 +11,12 @@ static inline double total(const double s[LANES]) {
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
+// clang-format off
 #define KIND(name)                                                                                 \
-    {                                                                                              \
-        fly_##name, sum_##name, mix_##name, dot_##name, largest_##name, square_##name,             \
-            multiply_##name                                                                        \
-    }
+    {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
+     .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
+     .largest = largest_##name, .square = square_##name, .multiply = multiply_##name}
+// clang-format on
 
 #define WIDTH 2
 #define NAME(name) name##_plain

@@ -24,8 +24,7 @@ Status frame_press_make(FramePress *press, const Frame *frame, Problem *problem)
     if (frame->plan->form != CONTACT_LINEAR || frame->dampers == 0)
         return STATUS_OK;
     press->stops = calloc(2 * frame->dampers, sizeof *press->stops);
-    press->block = calloc(3 * size + n, sizeof *press->block);
-    press->lanes = &frame_lanes_kinds[frame_lanes_widest()];
+    press->block = calloc(3 * size + frame->padded, sizeof *press->block);
     if (press->stops == NULL || press->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     press->count = 2 * frame->dampers;
@@ -221,7 +220,7 @@ static void add_work(const FramePress *press, const FrameDense *dense, Frame *fr
                      FrameDamper *alone, const Slice *slice, double length, FrameWork *work) {
     const size_t n = frame->storeys;
     const double *start = press->start, *gained = press->gained;
-    work->damping = frame_dense_form(dense, press->lanes, dense->loss, start, press->pulled);
+    work->damping = frame_dense_form(dense, frame->lanes, dense->loss, start, press->pulled);
     work->input = -(slice->value * frame_dot(dense->input[0], start, dense->size) +
                     slice->slope * frame_dot(dense->input[1], start, dense->size));
     for (size_t d = 0; d < frame->dampers; d++) {
@@ -237,7 +236,7 @@ static void add_work(const FramePress *press, const FrameDense *dense, Frame *fr
                          alone->contact.damping * (alone->w + gained[2 * n + 1]);
     ledger_force(&frame->ledger, &alone->row, fabs(force));
     ledger_stretch(&frame->ledger, &alone->row, length, impulse,
-                   frame_dense_form(dense, press->lanes, dense->contact, start, press->pulled));
+                   frame_dense_form(dense, frame->lanes, dense->contact, start, press->pulled));
 }
 
 // What (q, r, p, w) gain over one level's length.
@@ -251,7 +250,7 @@ static void find_gained(FramePress *press, const FrameDense *dense, const Frame 
     start[freedoms + n] = alone->w;
     start[2 * freedoms] = slice->value;
     start[2 * freedoms + 1] = slice->slope;
-    press->lanes->multiply(dense->gain, dense->rows, start, dense->size, press->gained);
+    frame->lanes->multiply(dense->gain, dense->rows, start, dense->size, press->gained);
 }
 
 static void move(const FramePress *press, Frame *frame, FrameDamper *alone, double ground) {

@@ -26,7 +26,6 @@ typedef struct FramePress {
     double length[PRESS_LEVELS];                           // the interval, its half, ...
     double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as FrameFlight's
     double *start, *gained, *pulled, *elastic;             // scratch
-    const FrameLanes *lanes;
     double *block;
 } FramePress;
 

@@ -75,7 +75,7 @@ static void take_storey(FrameRecord *record, const Frame *frame, size_t column, 
                          : channel == CHANNEL_DISPLACEMENT ? trail->q
                                                            : trail->p;
     const double *shape = record->shapes + column * padded;
-    trail->lanes->dot(padded, count, shape, rows + padded, values);
+    frame->lanes->dot(padded, count, shape, rows + padded, values);
     if (channel == CHANNEL_MEAN_ACCELERATION) {
         take_means(record, frame, column, values, count);
         if (frame->sample == 0)
@@ -99,7 +99,7 @@ static void take_damper(FrameRecord *record, const Frame *frame, size_t column, 
     const double *z = trail->z + wanted->number * TRAIL_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
         const double middle = frame_middle(damper);
-        trail->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
+        frame->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
                           trail->q + trail->padded, values);
         for (size_t k = 0; k < count; k++)
             values[k] += middle + r[k];
@@ -135,7 +135,7 @@ static void take_column(FrameRecord *record, const Frame *frame, size_t column, 
 static void add_batch(FrameRecord *record, const Frame *frame, size_t count) {
     const FrameTrail *trail = record->trail;
     for (size_t k = 0; k < 2; k++)
-        trail->lanes->square(frame->storeys, trail->padded, count, record->batch[k],
+        frame->lanes->square(frame->storeys, trail->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
@@ -241,7 +241,7 @@ void frame_record_peaks(Frame *frame) {
 static bool may_rise(FrameRecord *record, const Frame *frame, const double *rows, size_t count,
                      double peak, double *most) {
     const FrameTrail *trail = record->trail;
-    trail->lanes->largest(trail->padded, count, rows + trail->padded, record->most);
+    frame->lanes->largest(trail->padded, count, rows + trail->padded, record->most);
     *most = bound(frame, record->most);
     return *most > peak;
 }

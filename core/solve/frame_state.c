@@ -9,6 +9,11 @@
 
 static const double NEARLY = 1e-9;
 
+// Columns of a matrix go in pairs.
+static size_t even(size_t count) {
+    return count + count % 2;
+}
+
 double frame_time(const Frame *frame) {
     return (double)frame->sample / frame->plan->sample_rate + frame->offset;
 }
@@ -31,19 +36,14 @@ double frame_middle(const FrameDamper *damper) {
 }
 
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
-    const size_t n = frame->storeys;
+    const size_t padded = frame->padded;
     if (frame->diagonal != NULL) {
-        for (size_t i = 0; i < n; i++)
-            out[i] = frame->diagonal[i] * p[i] + frame->omega2[i] * q[i];
+        frame->lanes->mix(padded, 1, frame->diagonal, p, frame->omega2, q, out);
         return;
     }
-    for (size_t i = 0; i < n; i++)
-        out[i] = frame->omega2[i] * q[i];
-    for (size_t j = 0; j < n; j++) {
-        const double *row = frame->damping + j * n; // D is symmetric
-        for (size_t i = 0; i < n; i++)
-            out[i] += row[i] * p[j];
-    }
+    frame->lanes->multiply(frame->coupled, padded, p, even(frame->storeys), out);
+    for (size_t i = 0; i < padded; i++)
+        out[i] += frame->omega2[i] * q[i];
 }
 
 // What a power law says of the present contact.
@@ -204,12 +204,14 @@ static void make_damper(Frame *frame, size_t d) {
     FrameDamper *damper = &frame->damper[d];
     const PlanDamper *planned = &plan->dampers[d];
     *damper = (FrameDamper){.plan = planned,
-                            .shape = frame->modes->shapes + planned->storey * n,
+                            .shape = frame->shapes + d * frame->padded,
                             .lean = plan->influence[planned->storey] - 1,
                             .phase = FRAME_FLIGHT,
                             .origin = FRAME_FROM_MIDDLE,
                             .r = planned->position,
                             .w = planned->velocity};
+    memcpy(frame->shapes + d * frame->padded, frame->modes->shapes + planned->storey * n,
+           n * sizeof *frame->shapes);
     for (size_t j = 0; j < n; j++) {
         frame->mobility[d * n + j] = mobility(frame->modes, planned->storey, j);
         damper->thrust = fmax(damper->thrust, fabs(frame->mobility[d * n + j]));
@@ -229,7 +231,7 @@ static void make_damper(Frame *frame, size_t d) {
 }
 
 // D, its norm and how far it is from only taking energy.
-static void make_damping(Frame *frame) {
+static Status make_damping(Frame *frame) {
     const size_t n = frame->storeys;
     frame->damping = frame->modes->damping;
     double rows = 0, squares = 0, lowest = 0, largest = 0;
@@ -249,8 +251,16 @@ static void make_damping(Frame *frame) {
     // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
     frame->growth =
         linear_find_indefinite(n, frame->damping, NEARLY) == 0 ? NEARLY * largest : -lowest;
-    if (!frame->modes->is_classical)
-        frame->diagonal = NULL;
+    if (frame->modes->is_classical)
+        return STATUS_OK;
+    frame->diagonal = NULL;
+    frame->coupled = calloc(even(n) * frame->padded, sizeof *frame->coupled);
+    if (frame->coupled == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++)
+            frame->coupled[j * frame->padded + i] = frame->damping[i * n + j];
+    return STATUS_OK;
 }
 
 // q = shapes' M x: the modes are normal. `carried` is scratch.
@@ -271,20 +281,21 @@ static void make_modal(const Frame *frame, const double *values, long double *ca
 }
 
 static Status make_room(Frame *frame) {
-    const size_t n = frame->storeys, m = frame->dampers;
-    double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,  &frame->q,
-                               &frame->p,      &frame->elastic,  &frame->widest, &frame->mobility,
-                               &frame->yield,  &frame->hold,     &frame->scratch};
-    const size_t sizes[] = {n, n, n, n, n, n, n, m * n, m * m, m * m, m * m};
-    size_t total = 0;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+    const size_t n = frame->padded, m = frame->dampers;
+    double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,   &frame->share,
+                               &frame->q,      &frame->p,        &frame->elastic, &frame->widest,
+                               &frame->shapes, &frame->mobility, &frame->yield,   &frame->hold,
+                               &frame->scratch};
+    const size_t sizes[] = {n, n, n, n, n, n, n, n, m * n, m * n, m * m, m * m, m * m};
+    size_t total = frame_lanes_room(0);
+    for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];
     frame->block = calloc(total, sizeof *frame->block);
     frame->damper = calloc(m > 0 ? m : 1, sizeof *frame->damper);
     if (frame->block == NULL || frame->damper == NULL)
         return STATUS_NO_MEMORY;
-    double *at = frame->block;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    double *at = frame_lanes_start(frame->block);
+    for (size_t i = 0; i < COUNT(sizes); i++) {
         *arrays[i] = at;
         at += sizes[i];
     }
@@ -299,6 +310,8 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     frame->plan = plan;
     frame->problem = problem;
     frame->storeys = n;
+    frame->padded = frame_lanes_padded(n);
+    frame->lanes = &frame_lanes_kinds[frame_lanes_widest()];
     frame->dampers = plan->damper_count;
     frame->interval = 1 / plan->sample_rate;
     frame->modes = &plan->modes;
@@ -307,13 +320,12 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
                        plan->influence, problem));
         frame->modes = &frame->own_modes;
     }
-    if (make_room(frame) != STATUS_OK)
+    if (make_room(frame) != STATUS_OK || make_damping(frame) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    make_damping(frame);
     for (size_t i = 0; i < n; i++) {
         frame->omega2[i] = frame->modes->omega[i] * frame->modes->omega[i];
         frame->stiff = fmax(frame->stiff, frame->omega2[i]);
-        frame->carry[i] = frame->modes->participation[i];
+        frame->share[i] = frame->carry[i] = frame->modes->participation[i];
         for (size_t j = 0; j < n; j++)
             frame->widest[i] = fmax(frame->widest[i], fabs(frame->modes->shapes[j * n + i]));
     }
@@ -350,5 +362,6 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
 void frame_clear(Frame *frame) {
     modes_clear(&frame->own_modes);
     free(frame->damper);
+    free(frame->coupled);
     free(frame->block);
 }

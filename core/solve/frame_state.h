@@ -6,6 +6,7 @@
 
 #include "core/plan/modes.h"
 #include "core/solve/cursor.h"
+#include "core/solve/frame_lanes.h"
 #include "core/solve/ledger.h"
 #include "core/solve/solver.h"
 
@@ -60,11 +61,16 @@ typedef struct Frame {
 
     bool is_shadow; // only the motion is wanted: no peaks, no energies
 
-    size_t storeys;        // and modes
-    double *omega2;        // [1/s^2]
-    const double *damping; // D: storeys values where it is diagonal, else storeys x storeys
-    double *diagonal;      // of D, where it is diagonal
-    double *widest;        // of each mode, the largest |shape| of any storey
+    size_t storeys;          // and modes
+    size_t padded;           // and values of each array over modes here, zeros behind them
+    const FrameLanes *lanes; // what this processor has
+    double *omega2;          // [1/s^2]
+    const double *damping;   // D, storeys x storeys
+    double *diagonal;        // of D, where it is diagonal; else NULL
+    double *coupled;         // D, where it is not: columns of `padded` values; else NULL
+    double *share;           // participation
+    double *shapes;          // of the dampers' storeys
+    double *widest;          // of each mode, the largest |shape| of any storey
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
     double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
@@ -84,7 +90,7 @@ typedef struct Frame {
     double *elastic; // D p + W^2 q, as of the last frame_feel
     double ground;   // a_g now [m/s^2]
     double *scratch; // of frame_hold_make and frame_collide
-    double *block;   // all arrays above
+    double *block;   // all arrays above, but for coupled
 
     size_t sample; // the last one passed
     double offset; // time since then [s]
@@ -124,7 +130,7 @@ double frame_room(const FrameDamper *damper, Side side);
 // Displacement of the free mass relative to its storey at r = 0 [m].
 double frame_middle(const FrameDamper *damper);
 
-// out = D p + W^2 q.
+// out = D p + W^2 q; arrays of `padded` values.
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
 void frame_feel(Frame *frame);

@@ -4,23 +4,19 @@
 #ifndef CORE_SOLVE_FRAME_TRAIL_H
 #define CORE_SOLVE_FRAME_TRAIL_H
 
-#include "core/solve/frame_lanes.h"
 #include "core/solve/frame_state.h"
 
 enum { TRAIL_MOST = 16, TRAIL_ROWS = TRAIL_MOST + 1 };
 
 // Row 0 is where the stretch begins, row k what is k samples on; all modes in each row.
 typedef struct FrameTrail {
-    const FrameLanes *lanes;
     size_t padded; // values of a row
     double *q, *p;
-    double *moved, *sped;              // what q and p have gained since row 0
-    double *elastic;                   // D p + W^2 q
-    double *r;                         // of the dampers, TRAIL_ROWS each, from the present origins
-    double *z;                         // likewise, their velocities relative to the base
-    double *a, *b, *ground;            // of each interval: a_g, as a Slice, and its integral
-    double *omega2, *damping, *widest; // of the frame; damping is NULL where it couples the modes
-    double *shapes;                    // of the dampers' storeys
+    double *moved, *sped;   // what q and p have gained since row 0
+    double *elastic;        // D p + W^2 q
+    double *r;              // of the dampers, TRAIL_ROWS each, from the present origins
+    double *z;              // likewise, their velocities relative to the base
+    double *a, *b, *ground; // of each interval: a_g, as a Slice, and its integral
     double *block;
 } FrameTrail;
 
