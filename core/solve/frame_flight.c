@@ -222,28 +222,43 @@ static double grown(const FrameFlight *flight, const Frame *frame, double size, 
     return left > 0.5 ? (size + length * frame->drive * shaken) / left : INFINITY;
 }
 
-// How many of `count` intervals surely keep all masses between their stops.
+// Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
+// than `bend`.
 static size_t count_clear(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
-                          const Slice *slices, size_t count) {
-    double shaken = 0;
-    for (size_t k = 0; k < count; k++)
-        shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
-    const double most = grown(flight, frame, frame_size(frame), shaken, count);
+                          size_t d, double bend, const Slice *slices, size_t count) {
+    const FrameDamper *damper = &frame->damper[d];
+    const double *r = trail->r + d * TRAIL_ROWS, length = flight->length;
+    double least = r[0], most = r[0];
+    for (size_t k = 1; k <= count; k++) {
+        least = r[k] < least ? r[k] : least;
+        most = r[k] > most ? r[k] : most;
+    }
+    if (frame_flight_is_clear(damper, least, most, bend, length))
+        return count;
+    for (size_t k = 0; k < count; k++) {
+        if (frame_flight_is_clear(damper, r[k], r[k + 1], bend, length))
+            continue;
+        // The bound of this interval alone is closer.
+        const double shaken = frame_flight_shaken(&slices[k], length);
+        const double size =
+            frame_size_of(frame, trail->q + k * trail->padded, trail->p + k * trail->padded);
+        const double own =
+            damper->reach * grown(flight, frame, size, shaken, 1) + fabs(damper->lean) * shaken;
+        if (!frame_flight_is_clear(damper, r[k], r[k + 1], own, length))
+            return k;
+    }
+    return count;
+}
+
+// A guess of how many intervals it takes to the next stop: to fly further would be in vain.
+static size_t guess(const FrameFlight *flight, const Frame *frame, size_t count) {
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
-        const double *r = trail->r + d * TRAIL_ROWS, lean = fabs(damper->lean);
-        const double bend = damper->reach * most + lean * shaken;
-        for (size_t k = 0; k < count; k++) {
-            if (frame_flight_is_clear(damper, r[k], r[k + 1], bend, flight->length))
-                continue;
-            // The bound of this interval alone is closer.
-            const double own = frame_flight_shaken(&slices[k], flight->length);
-            const double size =
-                frame_size_of(frame, trail->q + k * trail->padded, trail->p + k * trail->padded);
-            const double closer = damper->reach * grown(flight, frame, size, own, 1) + lean * own;
-            if (!frame_flight_is_clear(damper, r[k], r[k + 1], closer, flight->length))
-                count = k;
-        }
+        const double step = fabs(damper->w) * flight->length;
+        const double room = damper->w > 0 ? frame_room(damper, SIDE_RIGHT) - damper->r
+                                          : frame_room(damper, SIDE_LEFT) + damper->r;
+        if (room < (double)(count - 1) * step)
+            count = 1 + (size_t)fmax(room / step, 0);
     }
     return count;
 }
@@ -251,11 +266,19 @@ static size_t count_clear(const FrameFlight *flight, const FrameTrail *trail, co
 size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
                         size_t count, FrameWork *work) {
     const size_t n = frame->storeys;
+    double shaken = 0;
+    count = guess(flight, frame, count);
     fly(flight, trail, frame, slices, count);
-    for (size_t d = 0; d < frame->dampers; d++)
+    for (size_t k = 0; k < count; k++)
+        shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
+    const double most =
+        frame->dampers > 0 ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double bend = damper->reach * most + fabs(damper->lean) * shaken;
         follow(flight, trail, frame, d, count, slices);
-    if (frame->dampers > 0)
-        count = count_clear(flight, trail, frame, slices, count);
+        count = count_clear(flight, trail, frame, d, bend, slices, count);
+    }
     if (count == 0)
         return 0;
     if (work != NULL) {

@@ -2,7 +2,6 @@
 // summed in one order, so every width of vector gives the same bytes.
 #include "core/solve/frame_lanes.h"
 
-#include <math.h>
 #include <stdint.h>
 
 enum { LANES = FRAME_LANES };
@@ -15,7 +14,7 @@ static inline double total(const double s[LANES]) {
 #define KIND(name)                                                                                 \
     {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
      .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
-     .largest = largest_##name, .square = square_##name, .multiply = multiply_##name}
+     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name}
 // clang-format on
 
 #define WIDTH 2

@@ -61,8 +61,9 @@ typedef struct FrameLanes {
     // number of rows. The last of the rows, of degree + 1 of them, first.
     void (*series)(size_t padded, size_t degree, const double *rows, size_t count,
                    const double *factors, size_t stride, double *out);
-    // The largest magnitude of each column.
-    void (*largest)(size_t padded, size_t count, const double *rows, double *out);
+    // out[k] = sum of weights |rows[k]|.
+    void (*reach)(size_t padded, size_t count, const double *weights, const double *rows,
+                  double *out);
     // squares += rows' rows, of the first `modes` columns: row after row, whole vectors of rows,
     // those beyond the diagonal being of no use.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);

@@ -83,8 +83,7 @@ static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper 
     if (stop->is_given_up || !isfinite(damper->plan->stops[damper->side].stiffness) ||
         !is_worth(frame, arcs) || !(arcs < 0x1p20))
         return false;
-    stop->spent += 256 * n;
-    if (stop->spent < 256 * n * n * n)
+    if ((stop->spent += n) < 4 * n * n * n)
         return false;
     stop->damped = calloc(2 * frame->storeys, sizeof *stop->damped);
     if (stop->damped == NULL ||
@@ -149,18 +148,31 @@ static double change_now(const FramePressStop *stop, const Frame *frame, const F
     return sum;
 }
 
-// s at the start, with `elastic` and N there.
+// At the start of a step: a_g, D p + W^2 q, and s.
+typedef struct Start {
+    const Slice *slice;
+    const double *elastic;
+    double s;
+} Start;
+
+// |s''| is not larger but for what N' does to it.
+static double bow_of(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
+                     const Slice *slice, const Bounds *at) {
+    const double pull = at->pull + stop->wide * at->force;
+    return fabs(damper->lean) * slice->omega * at->shaking + stop->most_bent * pull +
+           stop->most_damped *
+               (frame->viscous * pull + frame->stiff * at->size + frame->drive * at->shaking);
+}
+
 static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
-                        const Slice *slice, const double *elastic, double s, double h, Bounds *at) {
-    const double r = damper->r, w = damper->w, sign = frame_sign(damper->side);
+                        const Start *from, double h, Bounds *at) {
+    const double r = damper->r, w = damper->w, sign = frame_sign(damper->side), s = from->s;
     const double k = damper->contact.stiffness, c = damper->contact.damping;
     const double mass = damper->effective_mass, omega2 = k / mass, omega = sqrt(omega2);
     const double hard = k / omega + c, now = k * r + c * w;
-    const double slope = change_now(stop, frame, damper, slice, elastic, stop->coupling * now);
-    const double pull = at->pull + stop->wide * at->force;
-    const double bow = fabs(damper->lean) * slice->omega * at->shaking + stop->most_bent * pull +
-                       stop->most_damped * (frame->viscous * pull + frame->stiff * at->size +
-                                            frame->drive * at->shaking); // |s''| without N'
+    const double slope =
+        change_now(stop, frame, damper, from->slice, from->elastic, stop->coupling * now);
+    const double bow = bow_of(stop, frame, damper, from->slice, at);
     const double stray = stop->coupling * (at->force + fabs(now));
     // r of a mass that is merely pressed, at both ends, and its least N; how far from these.
     const double start = (s - c / mass * slope / omega2) / omega2, end = start + h * slope / omega2;
@@ -176,25 +188,37 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
     return fmin(sign * start, sign * end) > stirred / omega;
 }
 
-// s at the start; r and w gain `moved` and `sped`.
+// r and w gain `moved` and `sped`.
 static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
-                       double s, double moved, double sped, double h, const Bounds *at) {
+                       const Start *from, double moved, double sped, double h, const Bounds *at) {
     const double sign = frame_sign(damper->side), mass = damper->effective_mass;
     const double k = damper->contact.stiffness, c = damper->contact.damping;
-    const double r = sign * damper->r, w = sign * damper->w;
-    const double now = k * r + c * w, then = now + sign * (k * moved + c * sped);
+    const double r = sign * damper->r, now = k * damper->r + c * damper->w;
+    const double then = now + (k * moved + c * sped), sag = h * h / 8;
     const double bend = at->push + at->force / mass; // |r''|
     const double change = stop->most_damped * (at->pull + stop->wide * at->force) +
                           stop->most_bent * at->size + fabs(damper->lean) * at->shaking; // |s'|
-    const double lift = k * bend + c * (change + (k * at->most + c * bend) / mass);      // |N''|
-    const double rise = k * w + c * (sign * s - now / mass);                             // N'
-    const double sag = h * h / 8;
-    if (!frame->is_shadow && !(fabs(rise) > h * lift) &&
-        !(fmax(fabs(now), fabs(then)) + sag * lift <= damper->row.impact.peak_force))
+    const double rate = k * at->most + c * bend;                                         // |N'|
+    const double turn = change + rate / mass;                                            // |r'''|
+    const double lift = k * bend + c * turn;                                             // |N''|
+    if (frame->plan->separation == SEPARATION_ZERO_FORCE
+            ? !(sign * now > sag * lift && sign * then > sag * lift)
+            : !(r > sag * bend && r + sign * moved > sag * bend))
         return false;
-    if (frame->plan->separation == SEPARATION_ZERO_FORCE)
-        return fmin(now, then) > sag * lift;
-    return fmin(r, r + sign * moved) > sag * bend;
+    if (frame->is_shadow ||
+        fmax(fabs(now), fabs(then)) + sag * lift <= damper->row.impact.peak_force)
+        return true;
+    // N only rises or falls where N' keeps its sign.
+    const double leap = from->s - now / mass, rise = k * damper->w + c * leap; // r'', N'
+    if (fabs(rise) > h * lift)
+        return true;
+    const double slope =
+        change_now(stop, frame, damper, from->slice, from->elastic, stop->coupling * now);
+    const double curve = k * leap + c * (slope - rise / mass); // N''
+    const double bow = bow_of(stop, frame, damper, from->slice, at) + stop->coupling * rate;
+    const double stray = k * turn + c * (bow + lift / mass); // |N'''|
+    const double up = rise > 0 ? 1 : -1;
+    return fmin(up * rise, up * (rise + h * curve)) > h * h / 2 * stray;
 }
 
 // Whether all others stay in flight; they are ready to be moved then.
@@ -278,12 +302,18 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
     FrameDamper *alone = press->count > 0 ? find_alone(frame) : NULL;
     if (alone == NULL)
         return 0;
-    FramePressStop *stop = &press->stops[2 * (size_t)(alone - frame->damper) + alone->side];
+    // Where its buffers are alike they share one.
+    const PlanStop *stops = alone->plan->stops;
+    const bool are_alike = stops[0].stiffness == stops[1].stiffness && //
+                           stops[0].damping == stops[1].damping;
+    FramePressStop *stop =
+        &press->stops[2 * (size_t)(alone - frame->damper) + (are_alike ? 0 : alone->side)];
     if (!prepare(stop, frame, alone))
         return 0;
     frame_elastic(frame, frame->q, frame->p, press->elastic);
-    const double s =
-        alone->lean * slice->value + frame_dot(alone->shape, press->elastic, frame->storeys);
+    const Start from = {slice, press->elastic,
+                        alone->lean * slice->value +
+                            frame_dot(alone->shape, press->elastic, frame->storeys)};
     const double rate = frame_rate(frame);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
     for (size_t i = 0; i < PRESS_LEVELS && is_worth(frame, press->length[i] * rate); i++) {
@@ -293,10 +323,10 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
         Bounds at;
         if (h > length * (1 + 1e-15) || dense->block == NULL ||
             !find_bounds(stop, frame, alone, slice, h, &at) ||
-            (!is_soft && !stiff_lasts(stop, frame, alone, slice, press->elastic, s, h, &at)))
+            (!is_soft && !stiff_lasts(stop, frame, alone, &from, h, &at)))
             continue;
         find_gained(press, dense, frame, alone, slice);
-        if (is_soft && !soft_lasts(stop, frame, alone, s, press->gained[frame->storeys],
+        if (is_soft && !soft_lasts(stop, frame, alone, &from, press->gained[frame->storeys],
                                    press->gained[2 * frame->storeys + 1], h, &at))
             continue;
         const double *ground = press->ground[i], *fall = press->fall[i];

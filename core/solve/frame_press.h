@@ -12,7 +12,7 @@ enum { PRESS_LEVELS = 3 };
 
 // Of one stop, made once contacts with it have lasted for long enough.
 typedef struct FramePressStop {
-    double spent;     // on arcs, in products
+    double spent;     // on arcs
     bool is_given_up; // no memory for it
     FrameDense levels[PRESS_LEVELS];
     double *damped, *bent;               // D shape, W^2 shape

@@ -26,10 +26,10 @@ static const double *shape_of(const Frame *frame, const RunColumn *column) {
 Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Frame *frame,
                           Response *response, Problem *problem) {
     const size_t n = frame->storeys, columns = frame->run->column_count, padded = trail->padded;
-    const size_t square = (n + FRAME_LANES) * padded; // a row's last vector may reach beyond it
+    const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
-    record->block = calloc(2 * (square + TRAIL_MOST * padded) + padded + columns * (1 + padded),
-                           sizeof *record->block);
+    record->block =
+        calloc(2 * (square + TRAIL_MOST * padded) + columns * (1 + padded), sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     record->trail = trail;
@@ -37,8 +37,7 @@ Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Fr
         record->squares[k] = record->block + k * square;
         record->batch[k] = record->block + 2 * square + k * TRAIL_MOST * padded;
     }
-    record->most = record->batch[1] + TRAIL_MOST * padded;
-    record->shapes = record->most + padded;
+    record->shapes = record->batch[1] + TRAIL_MOST * padded;
     record->last_velocity = record->shapes + columns * padded;
     for (size_t i = 0; i < columns; i++)
         memcpy(record->shapes + i * padded, shape_of(frame, &frame->run->columns[i]),
@@ -188,21 +187,14 @@ void frame_record_finish(FrameRecord *record, const Frame *frame, Response *resp
 
 // No storey's value can be larger where its modes' are these.
 static double bound(const Frame *frame, const double *modal) {
-    double sum[4] = {0, 0, 0, 0};
-    size_t i = 0;
-    for (; i + 4 <= frame->storeys; i += 4)
-        for (size_t k = 0; k < 4; k++)
-            sum[k] += frame->widest[i + k] * fabs(modal[i + k]);
-    for (; i < frame->storeys; i++)
-        sum[0] += frame->widest[i] * fabs(modal[i]);
-    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+    double most;
+    frame->lanes->reach(frame->padded, 1, frame->widest, modal, &most);
+    return most;
 }
 
-// The largest of all storeys, where it may be larger than `least`.
-static double largest(const Frame *frame, const double *modal, double least) {
+// The largest of all storeys.
+static double largest(const Frame *frame, const double *modal) {
     double most = 0;
-    if (!(bound(frame, modal) > least))
-        return 0;
     for (size_t j = 0; j < frame->storeys; j++)
         most =
             fmax(most,
@@ -223,9 +215,12 @@ void frame_record_acceleration(Frame *frame) {
 
 void frame_record_peaks(Frame *frame) {
     const Peaks *peaks = &frame->ledger.response->peaks;
-    Moment at = {.x = largest(frame, frame->q, peaks->displacement),
-                 .v = largest(frame, frame->p, peaks->velocity)};
-    const double far = frame->dampers > 0 ? bound(frame, frame->q) : 0;
+    const double far = bound(frame, frame->q);
+    Moment at = {0};
+    if (far > peaks->displacement)
+        at.x = largest(frame, frame->q);
+    if (bound(frame, frame->p) > peaks->velocity)
+        at.v = largest(frame, frame->p);
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double relative = frame_middle(damper) + damper->r;
@@ -237,42 +232,37 @@ void frame_record_peaks(Frame *frame) {
     frame_record_acceleration(frame);
 }
 
-// Whether any of these rows may hold a new peak; `most` gets their bound.
-static bool may_rise(FrameRecord *record, const Frame *frame, const double *rows, size_t count,
-                     double peak, double *most) {
-    const FrameTrail *trail = record->trail;
-    frame->lanes->largest(trail->padded, count, rows + trail->padded, record->most);
-    *most = bound(frame, record->most);
-    return *most > peak;
+// The largest of all storeys in rows 1 to `count`, where that is more than `least`; `most` gets
+// what no row can be beyond.
+static double rise(const Frame *frame, const double *rows, size_t count, double least,
+                   double *most) {
+    const size_t padded = frame->padded;
+    frame->lanes->reach(padded, count, frame->widest, rows + padded, most);
+    for (size_t k = 0; k < count; k++)
+        if (most[k] > least)
+            least = fmax(least, largest(frame, rows + (k + 1) * padded));
+    return least;
 }
 
 void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count) {
     const FrameTrail *trail = record->trail;
     const Peaks *peaks = &frame->ledger.response->peaks;
-    const size_t padded = trail->padded;
-    double far, most;
-    Moment at = {0};
-    if (may_rise(record, frame, trail->q, count, peaks->displacement, &far))
-        for (size_t k = 1; k <= count; k++)
-            at.x =
-                fmax(at.x, largest(frame, trail->q + k * padded, fmax(at.x, peaks->displacement)));
-    if (may_rise(record, frame, trail->p, count, peaks->velocity, &most))
-        for (size_t k = 1; k <= count; k++)
-            at.v = fmax(at.v, largest(frame, trail->p + k * padded, fmax(at.v, peaks->velocity)));
-    if (may_rise(record, frame, trail->elastic, count, peaks->acceleration, &most))
-        for (size_t k = 1; k <= count; k++)
-            at.acceleration =
-                fmax(at.acceleration, largest(frame, trail->elastic + k * padded,
-                                              fmax(at.acceleration, peaks->acceleration)));
+    double far[TRAIL_MOST], most[TRAIL_MOST];
+    Moment at = {
+        .v = rise(frame, trail->p, count, peaks->velocity, most),
+        .acceleration = rise(frame, trail->elastic, count, peaks->acceleration, most),
+        .x = rise(frame, trail->q, count, peaks->displacement, far),
+        .damper_x = peaks->damper_displacement,
+    };
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
-        const double *r = trail->r + d * TRAIL_ROWS, middle = frame_middle(damper);
-        for (size_t k = 1; k <= count; k++)
-            if (far + fabs(middle + r[k]) > fmax(at.damper_x, peaks->damper_displacement))
-                at.damper_x =
-                    fmax(at.damper_x,
-                         fabs(frame_dot(damper->shape, trail->q + k * padded, frame->storeys) +
-                              (middle + r[k])));
+        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = frame_middle(damper);
+        for (size_t k = 0; k < count; k++)
+            if (far[k] + fabs(middle + r[k]) > at.damper_x)
+                at.damper_x = fmax(at.damper_x,
+                                   fabs(frame_dot(damper->shape, trail->q + (k + 1) * trail->padded,
+                                                  frame->storeys) +
+                                        (middle + r[k])));
     }
     ledger_peaks(&frame->ledger, &at);
 }

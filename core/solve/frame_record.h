@@ -15,7 +15,6 @@ typedef struct FrameRecord {
     // are not in them yet.
     double *squares[2], *batch[2];
     size_t count;
-    double *most; // scratch
     double *block;
 } FrameRecord;
 
