@@ -32,8 +32,9 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
     if (bound <= neighbour->worst)
         return;
+    const double *values = frame_spread(frame, apart);
     for (size_t j = 0; j < n; j++)
-        difference = fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, apart, n)));
+        difference = fmax(difference, fabs(values[j]));
     neighbour->worst = fmax(neighbour->worst, difference);
     if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
         neighbour->horizon = (double)before / frame->plan->sample_rate;
@@ -66,7 +67,7 @@ void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine)
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     Frame *own = &neighbour->engine.frame;
-    neighbour->apart = malloc(frame->storeys * sizeof *neighbour->apart);
+    neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
     neighbour->is_known =
         neighbour->apart != NULL && frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
                                                         &neighbour->response) == STATUS_OK;

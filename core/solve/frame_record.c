@@ -194,11 +194,10 @@ static double bound(const Frame *frame, const double *modal) {
 
 // The largest of all storeys.
 static double largest(const Frame *frame, const double *modal) {
+    const double *values = frame_spread(frame, modal);
     double most = 0;
     for (size_t j = 0; j < frame->storeys; j++)
-        most =
-            fmax(most,
-                 fabs(frame_dot(frame->modes->shapes + j * frame->storeys, modal, frame->storeys)));
+        most = ledger_larger(most, fabs(values[j]));
     return most;
 }
 
@@ -208,8 +207,13 @@ void frame_record_acceleration(Frame *frame) {
         most += frame->damper[d].thrust * fabs(frame->damper[d].force);
     if (!(most > frame->ledger.response->peaks.acceleration))
         return;
-    for (size_t j = 0; j < frame->storeys; j++)
-        at = fmax(at, fabs(frame_storey_acceleration(frame, j)));
+    const double *pull = frame_spread(frame, frame->elastic);
+    for (size_t j = 0; j < frame->storeys; j++) {
+        double sum = -pull[j];
+        for (size_t d = 0; d < frame->dampers; d++)
+            sum += frame->mobility[d * frame->storeys + j] * frame->damper[d].force;
+        at = ledger_larger(at, fabs(sum));
+    }
     ledger_acceleration(&frame->ledger, at);
 }
 

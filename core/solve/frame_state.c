@@ -73,6 +73,11 @@ void frame_feel(Frame *frame) {
     }
 }
 
+const double *frame_spread(const Frame *frame, const double *modal) {
+    frame->lanes->multiply(frame->spread, frame->padded, modal, even(frame->storeys), frame->seen);
+    return frame->seen;
+}
+
 double frame_displacement(const Frame *frame, size_t storey) {
     return frame_dot(frame->modes->shapes + storey * frame->storeys, frame->q, frame->storeys);
 }
@@ -284,9 +289,10 @@ static Status make_room(Frame *frame) {
     const size_t n = frame->padded, m = frame->dampers;
     double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,   &frame->share,
                                &frame->q,      &frame->p,        &frame->elastic, &frame->widest,
-                               &frame->shapes, &frame->mobility, &frame->yield,   &frame->hold,
-                               &frame->scratch};
-    const size_t sizes[] = {n, n, n, n, n, n, n, n, m * n, m * n, m * m, m * m, m * m};
+                               &frame->shapes, &frame->spread,   &frame->seen,    &frame->mobility,
+                               &frame->yield,  &frame->hold,     &frame->scratch};
+    const size_t all = even(frame->storeys) * n;
+    const size_t sizes[] = {n, n, n, n, n, n, n, n, m * n, all, n, m * n, m * m, m * m, m * m};
     size_t total = frame_lanes_room(0);
     for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];
@@ -326,8 +332,11 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
         frame->omega2[i] = frame->modes->omega[i] * frame->modes->omega[i];
         frame->stiff = fmax(frame->stiff, frame->omega2[i]);
         frame->share[i] = frame->carry[i] = frame->modes->participation[i];
-        for (size_t j = 0; j < n; j++)
-            frame->widest[i] = fmax(frame->widest[i], fabs(frame->modes->shapes[j * n + i]));
+        for (size_t j = 0; j < n; j++) {
+            const double shape = frame->modes->shapes[j * n + i];
+            frame->widest[i] = fmax(frame->widest[i], fabs(shape));
+            frame->spread[i * frame->padded + j] = shape;
+        }
     }
     frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
     frame->rate = fmax(fmax(sqrt(frame->stiff), frame->viscous), 1e-300);

@@ -70,6 +70,8 @@ typedef struct Frame {
     double *coupled;         // D, where it is not: columns of `padded` values; else NULL
     double *share;           // participation
     double *shapes;          // of the dampers' storeys
+    double *spread;          // of all storeys: columns of `padded` values, one a mode
+    double *seen;            // scratch of frame_spread
     double *widest;          // of each mode, the largest |shape| of any storey
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
@@ -134,6 +136,8 @@ double frame_middle(const FrameDamper *damper);
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
 void frame_feel(Frame *frame);
+// Values of all storeys from those of all modes, until the next call.
+const double *frame_spread(const Frame *frame, const double *modal);
 // Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
 double frame_displacement(const Frame *frame, size_t storey);
 double frame_velocity(const Frame *frame, size_t storey);
