@@ -87,16 +87,16 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
         arrays[8 + i] = &flight->loss[i];
     const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
     const size_t padded = frame_lanes_padded(n);
-    flight->block =
-        calloc((count + FRAME_SUMS) * padded + 2 * n + 2 + frame_lanes_padded(2 * n + 2),
-               sizeof *flight->block);
+    const size_t starts = FRAME_FOUR * (2 * n + 2);
+    const size_t ends = FRAME_FOUR * frame_lanes_padded(2 * n + 2);
+    flight->block = calloc((count + FRAME_SUMS) * padded + starts + ends, sizeof *flight->block);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + i * padded;
     flight->sums = flight->block + count * padded;
     flight->start = flight->sums + FRAME_SUMS * padded;
-    flight->gained = flight->start + 2 * n + 2;
+    flight->gained = flight->start + starts;
     flight->length = frame->interval;
     frame_flight_ground(frame->turning, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
@@ -158,17 +158,24 @@ bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, do
 
 static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
                            size_t count, FrameWork *work) {
-    const size_t n = frame->storeys;
     const FrameDense *dense = &flight->dense;
-    double *start = flight->start, *pulled = flight->gained;
-    for (size_t k = 0; k < count; k++) {
-        memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
-        memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
-        start[2 * n] = trail->a[k];
-        start[2 * n + 1] = trail->b[k];
-        work->damping += frame_dense_form(dense, frame->lanes, dense->loss, start, pulled);
-        work->input -= trail->a[k] * frame_dot(dense->input[0], start, dense->size) +
-                       trail->b[k] * frame_dot(dense->input[1], start, dense->size);
+    const size_t n = frame->storeys, size = dense->size;
+    for (size_t from = 0; from < count; from += FRAME_FOUR) {
+        const size_t many = count - from < FRAME_FOUR ? count - from : FRAME_FOUR;
+        for (size_t k = from; k < from + many; k++) {
+            double *start = flight->start + (k - from) * size;
+            memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
+            memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
+            start[2 * n] = trail->a[k];
+            start[2 * n + 1] = trail->b[k];
+            work->input -= trail->a[k] * frame_dot(dense->input[0], start, size) +
+                           trail->b[k] * frame_dot(dense->input[1], start, size);
+        }
+        frame->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
+                                    flight->gained);
+        for (size_t k = 0; k < many; k++)
+            work->damping +=
+                frame_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
     }
 }
 

@@ -18,7 +18,7 @@ typedef struct FrameFlight {
     double loss_base[3], input_base[3]; // over (value^2, value slope, slope^2), all modes
     double ground[2], fall[2];          // integral of a_g over (value, slope), and its integral
     double *sums;                       // scratch, as are the next
-    double *start, *gained;             // (q, p, value, slope), and what these gain
+    double *start, *gained;             // FRAME_FOUR times (q, p, value, slope), and their gains
     double *block;
 } FrameFlight;
 

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-enum { LANES = FRAME_LANES };
+enum { LANES = FRAME_LANES, LARGE = 4096 };
 
 static inline double total(const double s[LANES]) {
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
@@ -14,7 +14,7 @@ static inline double total(const double s[LANES]) {
 #define KIND(name)                                                                                 \
     {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
      .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
-     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name}
+     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
 // clang-format on
 
 #define WIDTH 2

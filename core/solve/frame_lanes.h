@@ -27,6 +27,7 @@ static inline double *frame_lanes_start(double *room) {
 typedef struct FrameGains {
     double *q[4], *p[4];
 } FrameGains;
+enum { FRAME_FOUR = 4 };
 enum { FRAME_SUMS = 7 }; // over (q q, q p, p p, q a, q b, p a, p b)
 
 // One order of an arc's series (frame_arc.h): from q's orders k and k + 1, which follow each other,
@@ -71,6 +72,9 @@ typedef struct FrameLanes {
     // columns.
     void (*multiply)(const double *matrix, size_t rows, const double *y, size_t columns,
                      double *out);
+    // Four times the same with y's that lie `stride` values apart, to four rows of out.
+    void (*multiply_four)(const double *matrix, size_t rows, const double *y, size_t stride,
+                          size_t columns, double *out);
 } FrameLanes;
 
 enum { FRAME_LANES_KINDS = 3 };

@@ -192,13 +192,16 @@ static double bound(const Frame *frame, const double *modal) {
     return most;
 }
 
+static double largest_of(const double *values, size_t count) {
+    double most[2] = {0, 0};
+    for (size_t j = 0; j < count; j++)
+        most[j % 2] = ledger_larger(most[j % 2], fabs(values[j]));
+    return ledger_larger(most[0], most[1]);
+}
+
 // The largest of all storeys.
 static double largest(const Frame *frame, const double *modal) {
-    const double *values = frame_spread(frame, modal);
-    double most = 0;
-    for (size_t j = 0; j < frame->storeys; j++)
-        most = ledger_larger(most, fabs(values[j]));
-    return most;
+    return largest_of(frame_spread(frame, modal), frame->storeys);
 }
 
 void frame_record_acceleration(Frame *frame) {
@@ -242,9 +245,17 @@ static double rise(const Frame *frame, const double *rows, size_t count, double 
                    double *most) {
     const size_t padded = frame->padded;
     frame->lanes->reach(padded, count, frame->widest, rows + padded, most);
-    for (size_t k = 0; k < count; k++)
-        if (most[k] > least)
-            least = fmax(least, largest(frame, rows + (k + 1) * padded));
+    for (size_t k = 0; k < count; k += FRAME_FOUR) {
+        bool may_rise = false;
+        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
+            may_rise = may_rise || most[j] > least;
+        if (!may_rise)
+            continue;
+        // Of rows behind the last one no use is made.
+        const double *values = frame_spread_four(frame, rows + (k + 1) * padded);
+        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
+            least = ledger_larger(least, largest_of(values + (j - k) * padded, frame->storeys));
+    }
     return least;
 }
 

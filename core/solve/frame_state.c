@@ -73,6 +73,12 @@ void frame_feel(Frame *frame) {
     }
 }
 
+const double *frame_spread_four(const Frame *frame, const double *modal) {
+    frame->lanes->multiply_four(frame->spread, frame->padded, modal, frame->padded,
+                                even(frame->storeys), frame->seen);
+    return frame->seen;
+}
+
 const double *frame_spread(const Frame *frame, const double *modal) {
     frame->lanes->multiply(frame->spread, frame->padded, modal, even(frame->storeys), frame->seen);
     return frame->seen;
@@ -292,7 +298,8 @@ static Status make_room(Frame *frame) {
                                &frame->shapes, &frame->spread,   &frame->seen,    &frame->mobility,
                                &frame->yield,  &frame->hold,     &frame->scratch};
     const size_t all = even(frame->storeys) * n;
-    const size_t sizes[] = {n, n, n, n, n, n, n, n, m * n, all, n, m * n, m * m, m * m, m * m};
+    const size_t sizes[] = {n,     n,     n,     n,    n, n, n, n, m * n, all, FRAME_FOUR * n,
+                            m * n, m * m, m * m, m * m};
     size_t total = frame_lanes_room(0);
     for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];

@@ -138,6 +138,8 @@ void frame_elastic(const Frame *frame, const double *q, const double *p, double 
 void frame_feel(Frame *frame);
 // Values of all storeys from those of all modes, until the next call.
 const double *frame_spread(const Frame *frame, const double *modal);
+// Likewise of FRAME_FOUR rows of modes, one after the other.
+const double *frame_spread_four(const Frame *frame, const double *modal);
 // Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
 double frame_displacement(const Frame *frame, size_t storey);
 double frame_velocity(const Frame *frame, size_t storey);
