@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TERMS = 22, NODES = 8 };
+enum { TERMS = 22, NODES = 8, WATCH_PRODUCTS = 1000000 };
 
 typedef long double Real;
 
@@ -26,6 +26,7 @@ typedef struct Work {
     Real *series; // of one column: TERMS x storeys
     Real *speeds; // node after node, column after column, of all modes
     Real *pulls;  // D times those of one column
+    size_t done;  // products since the watch was asked
 } Work;
 
 // Coefficients in t / h of a_g for a unit of value or of slope.
@@ -44,8 +45,12 @@ static void base_series(const Work *work, bool is_slope, Real *a) {
     }
 }
 
-static bool goes_on(const Work *work) {
+// Before so many products.
+static bool goes_on(Work *work, size_t products) {
     const Frame *frame = work->frame;
+    if ((work->done += products) < WATCH_PRODUCTS)
+        return true;
+    work->done = 0;
     return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
 }
 
@@ -134,7 +139,7 @@ static bool make_small(Work *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size;
     memset(work->T, 0, size * size * sizeof *work->T);
     for (size_t j = 0; j < size; j++) {
-        if (!goes_on(work))
+        if (!goes_on(work, TERMS * n * n))
             return false;
         column_series(work, j);
         for (size_t i = 0; i < n; i++) {
@@ -179,7 +184,7 @@ static bool make_forms(Work *work, const Quadrature *rule) {
         }
         for (size_t j = 0; j < size; j++) {
             const Real *p = speeds + j * n, share = dot_long(work->share, p, n);
-            if (!goes_on(work))
+            if (!goes_on(work, 2 * n * n))
                 return false;
             for (size_t i = 0; i < modes; i++)
                 work->pulls[i] = dot(damping + i * modes, p, modes);
@@ -201,10 +206,10 @@ static bool make_forms(Work *work, const Quadrature *rule) {
 }
 
 // out += a b. False: cancelled.
-static bool add_product(const Work *work, const Real *a, const Real *b, size_t rows, Real *out) {
+static bool add_product(Work *work, const Real *a, const Real *b, size_t rows, Real *out) {
     const size_t size = work->size;
     for (size_t i = 0; i < rows; i++) {
-        if (!goes_on(work))
+        if (!goes_on(work, size * size))
             return false;
         for (size_t k = 0; k < size; k++) {
             const Real factor = a[i * size + k];

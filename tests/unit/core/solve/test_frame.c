@@ -377,6 +377,35 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
     plan_free(plan);
 }
 
+typedef struct Asked {
+    size_t times, most;
+    double fraction;
+} Asked;
+
+static bool stop_after(void *context, double fraction) {
+    Asked *asked = context;
+    asked->fraction = fraction;
+    return ++asked->times < asked->most;
+}
+
+static void making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way(void **state) {
+    (void)state;
+    enum { MANY = 60 };
+    Plan *plan = frames_new(MANY, 0, 10, 1000);
+    Problem problem;
+    frames_uniform(plan, 1000, 1e6, 0.02);
+    plan->damping[0] *= 5;
+    plan->displacement[0] = 0.01;
+    for (size_t most = 1; most < 14; most += 6) {
+        Asked asked = {.most = most};
+        const Watch watch = {&asked, stop_after};
+        assert_int_equal(status_of(plan, (Run){.watch = &watch}, &problem), STATUS_CANCELLED);
+        assert_int_equal(asked.times, most);
+        assert_true(asked.fraction == 0);
+    }
+    plan_free(plan);
+}
+
 // A half-sine of the base that lasts `length` and leaves the same speed however short it is.
 static double knocked(const Plan *plan, double length, double *steps) {
     const double start = 0.0123, amplitude = 1 / length;
@@ -421,6 +450,7 @@ int main(void) {
         cmocka_unit_test(a_short_pulse_costs_what_a_long_one_does),
         cmocka_unit_test(many_held_masses_change_stops_together),
         cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
+        cmocka_unit_test(making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
