@@ -8,7 +8,13 @@
 #include <float.h>
 #include <math.h>
 
-enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
+enum {
+    STILL_EVENTS = 1000,
+    STALLED_EVENTS = 100,
+    FLIGHT_WORK = 8,
+    PRESS_WORK = 64,
+    PRESS_STEPS = 32
+};
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
@@ -95,7 +101,11 @@ static void pass(FrameEngine *engine, const FrameEvent *hit) {
             take_contact(engine, d);
     frame_arc_state(arc, frame, 1);
     frame->offset += arc->length;
-    frame->still_events = 0;
+    frame->still_time += arc->length;
+    if (frame->still_time > frame_clock(frame)) {
+        frame->still_events = 0;
+        frame->still_time = 0;
+    }
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->is_fresh = false;
@@ -154,6 +164,19 @@ static bool hold(FrameEngine *engine, const Slice *slice, double length) {
     return true;
 }
 
+// Masses that touch and part at one instant again and again do so by rounding alone: between stops
+// without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
+// is longer each time, until the motion itself decides.
+static bool is_stalled(Frame *frame) {
+    if (frame->still_events < STALLED_EVENTS * frame->dampers)
+        return false;
+    const double now = frame_time(frame);
+    const bool goes_on = now - frame->stalled_at <= 4 * frame->stall;
+    frame->stall = fmax(goes_on ? 2 * frame->stall : 0, frame_clock(frame));
+    frame->stalled_at = now;
+    return true;
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(FrameEngine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -165,9 +188,12 @@ static Status advance(FrameEngine *engine, double length) {
         return press(engine, &slice, fmin(length, knot));
     if (hold(engine, &slice, fmin(length, knot)))
         return count_steps(engine, 1, PRESS_WORK);
-    frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), arc_most(frame, &slice)));
+    const bool stays = is_stalled(frame);
+    const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
+    frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
     FrameEvent event;
-    const bool is_event = frame_find_event(frame, arc, &event);
+    const bool is_event = frame_find_event(frame, arc, &event) &&
+                          !(stays && event.s * arc->length <= frame_clock(frame));
     if (is_event)
         frame_arc_cut(arc, frame, event.s * arc->length < SHORTEST ? 0 : event.s);
     if (arc->length > 0)

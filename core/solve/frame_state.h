@@ -99,8 +99,10 @@ typedef struct Frame {
     double interval;
     BaseCursor base;
     Ledger ledger;
-    size_t events;       // all so far
-    size_t still_events; // in a row, without time passing
+    size_t events;            // all so far
+    size_t still_events;      // in a row, without time passing
+    double still_time;        // what has passed nevertheless [s]
+    double stall, stalled_at; // how long events were last passed over, and when that was [s]
 } Frame;
 
 // +1 for the right stop, -1 for the left.
