@@ -1,12 +1,15 @@
-// With s = shape . (D p + W^2 q) + lean a_g the contact is r'' = s - N / m_e, N = k r + c w, and
-// its size E^2 = w^2 + (k / m_e) r^2 grows by no more than |s| in unit time. The structure's V^2 =
-// p'p + q'W^2 q grows by no more than growth V + |participation| |a_g| + |shape| |N|, while |s| <=
-// reach V + |lean| |a_g| and |N| <= hard E. That bounds V, E, s and N over a step.
+// With s = shape . (D p + W^2 q) + lean a_g the contact is r'' = s - N / m_e, N = k r + c w. The
+// energy of structure, free mass and buffer, U = V^2 + m z'^2 + k r^2 with V^2 = p'p + q'W^2 q,
+// only falls but for the base's work, so sqrt(U) grows by no more than sqrt(|participation|^2 + m)
+// |a_g| in unit time. That bounds V and s over a step. The contact's own size E^2 = w^2 + (k / m_e)
+// r^2 grows by no more than |s|, and |N| <= hard E.
 //
-// Were s a straight line, a mass that is merely pressed would ride at
-//   (s - (c / m_e) s' m_e / k) m_e / k   with   N = m_e s,
-// and the size of what is left of r grows by no more than s strays from that line. Of its bend what
-// N does through the structure's damping, coupling = shape . D shape, is kept apart, for N is fast.
+// A stiff contact is taken apart: y = q + m_e shape r feels N only through its damping, and
+//   r'' + slack w + spring r = S,   S = lean a_g + shape . (D y' + W^2 y),
+//   slack = c / m_e + m_e shape . D shape,   spring = k / m_e + m_e shape . W^2 shape.
+// Were S a straight line, a mass that is merely pressed would ride at (S - slack S' / spring) /
+// spring. How far r strays from there grows with what S bends, and that is slow: of such a bend d
+// the mass follows all but (d'' + slack d') / spring.
 //
 // A softer contact, one that does not get far in a step, lasts where r at both ends is further from
 // 0 than r'' can bend it; and where N surely only rises or falls its peak is at an end.
@@ -17,6 +20,9 @@
 #include <string.h>
 
 enum { FEW_STOREYS = 24 }; // a step takes less than a single arc
+
+// Of N: what a mass that rides on a stiff stop may add to a peak without being looked at.
+static const double RIPPLE_MOST = 1e-9;
 
 Status frame_press_make(FramePress *press, const Frame *frame, Problem *problem) {
     const size_t n = frame->storeys, size = frame_lanes_padded(2 * (n + 1) + 2);
@@ -75,6 +81,11 @@ static double size_of(const double *values, size_t count) {
     return sqrt(frame_dot(values, values, count));
 }
 
+// Tables of many storeys are large.
+static size_t levels_of(const Frame *frame) {
+    return frame->storeys <= FEW_STOREYS ? PRESS_LEVELS : 3;
+}
+
 // Makes the stop's transitions when arcs have cost about as much as it does. False: there is none.
 static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper *damper) {
     if (stop->levels[0].block != NULL)
@@ -87,7 +98,7 @@ static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper 
         return false;
     stop->damped = calloc(2 * frame->storeys, sizeof *stop->damped);
     if (stop->damped == NULL ||
-        frame_dense_make(stop->levels, PRESS_LEVELS, frame, damper, NULL) != STATUS_OK) {
+        frame_dense_make(stop->levels, levels_of(frame), frame, damper, NULL) != STATUS_OK) {
         clear_stop(stop);
         *stop = (FramePressStop){.is_given_up = true};
         return false;
@@ -102,6 +113,7 @@ static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper 
     stop->most_damped = size_of(stop->damped, frame->storeys);
     stop->most_bent = size_of(stop->bent, frame->storeys);
     stop->coupling = frame_dot(damper->shape, stop->damped, frame->storeys);
+    stop->bending = frame_dot(damper->shape, stop->bent, frame->storeys);
     return true;
 }
 
@@ -115,25 +127,21 @@ typedef struct Bounds {
     double force;      // |N|
 } Bounds;
 
-// False: there are none.
-static bool find_bounds(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
-                        const Slice *slice, double h, Bounds *at) {
-    const double omega = sqrt(damper->contact.stiffness / damper->effective_mass);
-    const double hard = damper->contact.stiffness / omega + damper->contact.damping;
-    const double lean = fabs(damper->lean), size = hypot(damper->w, omega * damper->r);
-    const double left = 1 - h * (frame->growth + h * stop->wide * hard * damper->reach);
-    if (!(left > 0.25))
-        return false;
+static void find_bounds(const Frame *frame, const FrameDamper *damper, const Slice *slice, double h,
+                        Bounds *at) {
+    const double k = damper->contact.stiffness, m = damper->plan->mass;
+    const double omega = sqrt(k / damper->effective_mass), lean = fabs(damper->lean);
+    const double own = frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
+    const double start = hypot(frame_size(frame), sqrt(m * own * own + k * damper->r * damper->r));
     at->shaken = frame_flight_shaken(slice, h);
     at->shaking = slice->omega > 0 ? slice->omega * at->shaken : fabs(slice->slope);
-    at->size = (frame_size(frame) + h * (frame->drive * at->shaken +
-                                         stop->wide * hard * (size + h * lean * at->shaken))) /
-               left;
+    // growth h is below 1, or there are no flights either
+    at->size =
+        (start + h * hypot(frame->drive, sqrt(m)) * at->shaken) / fmax(1 - frame->growth * h, 0);
     at->pull = (frame->viscous + sqrt(frame->stiff)) * at->size + frame->drive * at->shaken;
     at->push = lean * at->shaken + damper->reach * at->size;
-    at->most = size + h * at->push;
-    at->force = hard * at->most;
-    return isfinite(at->force);
+    at->most = hypot(damper->w, omega * damper->r) + h * at->push;
+    at->force = (k / omega + damper->contact.damping) * at->most;
 }
 
 // s' now; p' but for what N does to it is -elastic - participation a_g.
@@ -155,10 +163,10 @@ typedef struct Start {
     double s;
 } Start;
 
-// |s''| is not larger but for what N' does to it.
+// |s''| is not larger but for what N' does to it, N being no larger than `force`.
 static double bow_of(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
-                     const Slice *slice, const Bounds *at) {
-    const double pull = at->pull + stop->wide * at->force;
+                     const Slice *slice, const Bounds *at, double force) {
+    const double pull = at->pull + stop->wide * force;
     return fabs(damper->lean) * slice->omega * at->shaking + stop->most_bent * pull +
            stop->most_damped *
                (frame->viscous * pull + frame->stiff * at->size + frame->drive * at->shaking);
@@ -166,25 +174,37 @@ static double bow_of(const FramePressStop *stop, const Frame *frame, const Frame
 
 static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
                         const Start *from, double h, Bounds *at) {
-    const double r = damper->r, w = damper->w, sign = frame_sign(damper->side), s = from->s;
+    const double r = damper->r, w = damper->w, sign = frame_sign(damper->side);
     const double k = damper->contact.stiffness, c = damper->contact.damping;
-    const double mass = damper->effective_mass, omega2 = k / mass, omega = sqrt(omega2);
-    const double hard = k / omega + c, now = k * r + c * w;
-    const double slope =
-        change_now(stop, frame, damper, from->slice, from->elastic, stop->coupling * now);
-    const double bow = bow_of(stop, frame, damper, from->slice, at);
-    const double stray = stop->coupling * (at->force + fabs(now));
-    // r of a mass that is merely pressed, at both ends, and its least N; how far from these.
-    const double start = (s - c / mass * slope / omega2) / omega2, end = start + h * slope / omega2;
-    const double least = mass * fmin(sign * s, sign * (s + h * slope));
-    const double stirred =
-        hypot(w - slope / omega2, omega * (r - start)) + h * h / 2 * (stray + h / 3 * bow);
-    at->force = fmin(at->force, mass * fmax(fabs(s), fabs(s + h * slope)) + hard * stirred);
-    // A force that may be the largest so far is to be seen where it is so.
-    if (!frame->is_shadow && at->force > damper->row.impact.peak_force)
+    const double mass = damper->effective_mass, extra = mass * fabs(damper->lean) * stop->wide;
+    const double spring = k / mass + mass * stop->bending, omega = sqrt(spring);
+    const double slack = c / mass + mass * stop->coupling, hard = k / omega + c;
+    const double S = from->s + mass * (stop->coupling * w + stop->bending * r);
+    const double slope = change_now(stop, frame, damper, from->slice, from->elastic,
+                                    mass * stop->coupling * from->s) +
+                         mass * stop->bending * w;
+    // |S''| <= bow + more |N|; and what of it the mass does not follow.
+    const double more = stop->most_damped * frame->viscous * stop->wide;
+    const double bow = bow_of(stop, frame, damper, from->slice, at, 0) +
+                       extra * (stop->most_bent * at->shaken + stop->most_damped * at->shaking);
+    const double left =
+        fmin((2 * h + slack * h * h / 2) / spring + h * h / 2 / omega, h * h * h / 6);
+    // r and N of a mass that is merely pressed, at both ends.
+    const double start = (S - slack * slope / spring) / spring, end = start + h * slope / spring;
+    const double rides[2] = {k * start + c * slope / spring, k * end + c * slope / spring};
+    const double astray = hypot(w - slope / spring, omega * (r - start));
+    const double largest = fmax(fabs(rides[0]), fabs(rides[1])), share = hard * left * more;
+    if (!(share < 0.5))
+        return false;
+    at->force = (largest + hard * (astray + left * bow)) / (1 - share);
+    const double bent = bow + more * at->force, stirred = astray + left * bent;
+    // A force that may be the largest so far is to be seen where it is so: at an end, once the mass
+    // merely rides and S only rises or falls.
+    if (!frame->is_shadow && at->force > damper->row.impact.peak_force &&
+        !(hard * astray <= RIPPLE_MOST * largest && fabs(slope) > h * bent))
         return false;
     if (frame->plan->separation == SEPARATION_ZERO_FORCE)
-        return least > hard * stirred;
+        return fmin(sign * rides[0], sign * rides[1]) > hard * stirred;
     return fmin(sign * start, sign * end) > stirred / omega;
 }
 
@@ -215,7 +235,8 @@ static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const Fra
     const double slope =
         change_now(stop, frame, damper, from->slice, from->elastic, stop->coupling * now);
     const double curve = k * leap + c * (slope - rise / mass); // N''
-    const double bow = bow_of(stop, frame, damper, from->slice, at) + stop->coupling * rate;
+    const double bow =
+        bow_of(stop, frame, damper, from->slice, at, at->force) + stop->coupling * rate;
     const double stray = k * turn + c * (bow + lift / mass); // |N'''|
     const double up = rise > 0 ? 1 : -1;
     return fmin(up * rise, up * (rise + h * curve)) > h * h / 2 * stray;
@@ -316,14 +337,15 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
                             frame_dot(alone->shape, press->elastic, frame->storeys)};
     const double rate = frame_rate(frame);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
-    for (size_t i = 0; i < PRESS_LEVELS && is_worth(frame, press->length[i] * rate); i++) {
+    for (size_t i = 0; i < levels_of(frame) && is_worth(frame, press->length[i] * rate); i++) {
         const FrameDense *dense = &stop->levels[i];
         const double h = press->length[i];
         const bool is_soft = h * omega < 1;
         Bounds at;
-        if (h > length * (1 + 1e-15) || dense->block == NULL ||
-            !find_bounds(stop, frame, alone, slice, h, &at) ||
-            (!is_soft && !stiff_lasts(stop, frame, alone, &from, h, &at)))
+        if (h > length * (1 + 1e-15) || dense->block == NULL)
+            continue;
+        find_bounds(frame, alone, slice, h, &at);
+        if (!is_soft && !stiff_lasts(stop, frame, alone, &from, h, &at))
             continue;
         find_gained(press, dense, frame, alone, slice);
         if (is_soft && !soft_lasts(stop, frame, alone, &from, press->gained[frame->storeys],

@@ -8,7 +8,7 @@
 #include "core/solve/frame_flight.h"
 #include "core/solve/frame_state.h"
 
-enum { PRESS_LEVELS = 3 };
+enum { PRESS_LEVELS = 8 };
 
 // Of one stop, made once contacts with it have lasted for long enough.
 typedef struct FramePressStop {
@@ -17,7 +17,7 @@ typedef struct FramePressStop {
     FrameDense levels[PRESS_LEVELS];
     double *damped, *bent;               // D shape, W^2 shape
     double wide, most_damped, most_bent; // |shape|, |D shape|, |W^2 shape|
-    double coupling;                     // shape . D shape
+    double coupling, bending;            // shape . D shape, shape . W^2 shape
 } FramePressStop;
 
 typedef struct FramePress {
