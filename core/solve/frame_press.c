@@ -1,8 +1,7 @@
-// With s = shape . (D p + W^2 q) + lean a_g the contact is r'' = s - N / m_e, N = k r + c w. The
-// energy of structure, free mass and buffer, U = V^2 + m z'^2 + k r^2 with V^2 = p'p + q'W^2 q,
-// only falls but for the base's work, so sqrt(U) grows by no more than sqrt(|participation|^2 + m)
-// |a_g| in unit time. That bounds V and s over a step. The contact's own size E^2 = w^2 + (k / m_e)
-// r^2 grows by no more than |s|, and |N| <= hard E.
+// With s = shape . (D p + W^2 q) + lean a_g the contact is r'' = s - N / m_e, N = k r + c w, and
+// its size E^2 = w^2 + (k / m_e) r^2 grows by no more than |s| in unit time. The structure's V^2 =
+// p'p + q'W^2 q grows by no more than growth V + |participation| |a_g| + |shape| |N|, while |s| <=
+// reach V + |lean| |a_g| and |N| <= hard E. That bounds V, E, s and N over a step.
 //
 // A stiff contact is taken apart: y = q + m_e shape r feels N only through its damping, and
 //   r'' + slack w + spring r = S,   S = lean a_g + shape . (D y' + W^2 y),
@@ -122,26 +121,23 @@ typedef struct Bounds {
     double size, pull; // V, and |p'| without N
     double shaken;     // |a_g|
     double shaking;    // |a_g'|
-    double push;       // |s|
-    double most;       // E
     double force;      // |N|
 } Bounds;
 
-static void find_bounds(const Frame *frame, const FrameDamper *damper, const Slice *slice, double h,
-                        Bounds *at) {
-    const double k = damper->contact.stiffness, m = damper->plan->mass;
-    const double omega = sqrt(k / damper->effective_mass), lean = fabs(damper->lean);
-    const double own = frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
-    const double start = hypot(frame_size(frame), sqrt(m * own * own + k * damper->r * damper->r));
+// |p'| is not larger but for N.
+static double pull_of(const Frame *frame, const Bounds *at) {
+    return (frame->viscous + sqrt(frame->stiff)) * at->size + frame->drive * at->shaken;
+}
+
+// Of V and p' as they are without N.
+static bool find_bounds(const Frame *frame, const Slice *slice, double h, Bounds *at) {
+    const double left = 1 - h * frame->growth;
     at->shaken = frame_flight_shaken(slice, h);
     at->shaking = slice->omega > 0 ? slice->omega * at->shaken : fabs(slice->slope);
-    // growth h is below 1, or there are no flights either
-    at->size =
-        (start + h * hypot(frame->drive, sqrt(m)) * at->shaken) / fmax(1 - frame->growth * h, 0);
-    at->pull = (frame->viscous + sqrt(frame->stiff)) * at->size + frame->drive * at->shaken;
-    at->push = lean * at->shaken + damper->reach * at->size;
-    at->most = hypot(damper->w, omega * damper->r) + h * at->push;
-    at->force = (k / omega + damper->contact.damping) * at->most;
+    at->size = (frame_size(frame) + h * frame->drive * at->shaken) / left;
+    at->pull = pull_of(frame, at);
+    at->force = 0;
+    return left > 0.5;
 }
 
 // s' now; p' but for what N does to it is -elastic - participation a_g.
@@ -184,7 +180,10 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
                                     mass * stop->coupling * from->s) +
                          mass * stop->bending * w;
     // |S''| <= bow + more |N|; and what of it the mass does not follow.
-    const double more = stop->most_damped * frame->viscous * stop->wide;
+    const double swing = frame->viscous + sqrt(frame->stiff), lift = 2 * h * stop->wide; // of V
+    const double more = stop->most_damped * frame->viscous * stop->wide +
+                        lift * (stop->most_bent * swing +
+                                stop->most_damped * (frame->viscous * swing + frame->stiff));
     const double bow = bow_of(stop, frame, damper, from->slice, at, 0) +
                        extra * (stop->most_bent * at->shaken + stop->most_damped * at->shaking);
     const double left =
@@ -198,6 +197,7 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
         return false;
     at->force = (largest + hard * (astray + left * bow)) / (1 - share);
     const double bent = bow + more * at->force, stirred = astray + left * bent;
+    at->size += lift * at->force;
     // A force that may be the largest so far is to be seen where it is so: at an end, once the mass
     // merely rides and S only rises or falls.
     if (!frame->is_shadow && at->force > damper->row.impact.peak_force &&
@@ -210,34 +210,43 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
 
 // r and w gain `moved` and `sped`.
 static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const FrameDamper *damper,
-                       const Start *from, double moved, double sped, double h, const Bounds *at) {
+                       const Start *from, double moved, double sped, double h, Bounds *at) {
     const double sign = frame_sign(damper->side), mass = damper->effective_mass;
     const double k = damper->contact.stiffness, c = damper->contact.damping;
+    const double omega = sqrt(k / mass), hard = k / omega + c, lean = fabs(damper->lean);
     const double r = sign * damper->r, now = k * damper->r + c * damper->w;
     const double then = now + (k * moved + c * sped), sag = h * h / 8;
-    const double bend = at->push + at->force / mass; // |r''|
+    const double size = hypot(damper->w, omega * damper->r), lift = 2 * h * stop->wide * hard;
+    const double left = 1 - lift * h * damper->reach;
+    if (!(left > 0.25))
+        return false;
+    at->size = (at->size + lift * (size + h * lean * at->shaken)) / left;
+    at->pull = pull_of(frame, at);
+    const double push = lean * at->shaken + damper->reach * at->size, most = size + h * push;
+    at->force = hard * most;
+    const double bend = push + at->force / mass; // |r''|
     const double change = stop->most_damped * (at->pull + stop->wide * at->force) +
-                          stop->most_bent * at->size + fabs(damper->lean) * at->shaking; // |s'|
-    const double rate = k * at->most + c * bend;                                         // |N'|
-    const double turn = change + rate / mass;                                            // |r'''|
-    const double lift = k * bend + c * turn;                                             // |N''|
+                          stop->most_bent * at->size + lean * at->shaking; // |s'|
+    const double rate = k * most + c * bend;                               // |N'|
+    const double turn = change + rate / mass;                              // |r'''|
+    const double climb = k * bend + c * turn;                              // |N''|
     if (frame->plan->separation == SEPARATION_ZERO_FORCE
-            ? !(sign * now > sag * lift && sign * then > sag * lift)
+            ? !(sign * now > sag * climb && sign * then > sag * climb)
             : !(r > sag * bend && r + sign * moved > sag * bend))
         return false;
     if (frame->is_shadow ||
-        fmax(fabs(now), fabs(then)) + sag * lift <= damper->row.impact.peak_force)
+        fmax(fabs(now), fabs(then)) + sag * climb <= damper->row.impact.peak_force)
         return true;
     // N only rises or falls where N' keeps its sign.
     const double leap = from->s - now / mass, rise = k * damper->w + c * leap; // r'', N'
-    if (fabs(rise) > h * lift)
+    if (fabs(rise) > h * climb)
         return true;
     const double slope =
         change_now(stop, frame, damper, from->slice, from->elastic, stop->coupling * now);
     const double curve = k * leap + c * (slope - rise / mass); // N''
     const double bow =
         bow_of(stop, frame, damper, from->slice, at, at->force) + stop->coupling * rate;
-    const double stray = k * turn + c * (bow + lift / mass); // |N'''|
+    const double stray = k * turn + c * (bow + climb / mass); // |N'''|
     const double up = rise > 0 ? 1 : -1;
     return fmin(up * rise, up * (rise + h * curve)) > h * h / 2 * stray;
 }
@@ -344,7 +353,8 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
         Bounds at;
         if (h > length * (1 + 1e-15) || dense->block == NULL)
             continue;
-        find_bounds(frame, alone, slice, h, &at);
+        if (!find_bounds(frame, slice, h, &at))
+            continue;
         if (!is_soft && !stiff_lasts(stop, frame, alone, &from, h, &at))
             continue;
         find_gained(press, dense, frame, alone, slice);
