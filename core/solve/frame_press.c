@@ -18,7 +18,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FEW_STOREYS = 24 }; // a step takes less than a single arc
+// Of FEW_STOREYS a step takes less than a single arc.
+enum { FEW_STOREYS = 24, SOFT_LEVEL = 1 };
+static const double SHORT_ARC = 0.25; // steps beyond SOFT_LEVEL are no shorter, over the rate
 
 // Of N: what a mass that rides on a stiff stop may add to a peak without being looked at.
 static const double RIPPLE_MOST = 1e-9;
@@ -351,6 +353,8 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
         const double h = press->length[i];
         const bool is_soft = h * omega < 1;
         Bounds at;
+        if (is_soft && i > SOFT_LEVEL && h * rate < SHORT_ARC)
+            break;
         if (h > length * (1 + 1e-15) || dense->block == NULL)
             continue;
         if (!find_bounds(frame, slice, h, &at))
