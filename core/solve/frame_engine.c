@@ -10,7 +10,7 @@
 
 enum {
     STILL_EVENTS = 1000,
-    STALLED_EVENTS = 100,
+    STORM_EVENTS = 100,
     FLIGHT_WORK = 8,
     PRESS_WORK = 64,
     PRESS_STEPS = 32
@@ -101,10 +101,11 @@ static void pass(FrameEngine *engine, const FrameEvent *hit) {
             take_contact(engine, d);
     frame_arc_state(arc, frame, 1);
     frame->offset += arc->length;
-    frame->still_time += arc->length;
-    if (frame->still_time > frame_clock(frame)) {
-        frame->still_events = 0;
-        frame->still_time = 0;
+    frame->still_events = 0;
+    frame->storm_time += arc->length;
+    if (frame->storm_time > frame_clock(frame)) {
+        frame->storm_events = 0;
+        frame->storm_time = 0;
     }
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
@@ -117,6 +118,7 @@ static void pass(FrameEngine *engine, const FrameEvent *hit) {
 static Status happen(Frame *frame, const FrameEvent *event) {
     const size_t most = STILL_EVENTS * frame->dampers;
     frame->events++;
+    frame->storm_events++;
     if (++frame->still_events > most)
         return problem_set(frame->problem, STATUS_UNSTABLE,
                            "more than %zu contact events at one instant, t = %.17g s", most,
@@ -166,9 +168,10 @@ static bool hold(FrameEngine *engine, const Slice *slice, double length) {
 
 // Masses that touch and part at one instant again and again do so by rounding alone: between stops
 // without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
-// is longer each time, until the motion itself decides.
+// is longer each time, until the motion itself decides. (Impulses close such series themselves.)
 static bool is_stalled(Frame *frame) {
-    if (frame->still_events < STALLED_EVENTS * frame->dampers)
+    if (frame->storm_events < STORM_EVENTS * frame->dampers ||
+        frame->plan->form == CONTACT_IMPULSIVE)
         return false;
     const double now = frame_time(frame);
     const bool goes_on = now - frame->stalled_at <= 4 * frame->stall;

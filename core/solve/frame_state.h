@@ -101,7 +101,8 @@ typedef struct Frame {
     Ledger ledger;
     size_t events;            // all so far
     size_t still_events;      // in a row, without time passing
-    double still_time;        // what has passed nevertheless [s]
+    size_t storm_events;      // without more time passing than the clock tells from none
+    double storm_time;        // what has passed nevertheless [s]
     double stall, stalled_at; // how long events were last passed over, and when that was [s]
 } Frame;
 
