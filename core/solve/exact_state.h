@@ -138,6 +138,21 @@ static inline EnergyState exact_energy(const Exact *exact) {
         0.5 * plan->stiffness[0] * state->x * state->x + 0.5 * k * state->r * state->r};
 }
 
+// The base from this instant on, to the next sample; for strides alone, where the grids coincide.
+static inline void exact_slice(const Exact *exact, Slice *slice) {
+    const Base *base = exact->run->base;
+    const double *a = base->values + exact->sample;
+    if (exact->stretch.base_most == 0 ||
+        (base->form == BASE_SAMPLED && exact->sample + 1 >= base->count)) {
+        *slice = (Slice){0, 0, 0};
+    } else if (base->form == BASE_SAMPLED) {
+        const double slope = (a[1] - a[0]) * exact->plan->sample_rate;
+        *slice = (Slice){a[0] + slope * exact->offset, slope, 0};
+    } else {
+        (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, slice);
+    }
+}
+
 static inline const Motion *exact_motion(const Exact *exact) {
     return exact->phase == FLIGHT    ? &exact->flying
            : exact->phase == CONTACT ? &exact->touching[exact->side]

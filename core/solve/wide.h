@@ -1,6 +1,6 @@
 // Four numbers side by side, and functions compiled for processors that hold them in one register.
 // Not wider ones (lanes.h) and no fused operations: the bytes are the same everywhere. Used by
-// trust.c, exact_press.c and exact_stride.c.
+// trust.c, hop.h, exact_press.c and exact_stride.c.
 #ifndef CORE_SOLVE_WIDE_H
 #define CORE_SOLVE_WIDE_H
 
@@ -11,6 +11,16 @@
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias)); // anywhere
 #define FOUR(values) (*(const Four *)(values))
 #define PUT_FOUR(values, four) (*(Four *)(values) = (four))
+
+// The sums of four of them, side by side.
+INLINE void wide_sum(const Four *a, const Four *b, const Four *c, const Four *d, Four *sum) {
+    const Four first =
+        __builtin_shufflevector(*a, *b, 0, 4, 2, 6) + __builtin_shufflevector(*a, *b, 1, 5, 3, 7);
+    const Four last =
+        __builtin_shufflevector(*c, *d, 0, 4, 2, 6) + __builtin_shufflevector(*c, *d, 1, 5, 3, 7);
+    *sum = __builtin_shufflevector(first, last, 0, 1, 4, 5) +
+           __builtin_shufflevector(first, last, 2, 3, 6, 7);
+}
 
 // A function of its own for such processors; what it calls must be INLINE to profit.
 #ifdef __x86_64__
