@@ -254,7 +254,7 @@ static void make_pulse(Exact *exact, Side side) {
         key->contact_damping[0] == key->contact_damping[1])
         exact->pulses[side] = exact->pulses[other];
     else
-        pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+        pulse_make(&exact->pulses[side], &exact->touching[side], key->base_omega, exact->interval);
     exact->has_pulse[side] = true;
 }
 
