@@ -47,6 +47,8 @@ typedef struct Exact {
     double offset; // time since then [s]
     double interval;
     BaseCursor base;
+    Slice sine;         // at sample sine_sample - 1: looked up once for all that happens after it
+    size_t sine_sample; // 0: none yet
     Ledger ledger;
     LedgerRow row; // of the present contact or rest
     Recorder recorder;
@@ -159,7 +161,7 @@ static inline double exact_turned(const Slice *slice, double t) {
 }
 
 // The base from this instant on, to the next sample; for strides alone, where the grids coincide.
-static inline void exact_slice(const Exact *exact, Slice *slice) {
+static inline void exact_slice(Exact *exact, Slice *slice) {
     const Base *base = exact->run->base;
     if (exact->stretch.base_most == 0 ||
         (base->form == BASE_SAMPLED && exact->sample + 1 >= base->count)) {
@@ -169,7 +171,11 @@ static inline void exact_slice(const Exact *exact, Slice *slice) {
         const double slope = (a[1] - a[0]) * exact->plan->sample_rate;
         *slice = (Slice){a[0] + slope * exact->offset, slope, 0};
     } else {
-        (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, slice);
+        if (exact->sine_sample != exact->sample + 1) {
+            (void)base_cursor_interval(&exact->base, exact->sample, &exact->sine);
+            exact->sine_sample = exact->sample + 1;
+        }
+        exact_turn(&exact->sine, exact->offset, slice);
     }
 }
 

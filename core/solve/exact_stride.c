@@ -42,7 +42,7 @@ void exact_stride_start(Exact *exact) {
         hop_table_make(&exact->hops, &exact->flying, base->omega, exact->interval);
     }
     exact->has_lanes = true;
-    exact->has_hops = !is_sine && exact->flying.rate * exact->interval <= HOP_REACH;
+    exact->has_hops = fmax(exact->flying.rate, base->omega) * exact->interval <= HOP_REACH;
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
     if (is_sine)
