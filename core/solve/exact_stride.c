@@ -49,7 +49,6 @@ void exact_stride_start(Exact *exact) {
         stretch->base_most = fabs(base->amplitude);
     stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
-    stretch->peaks = &exact->ledger.response->peaks;
     stretch->left = stretch->right = INFINITY;
     // What flight leaves alone: contacts write over it.
     const bool has_damper = exact->plan->damper_count > 0;
@@ -110,6 +109,8 @@ static size_t fly(Exact *exact, size_t most) {
     exact->state = (State){s->x, s->v, s->r, s->z - s->v};
     const double gain = z - s->z;
     exact->free_work += gain * (z - gain / 2);
+    Peaks *peaks = &exact->ledger.response->peaks; // trust asks for this one
+    peaks->displacement = ledger_larger(peaks->displacement, lanes_take_peak(s, OF_DISPLACEMENT));
     exact->pending += count;
     exact->sample += count;
     exact->run->steps += (double)count;
@@ -307,7 +308,15 @@ void exact_stride_enter(Exact *exact) {
     const Plan *plan = exact->plan;
     const Lanes *lanes = &exact->lanes;
     double sums[LANE_SUMS], vv = 0, av = 0;
-    lanes_take_sums(&exact->stretch, sums);
+    Stretch *stretch = &exact->stretch;
+    Peaks *peaks = &exact->ledger.response->peaks;
+    lanes_take_sums(stretch, sums);
+    peaks->velocity = ledger_larger(peaks->velocity, lanes_take_peak(stretch, OF_VELOCITY));
+    peaks->acceleration =
+        ledger_larger(peaks->acceleration, lanes_take_peak(stretch, OF_ACCELERATION));
+    const double damper = lanes_take_peak(stretch, OF_DAMPER);
+    if (plan->damper_count > 0)
+        peaks->damper_displacement = ledger_larger(peaks->damper_displacement, damper);
     for (int i = 0; i < LANE_SUMS; i++) {
         vv += lanes->vv[i] * sums[i];
         av += lanes->av[i] * sums[i];

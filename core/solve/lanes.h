@@ -13,9 +13,18 @@
 
 enum { LANES = 8 };
 
-// Sums over samples; with b the base at a sample and a at the one before, or under a sine its other
+// Sums over samples: with b the base at a sample and a at the one before, or under a sine its other
 // half: a_g is b cos + a sin from there on.
 typedef enum LaneSum { XX, XV, VV, XB, XA, VB, VA, BB, AB, AA, LANE_SUMS } LaneSum;
+
+// Largest sizes over samples; the last is the free mass's displacement.
+typedef enum LanePeak {
+    OF_DISPLACEMENT,
+    OF_VELOCITY,
+    OF_ACCELERATION,
+    OF_DAMPER,
+    LANE_PEAKS
+} LanePeak;
 
 // What a stretch starts from and what it comes to.
 typedef struct Stretch {
@@ -26,8 +35,7 @@ typedef struct Stretch {
     double base_most;               // |a_g| is not larger over the whole run [m/s^2]
     const BaseCursor *base;         // of a sine
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
-    Peaks *peaks;
-    _Alignas(64) double sums[LANE_SUMS][LANES];
+    _Alignas(64) double sums[LANE_SUMS][LANES], most[LANE_PEAKS][LANES];
 } Stretch;
 
 // What the processor's vectors hold; the bytes are the same with all.
@@ -37,17 +45,21 @@ typedef struct Lanes Lanes;
 typedef size_t LanesRun(const Lanes *lanes, Stretch *stretch, size_t sample, size_t count,
                         const double *base);
 
-// State i + 1 samples on: what x and v gain from (x, v), and from the base's samples.
-struct Lanes {
+// What x and v gain over i + 1 steps: from (x, v), and under a sine from its value and slope.
+typedef struct LanesMap {
     _Alignas(64) double x_x[LANES], x_v[LANES], v_x[LANES], v_v[LANES], time[LANES];
+    double x_s[2][LANES], v_s[2][LANES];
+    double z_s[2][LANES], speed_s[2][LANES]; // displacement of the free mass, and its velocity
+    double turn[2][LANES];                   // cosine and sine of the sine's angle
+} LanesMap;
+
+struct Lanes {
+    LanesMap sample, block; // in steps of a sample, and of a block of LANES samples
+    // What i + 1 samples on a_g at samples 0 to LANES has given.
     double x_a[LANES + 1][LANES], v_a[LANES + 1][LANES];
-    double z_a[LANES + 1][LANES];        // displacement of the free mass
-    double speed_a[LANES + 1][LANES];    // its velocity
-    double x_s[2][LANES], v_s[2][LANES]; // what they gain from a sine of value and slope
-    double z_s[2][LANES], speed_s[2][LANES];
-    double turn[2][LANES];               // its cosine and sine
+    double z_a[LANES + 1][LANES], speed_a[LANES + 1][LANES];
     double base_omega;                   // of a sine, or 0 [rad/s]
-    double interval;                     // [s]
+    double interval, per_interval;       // [s], [1/s]
     double omega2, damping, omega;       // of the structure: K / M, C / M, sqrt(K / M)
     double vv[LANE_SUMS], av[LANE_SUMS]; // integrals of v^2 and a_g v are these times the sums
     LanesWidth width;
@@ -67,7 +79,8 @@ static inline size_t lanes_fly(const Lanes *lanes, Stretch *stretch, size_t samp
     return lanes->run(lanes, stretch, sample, count, base);
 }
 
-// The sums over all lanes, emptied.
+// The sums over all lanes, or the largest of one kind since it was last asked for; emptied.
 void lanes_take_sums(Stretch *stretch, double sums[LANE_SUMS]);
+double lanes_take_peak(Stretch *stretch, LanePeak which);
 
 #endif

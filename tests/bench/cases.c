@@ -9,12 +9,15 @@
 #include "tests/support/paper.h"
 
 const BenchCase bench_cases[] = {
-    {"no contact, free", 0.61, 0.025, false, false, 10},
+    {"no contact, free", 0.61, 0.025, false, false, 60},
     {"no contact, random", 0.61, 0.025, true, false, 60},
-    {"free sponge", 0.61, 0.025, false, true, 10},
-    {"free aluminium", 0.46, 0.0003, false, true, 10},
+    {"free sponge", 0.61, 0.025, false, true, 60},
+    {"free aluminium", 0.46, 0.0003, false, true, 60},
     {"random sponge", 0.61, 0.025, true, true, 60},
     {"random aluminium", 0.46, 0.0003, true, true, 60},
+    // The same impacts, hardly any flight after them.
+    {"free sponge, 10 s", 0.61, 0.025, false, true, 10},
+    {"free aluminium, 10 s", 0.46, 0.0003, false, true, 10},
 };
 const size_t bench_case_count = COUNT(bench_cases);
 
