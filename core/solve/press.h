@@ -1,5 +1,5 @@
 // One linear contact on its way in closed form: where it is and what it has come to, and how the
-// base goes on under it. Not its proofs (press_bounds.h) nor its searches (press_search.h). Used by
+// base goes on under it. Not its proofs (press_bounds.h) nor its steps (exact_press.c). Used by
 // exact_press.c and exact_ride.c.
 #ifndef CORE_SOLVE_PRESS_H
 #define CORE_SOLVE_PRESS_H
