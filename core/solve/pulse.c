@@ -173,8 +173,9 @@ static bool find_oscillations(const Pencil *p, Complex l[2]) {
     l[1] = complex_of(-fast_damping, sqrtl(fast2));
     if (!find_root(p, &l[0]) || !find_root(p, &l[1]))
         return false;
+    // Faster decays of the buffer's would want more terms of pulse_nudge than there are.
     for (int i = 0; i < 2; i++)
-        if (!(creall(l[i]) < 0) || !(cimagl(l[i]) > (i == 0 ? 0.05L : 0.5L) * -creall(l[i])))
+        if (!(creall(l[i]) < 0) || !(cimagl(l[i]) > (i == 0 ? 0.05L : 0.25L) * -creall(l[i])))
             return false;
     return square(l[1]) > 4 * square(l[0]);
 }
@@ -255,6 +256,8 @@ void pulse_make(Pulse *pulse, const Motion *m, double base_omega, double interva
     }
     pulse->slow_sigma = pulse->sigma[0];
     pulse->fast = pulse->omega[2];
+    const double turn = 0.05 / pulse->fast, decay = -0.1 / pulse->sigma[2];
+    pulse->near = turn < decay ? turn : decay;
     double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
     a[PULSE_X] = (double)creall(fixed[0]);
     s[PULSE_X] = (double)creall(fixed_slope[0]);

@@ -7,7 +7,7 @@
 #include "core/solve/arc.h"
 #include "core/solve/wide.h"
 
-enum { PULSE_TABLE = 80, PULSE_TABLE_UNIT = 32, PULSE_RIDE = 8 };
+enum { PULSE_TABLE = 160, PULSE_TABLE_UNIT = 64, PULSE_RIDE = 8 };
 
 // What can be seen: the state, n = N / m_e and its derivatives, further derivatives of r.
 typedef enum PulseRow {
@@ -55,6 +55,7 @@ typedef struct Pulse {
     PulseForm vv, ww;                      // less what the base's constants add
     PulseSine sine_vv, sine_ww, sine_work; // the last: of a_g times the speed of x + share r
     double sigma[4], omega[4];             // of the oscillations, each twice [1/s], [rad/s]
+    double near;                           // what pulse_nudge is right for [s]
     double slow_sigma, fast;               // sigma of the first, omega of the other
     double size2[2];                       // |lambda|^2
     double sway, n_sway;                   // what a sine of amplitude 1 makes of r'' and n''
@@ -84,8 +85,7 @@ INLINE void pulse_multiply(const double turn[4], const Four *d, Four *out) {
     *out = re * *d + im * __builtin_shufflevector(*d, *d, 1, 0, 3, 2);
 }
 
-// Amplitudes a little later or earlier; the fast one turns by at most PULSE_NEAR.
-#define PULSE_NEAR 0.05
+// Amplitudes a little later or earlier, by at most `near`.
 INLINE void pulse_nudge(const Pulse *pulse, double time, Four *d) {
     // In pairs, not by Horner: much waits for the last term.
     const Four s = FOUR(pulse->sigma) * time, w = FOUR(pulse->omega) * time;
