@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
@@ -150,16 +151,6 @@ static void summarize(Outcome *outcome) {
                   .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
 }
 
-static Status warn_of_horizon(Outcome *outcome, Problem *problem) {
-    if (isnan(outcome->summary.trust_horizon) ||
-        warnings_add(&outcome->warnings, "/duration",
-                     "the run goes on beyond t = %.6g s: there rounding has moved the displacement "
-                     "by %g of its largest value, and from there on only statistics hold",
-                     outcome->summary.trust_horizon, RESPONSE_PARTING) == STATUS_OK)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-}
-
 // Finite inputs can still be too large for their products.
 static Status check_finite(const Outcome *outcome, Problem *problem) {
     const Summary *summary = &outcome->summary;
@@ -206,7 +197,8 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     summarize(outcome);
     TRY(check_finite(outcome, problem));
-    TRY(warn_of_horizon(outcome, problem));
+    if (caution_warn(scene, outcome) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
