@@ -20,7 +20,7 @@ typedef enum BaseKind { STILL, LINEAR, SINE } BaseKind;
 typedef struct Ride {
     Eight d[4], a, s, jump;
     Eight x, v, r, w, n, rate;
-    double d0[4], a0, s0; // at the beginning
+    double d0[4], a0, s0, rate0; // at the beginning, one by one: as vectors they would wait
 } Ride;
 
 // What rides add up to and the largest magnitudes seen, lane by lane.
@@ -68,17 +68,17 @@ INLINE double most_of(const double values[RIDE]) {
 // later.
 INLINE void turn(const Press *press, Ride *ride, const double *base, BaseKind kind) {
     const Pulse *p = press->pulse;
-    const Four d = press->d;
+    const double *d = ride->d0;
     if (kind == LINEAR) {
         const double rate = press->exact->plan->sample_rate;
         ride->a = LOAD(base + 1);
         ride->s = (LOAD(base + 2) - ride->a) * rate;
         ride->jump = ride->s - (ride->a - LOAD(base)) * rate;
-        ride->jump[0] = ride->s[0] - press->slope;
+        ride->jump[0] = ride->s[0] - ride->s0;
     }
     if (kind == SINE) {
-        ride->a = LOAD(p->cosine) * press->a + LOAD(p->sine) * press->slope;
-        ride->s = LOAD(p->cosine) * press->slope - LOAD(p->sine) * press->a;
+        ride->a = LOAD(p->cosine) * ride->a0 + LOAD(p->sine) * ride->s0;
+        ride->s = LOAD(p->cosine) * ride->s0 - LOAD(p->sine) * ride->a0;
     }
     for (int i = 0; i < 4; i += 2) {
         Eight re = LOAD(p->ride[i]) * d[i] - LOAD(p->ride[i + 1]) * d[i + 1];
@@ -90,10 +90,6 @@ INLINE void turn(const Press *press, Ride *ride, const double *base, BaseKind ki
         ride->d[i] = re;
         ride->d[i + 1] = im;
     }
-    for (int i = 0; i < 4; i++)
-        ride->d0[i] = d[i];
-    ride->a0 = press->a;
-    ride->s0 = press->slope;
 }
 
 INLINE void see(const Pulse *p, const Ride *ride, PulseRow row, BaseKind kind, Eight *out) {
@@ -122,7 +118,10 @@ INLINE unsigned mark(const Press *press, const Ride *ride) {
         bends[j] = p->size2[0] * (fabs(d[0][j]) + fabs(d[1][j])) +
                    p->size2[1] * (fabs(d[2][j]) + fabs(d[3][j]));
     here = LOAD(bends);
-    shift(&here, press_bend(press) - sway, &shifted);
+    const double *d0 = ride->d0;
+    const double bend0 =
+        p->size2[0] * (fabs(d0[0]) + fabs(d0[1])) + p->size2[1] * (fabs(d0[2]) + fabs(d0[3]));
+    shift(&here, bend0, &shifted);
     STORE(bend, shifted + sway); // |r''| in the interval before is not larger
     here = press->sign * ride->r;
     shift(&here, press->sign * exact->state.r, &shifted);
@@ -146,10 +145,17 @@ INLINE unsigned mark(const Press *press, const Ride *ride) {
     return (unsigned)sum_of(&here);
 }
 
-INLINE void set_start(Press *press, double (*at)[RIDE], size_t j) {
-    press->d = (Four){at[0][j], at[1][j], at[2][j], at[3][j]};
-    press->a = at[4][j];
-    press->slope = at[5][j];
+// The start of interval j.
+INLINE void set_start(Press *press, const Ride *ride, double (*at)[RIDE], size_t j) {
+    if (j == 0) {
+        press->d = (Four){ride->d0[0], ride->d0[1], ride->d0[2], ride->d0[3]};
+        press->a = ride->a0;
+        press->slope = ride->s0;
+    } else {
+        press->d = (Four){at[0][j - 1], at[1][j - 1], at[2][j - 1], at[3][j - 1]};
+        press->a = at[4][j - 1];
+        press->slope = at[5][j - 1];
+    }
 }
 
 // How many intervals surely belong to the contact and show its peaks. `at` are the starts' lanes.
@@ -157,23 +163,16 @@ INLINE size_t count_clear(Press *press, const Ride *ride, double (*at)[RIDE]) {
     const Exact *exact = press->exact;
     const unsigned marks = mark(press, ride), inside = marks & 0xff, rising = marks >> RIDE;
     size_t count = (size_t)__builtin_ctz(~inside);
-    Four force;
-    pulse_see(press->pulse, PULSE_N, &press->d, press->a, press->slope, &force);
-    const double first = press->sign * force[1];
+    const double first = press->sign * ride->rate0;
     size_t falls = 0; // from there on the force must fall
     if (first > 0) {
         falls = (size_t)__builtin_ctz(~rising);
         if (falls < count) {
             const double from = falls == 0 ? first : press->sign * ride->rate[falls - 1];
             const double to = press->sign * ride->rate[falls];
-            const Press start = *press;
-            if (falls > 0)
-                set_start(press, at, falls - 1);
+            set_start(press, ride, at, falls);
             const bool is_found =
                 press_find_peak(press, exact->interval * from / (from - to), exact->interval);
-            press->d = start.d;
-            press->a = start.a;
-            press->slope = start.slope;
             if (!is_found)
                 return falls;
         }
@@ -315,15 +314,23 @@ INLINE size_t run(Press *press, size_t most, BaseKind kind) {
     STORE(tally.acceleration, none);
     STORE(tally.z, none);
     STORE(tally.force, none);
+    Ride ride;
+    Four force;
+    pulse_see(p, PULSE_N, &press->d, press->a, press->slope, &force);
+    for (int i = 0; i < 4; i++)
+        ride.d0[i] = press->d[i];
+    ride.a0 = press->a;
+    ride.s0 = press->slope;
+    ride.rate0 = force[1];
+    double at[11][RIDE];
     while (done + RIDE <= most) {
-        Ride ride;
         if (kind == LINEAR && exact->sample + RIDE + 1 >= base->count)
             break;
         if (kind == SINE && exact->sample % PRESS_FRESH < RIDE) {
             Slice slice;
             exact_slice(exact, &slice);
-            press->a = slice.value;
-            press->slope = slice.slope;
+            ride.a0 = slice.value;
+            ride.s0 = slice.slope;
         }
         turn(press, &ride, kind == LINEAR ? base->values + exact->sample : NULL, kind);
         see(p, &ride, PULSE_X, kind, &ride.x);
@@ -332,7 +339,6 @@ INLINE size_t run(Press *press, size_t most, BaseKind kind) {
         see(p, &ride, PULSE_W, kind, &ride.w);
         see(p, &ride, PULSE_N, kind, &ride.n);
         see(p, &ride, PULSE_N1, kind, &ride.rate);
-        double at[10][RIDE];
         for (int i = 0; i < 4; i++)
             STORE(at[i], ride.d[i]);
         STORE(at[4], kind == STILL ? none : ride.a);
@@ -341,20 +347,26 @@ INLINE size_t run(Press *press, size_t most, BaseKind kind) {
         STORE(at[7], ride.v);
         STORE(at[8], ride.r);
         STORE(at[9], ride.w);
+        STORE(at[10], ride.rate);
         const size_t count = count_clear(press, &ride, at);
         if (count == 0)
             break;
         const Eight keep = LOAD(ones + RIDE - count);
         take_sums(press, &ride, &keep, count, kind, &tally);
         take_samples(press, &ride, &keep, &tally);
-        set_start(press, at, count - 1);
-        exact->state =
-            (State){at[6][count - 1], at[7][count - 1], at[8][count - 1], at[9][count - 1]};
+        const size_t last = count - 1;
+        for (int i = 0; i < 4; i++)
+            ride.d0[i] = at[i][last];
+        ride.a0 = at[4][last];
+        ride.s0 = at[5][last];
+        ride.rate0 = at[10][last];
+        exact->state = (State){at[6][last], at[7][last], at[8][last], at[9][last]};
         exact->sample += count;
         done += count;
         if (count < RIDE)
             break;
     }
+    set_start(press, &ride, at, 0);
     if (done > 0) {
         exact->recorder.last_velocity = exact->state.v;
         enter(press, &tally, done, is_counted);
