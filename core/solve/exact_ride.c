@@ -56,12 +56,10 @@ INLINE double sum_of(const Eight *values) {
 }
 
 INLINE double most_of(const double values[RIDE]) {
-    double most[RIDE / 2];
-    for (size_t j = 0; j < RIDE / 2; j++)
-        most[j] = values[j] > values[j + RIDE / 2] ? values[j] : values[j + RIDE / 2];
-    const double a = most[0] > most[1] ? most[0] : most[1];
-    const double b = most[2] > most[3] ? most[2] : most[3];
-    return a > b ? a : b;
+    double most = 0;
+    for (size_t j = 0; j < RIDE; j++)
+        most = ledger_larger(most, values[j]);
+    return most;
 }
 
 // All eight straight from the beginning: what each jump of the base's slope leaves is the same, but
@@ -380,10 +378,6 @@ INLINE size_t run_any(Press *press, size_t most) {
     return press->exact->stretch.base_most > 0 ? run(press, most, LINEAR) : run(press, most, STILL);
 }
 
-static size_t run_plain(Press *press, size_t most) {
-    return run_any(press, most);
-}
-
 #ifdef __x86_64__
 __attribute__((target("avx2"))) static size_t run_avx2(Press *press, size_t most) {
     return run_any(press, most);
@@ -401,5 +395,5 @@ size_t press_ride(Press *press, size_t most) {
     if (press->exact->lanes.width == LANES_AVX2)
         return run_avx2(press, most);
 #endif
-    return run_plain(press, most);
+    return run_any(press, most);
 }
