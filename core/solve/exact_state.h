@@ -34,8 +34,9 @@ typedef struct Exact {
     Problem *problem;
     Motion flying, touching[2], resting;
     Stretch stretch;
-    bool has_hops;    // intervals are short enough for hop.h
-    size_t pending;   // samples whose sums wait in `stretch`
+    bool has_hops;     // intervals are short enough for hop.h
+    double base_slope; // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
+    size_t pending;    // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
     Phase phase;
     Side side;       // of CONTACT and RESTING
