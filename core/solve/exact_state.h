@@ -1,5 +1,6 @@
 // What the exact solver knows while it runs, and how it looks from outside: origin, room, forces,
-// energies. Not the stepping (exact.c) nor the events (exact_events.c); these three alone use it.
+// energies. Not the stepping (exact.c) nor the events (exact_events.c). Used by core/solve/exact*.c
+// and press*.
 #ifndef CORE_SOLVE_EXACT_STATE_H
 #define CORE_SOLVE_EXACT_STATE_H
 
