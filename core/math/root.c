@@ -48,6 +48,10 @@ static bool march(const double *c, size_t degree, double *s, bool *found) {
     for (int step = 0; step < ROOT_STEPS; step++) {
         const double value = root_value(c, degree, at);
         const double slope = root_slope(c, degree, at);
+        if (isnan(value)) { // no number has no zero; halving would never end
+            *found = false;
+            return true;
+        }
         if (value <= noise(c, degree, at)) {
             // The last bit of the way needs no caution: what is left is rounding.
             const double last = slope < 0 ? -value / slope : 0;

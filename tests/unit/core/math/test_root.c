@@ -67,6 +67,15 @@ static void a_root_at_the_start_does_not_count(void **state) {
 }
 
 // Against a scan so fine that a root of these low degrees cannot hide from it.
+// Motion that has left what doubles hold: the caller is told of no crossing, and not in 2^52 steps.
+static void coefficients_that_are_no_numbers_end_the_search(void **state) {
+    (void)state;
+    double s;
+    const double lost[][4] = {{1, NAN, 0, 0}, {1, -2, NAN, 1}, {NAN, -1, 0, 0}};
+    for (size_t i = 0; i < sizeof lost / sizeof *lost; i++)
+        assert_false(root_first_crossing(lost[i], 3, &s));
+}
+
 static void random_polynomials_agree_with_a_scan(void **state) {
     (void)state;
     srand(7);
@@ -99,6 +108,7 @@ int main(void) {
         cmocka_unit_test(the_first_of_two_close_roots_is_taken),
         cmocka_unit_test(a_near_miss_is_not_a_crossing),
         cmocka_unit_test(a_root_at_the_start_does_not_count),
+        cmocka_unit_test(coefficients_that_are_no_numbers_end_the_search),
         cmocka_unit_test(random_polynomials_agree_with_a_scan),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
