@@ -147,3 +147,47 @@ void exponential_form_double(size_t n, const long double *increment, long double
     for (size_t i = 0; i < n * n; i++)
         form[i] += second[i];
 }
+
+// out = left right; zeros in `left` cost nothing.
+static void product(const double *left, const double *right, size_t n, double *restrict out) {
+    for (size_t i = 0; i < n; i++) {
+        double *restrict row = out + i * n;
+        memset(row, 0, n * sizeof *row);
+        for (size_t k = 0; k < n; k++) {
+            const double factor = left[i * n + k], *of = right + k * n;
+            for (size_t j = 0; j < n && factor != 0; j++)
+                row[j] += factor * of[j];
+        }
+    }
+}
+
+void exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch) {
+    enum { PAPER = 20, MOST = 1000 };
+    double norm = 0, *small = scratch, *next = scratch + n * n;
+    for (size_t i = 0; i < n; i++) {
+        double sum = 0;
+        for (size_t j = 0; j < n; j++)
+            sum += fabs(A[i * n + j]);
+        norm = fmax(norm, sum);
+    }
+    // Four terms leave (|A| h / 2^N)^5 / 120: 1e-13 of the first at most, for all doublings
+    // together.
+    int count = PAPER;
+    for (double rest = ldexp(norm * h, -PAPER); rest > 1e-3 && count < MOST; rest /= 2)
+        count++;
+    for (size_t i = 0; i < n * n; i++)
+        small[i] = ldexp(A[i] * h, -count);
+    // T = S (I + S/2 (I + S/3 (I + S/4)))
+    for (size_t i = 0; i < n * n; i++)
+        out[i] = small[i] / 4;
+    for (int k = 3; k >= 1; k--) {
+        product(small, out, n, next);
+        for (size_t i = 0; i < n * n; i++)
+            out[i] = (small[i] + next[i]) / k;
+    }
+    for (int i = 0; i < count; i++) {
+        product(out, out, n, next);
+        for (size_t j = 0; j < n * n; j++)
+            out[j] = 2 * out[j] + next[j];
+    }
+}

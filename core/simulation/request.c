@@ -123,6 +123,18 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
+static Status check_solver(const Simulation *simulation, Problem *problem) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    if (!solver->is_linear_only || scene->dampers.count == 0 || law->form != CONTACT_POWER)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/accuracy/solver",
+                       "%s serves linear contact and impulses, not the power law of %s: take "
+                       "exact, rk4, newmark or adaptive",
+                       solver->kind.name, law->kind.name);
+}
+
 // A scene that can be told beforehand to take too long is refused at once.
 static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
                          Problem *problem) {
@@ -168,6 +180,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
         return problem->status;
     if (status == STATUS_OK)
         status = check_values(simulation, limits, problem);
+    if (status == STATUS_OK)
+        status = check_solver(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)
