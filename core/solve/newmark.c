@@ -96,7 +96,14 @@ static Status invert(const Steps *steps, double length) {
         status = linear_solve(n, G, unit, own->inverse + i * n);
     }
     free(G);
-    return status == STATUS_OK ? STATUS_OK : no_memory(steps);
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    return status == STATUS_NO_MEMORY
+               ? no_memory(steps)
+               : problem_set(frame->problem, STATUS_UNSTABLE,
+                             "newmark's matrices leave what double precision can hold with a step "
+                             "of %.4g s",
+                             length);
 }
 
 // out = G^-1 in.

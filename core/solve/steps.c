@@ -2,6 +2,7 @@
 // a rule of the method's own order, so that the energy balance tells of the method's error.
 #include "core/solve/steps.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -258,16 +259,17 @@ Status steps_interval(Steps *steps) {
 }
 
 Status steps_finish(Steps *steps, double length) {
+    const double clock = 8 * DBL_EPSILON * steps->frame.plan->duration; // less is rounding
+    const double whole = floor(length / steps->length * (1 + 1e-9));
     if (steps->stepper->cross != NULL) {
-        if (length > 1e-9 * steps->length)
+        if (length > clock)
             TRY(steps->stepper->cross(steps, length));
         return steps_check(steps);
     }
-    const double whole = floor(length / steps->length * (1 + 1e-9));
     for (double k = 1; k <= whole; k++)
         TRY(step(steps, steps->length, k * steps->length));
     const double rest = length - whole * steps->length;
-    if (rest > 1e-9 * steps->length)
+    if (rest > clock)
         TRY(step(steps, rest, length));
     return steps_check(steps);
 }

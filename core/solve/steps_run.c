@@ -282,8 +282,10 @@ Status steps_run(Run *run, const Stepper *stepper, Response *response, Problem *
     const Choice choice =
         choose(run->plan, run->accuracy, base->form == BASE_SAMPLED ? base->interval : 0);
     if (!(choice.share <= SHARE_MOST))
-        return problem_set(problem, STATUS_INVALID,
-                           "a step is too short: %.3g to a sample interval", choice.share);
+        return problem_set(problem, STATUS_LIMIT,
+                           "the scene moves too fast for %s: %.3g steps to a sample interval, at "
+                           "most %.3g are possible",
+                           stepper->name, choice.share, SHARE_MOST);
     if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
         return problem_set(problem, STATUS_INVALID,
                            "%s serves linear contact and impulses, not a power law", stepper->name);
