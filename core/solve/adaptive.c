@@ -23,11 +23,6 @@
 
 enum { WATCHED = 3, FIRST = 0, SECOND = 1, PEAK = 2, TOTALS = 3, STILL_MOST = 1000 };
 
-typedef struct AccuracyTolerance {
-    Accuracy accuracy;
-    double tolerance;
-} AccuracyTolerance;
-
 typedef struct Adaptive {
     Steps *steps;
     Ode *ode;
@@ -267,7 +262,7 @@ static Status happen(Frame *frame, const FrameEvent *event) {
 static double adaptive_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
     const double n = (double)storeys, m = (double)dampers;
     *making = 0;
-    return 50 + 8 * n * (1 + m) + (is_coupled ? 4 * n * n : 0);
+    return 100 + 3 * n * (1 + m) + (is_coupled ? 0.1 * n * n : 0);
 }
 
 // One step, at most `length` long, and the event at its end.
@@ -401,7 +396,7 @@ static double cost(const Accuracy *accuracy, double base_interval, const Plan *p
     steps = fmax(steps, fastest * each / 8) + 7 * 10 * each * (double)plan->damper_count;
     const double one = adaptive_cost(plan->storeys, plan->damper_count,
                                      modes->count > 0 && !modes->is_classical, &making);
-    return 2 * one * steps * plan->duration; // the neighbour takes as many
+    return 3 * one * steps * plan->duration; // the neighbour takes twice as many
 }
 
 // clang-format off

@@ -253,8 +253,8 @@ static Status newmark_step(Steps *steps, double length) {
 
 static double newmark_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
     const double n = (double)storeys, m = (double)dampers;
-    *making = is_coupled ? n * n * n * n / 30 : 0;
-    return 4 + 2 * n * (1 + m) + (is_coupled ? n * n : 0);
+    *making = is_coupled ? n * n * n * n / 1000 : 0;
+    return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }
 
 static const Stepper stepper = {.name = "newmark",

@@ -18,7 +18,7 @@
 static const double PARTS = 30;
 static const double SHARE_MOST = 1e12;
 static const double FINER = 10; // tolerance
-static const double CHANCE = 3; // what the difference is taken for with contacts
+static const double CHANCE = 6; // what the difference is taken for with contacts
 static const double TURN = 6.28318530717958647693;
 
 // clang-format off
