@@ -146,6 +146,11 @@ static double make_scale(Adaptive *own) {
         const double wide = sqrt(frame_dot(damper->shape, damper->shape, n)) * own->speed;
         const double speed =
             fmax(fabs(damper->w), damper->phase == FRAME_CONTACT ? 1e-3 * wide : wide);
+        // After a bounce the mass may be back at once; the integrator finds a root to a part of its
+        // step alone.
+        const double pull = fabs(own->rates[at_r(frame) + m + d]);
+        if (damper->phase == FRAME_FLIGHT && damper->r == 0 && damper->w != 0 && pull > 0)
+            time = fmin(time, fabs(damper->w) / pull);
         w[d] = speed;
         r[d] = fmax(damper->plan->clearance, speed * frame->interval);
         if (damper->phase == FRAME_CONTACT) {
@@ -181,6 +186,7 @@ static Status start(Adaptive *own) {
     }
     own->at = 0;
     own->events = frame->events;
+    rate(own, 0, own->y, own->rates);
     return ode_start(own->ode, own->y, own->scale, make_scale(own), frame->problem);
 }
 
