@@ -146,11 +146,11 @@ static double make_scale(Adaptive *own) {
         const double wide = sqrt(frame_dot(damper->shape, damper->shape, n)) * own->speed;
         const double speed =
             fmax(fabs(damper->w), damper->phase == FRAME_CONTACT ? 1e-3 * wide : wide);
-        // After a bounce the mass may be back at once; the integrator finds a root to a part of its
-        // step alone.
+        // Not far from a stop the mass may be back at once, and the integrator finds a root to a
+        // part of its step alone.
         const double pull = fabs(own->rates[at_r(frame) + m + d]);
-        if (damper->phase == FRAME_FLIGHT && damper->r == 0 && damper->w != 0 && pull > 0)
-            time = fmin(time, fabs(damper->w) / pull);
+        if (damper->phase == FRAME_FLIGHT && damper->origin != FRAME_FROM_MIDDLE && pull > 0)
+            time = fmin(time, (fabs(damper->w) + sqrt(2 * pull * fabs(damper->r))) / pull);
         w[d] = speed;
         r[d] = fmax(damper->plan->clearance, speed * frame->interval);
         if (damper->phase == FRAME_CONTACT) {
@@ -243,9 +243,11 @@ static bool find_beyond(Frame *frame, FrameEvent *event) {
             return true;
         }
         for (int side = 0; side < 2 && damper->phase == FRAME_FLIGHT; side++) {
-            const double toward = frame_sign((Side)side);
-            if (frame_room(damper, (Side)side) - toward * damper->r > 0 ||
-                !(toward * damper->w > 0))
+            const double toward = frame_sign((Side)side), speed = toward * damper->w;
+            if (frame_room(damper, (Side)side) - toward * damper->r > 0)
+                continue;
+            const bool is_pushed = speed == 0 && toward * frame_acceleration(frame, d) > 0;
+            if (!(speed > 0 || is_pushed || damper->plan->clearance == 0))
                 continue;
             *event = event_of(frame, d, side);
             return true;
@@ -291,7 +293,7 @@ static Status advance(Adaptive *own, double length) {
     take(own, taken);
     frame->offset += taken;
     frame->ground = slice_at(&own->slice, taken);
-    if (taken > 0)
+    if (taken > frame_clock(frame))
         frame->still_events = 0;
     TRY(steps_note(
         steps, adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making)));
@@ -323,7 +325,7 @@ static Status adaptive_cross(Steps *steps, double length) {
 }
 
 static Status adaptive_make(Steps *steps) {
-    const Frame *frame = &steps->frame;
+    Frame *frame = &steps->frame;
     const size_t m = frame->dampers;
     Adaptive *own = calloc(1, sizeof *own);
     steps->own = own;
@@ -349,6 +351,10 @@ static Status adaptive_make(Steps *steps) {
     own->rates = own->scale + own->size;
     own->force = own->rates + own->size;
     own->strain = own->force + m;
+    // A mass that starts on a stop may touch it at t = 0.
+    FrameEvent event;
+    for (frame_feel(frame); find_beyond(frame, &event); frame_feel(frame))
+        TRY(happen(frame, &event));
     return STATUS_OK;
 }
 
