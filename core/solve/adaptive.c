@@ -190,6 +190,16 @@ static Status start(Adaptive *own) {
     return ode_start(own->ode, own->y, own->scale, make_scale(own), frame->problem);
 }
 
+// Has the gap of a mass released from rest opened beyond rounding yet?
+static void leave(Frame *frame, FrameDamper *damper) {
+    if (frame_sign((Side)damper->origin) * damper->r < 0) {
+        damper->leaving = 0;
+        return;
+    }
+    damper->r = damper->w = 0;
+    frame->events++; // the motion begins anew
+}
+
 // The frame's state becomes y; what was summed up goes where it belongs.
 static void take(Adaptive *own, double length) {
     Frame *frame = &own->steps->frame;
@@ -204,6 +214,8 @@ static void take(Adaptive *own, double length) {
         double work = y[sums + m + d] - before[sums + m + d];
         damper->r = r[d];
         damper->w = r[m + d];
+        if (damper->leaving > 0)
+            leave(frame, damper);
         if (damper->phase == FRAME_CONTACT) {
             const ContactForce force = steps_contact(frame, d, damper->r, damper->w);
             ledger_force(&frame->ledger, &damper->row, fabs(force.value));
@@ -231,13 +243,18 @@ static FrameEvent event_of(const Frame *frame, size_t d, int which) {
 // push.
 static bool find_beyond(Frame *frame, FrameEvent *event) {
     for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
+        FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         if (damper->phase == FRAME_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
             *event = event_of(frame, d, FIRST);
             return true;
         }
-        if (damper->phase == FRAME_RESTING && sign * damper->force < 0) {
+        // An acceleration that may be rounding alone.
+        const double noise =
+            64 * DBL_EPSILON *
+            (damper->reach * frame_size(frame) + fabs(damper->lean * frame->ground));
+        if (damper->phase == FRAME_RESTING &&
+            sign * damper->force < -noise * damper->effective_mass) {
             *event = event_of(frame, d, FIRST);
             event->is_jump = true;
             return true;
@@ -246,9 +263,13 @@ static bool find_beyond(Frame *frame, FrameEvent *event) {
             const double toward = frame_sign((Side)side), speed = toward * damper->w;
             if (frame_room(damper, (Side)side) - toward * damper->r > 0)
                 continue;
-            const bool is_pushed = speed == 0 && toward * frame_acceleration(frame, d) > 0;
-            if (!(speed > 0 || is_pushed || damper->plan->clearance == 0))
+            // A flight that is over before the clock tells: the mass is back as fast as it went.
+            const double pull = toward * frame_acceleration(frame, d);
+            const bool is_back = speed <= 0 && -2 * speed < pull * frame_clock(frame) &&
+                                 (damper->leaving == 0 || pull > noise);
+            if (!(speed > 0 || is_back || damper->plan->clearance == 0))
                 continue;
+            damper->w = is_back ? -damper->w : damper->w;
             *event = event_of(frame, d, side);
             return true;
         }
@@ -282,8 +303,12 @@ static Status advance(Adaptive *own, double length) {
     int root;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &own->slice);
     frame->ground = own->slice.value;
-    if (own->events != frame->events)
+    if (own->events != frame->events) {
+        frame_feel(frame);
+        if (find_beyond(frame, &event))
+            return happen(frame, &event);
         TRY(start(own));
+    }
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
