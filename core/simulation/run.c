@@ -331,11 +331,11 @@ static double exact_steps(const Simulation *simulation) {
            power_steps(&simulation->scene);
 }
 
-// Steps of a solver that knows its own cost, once the scene is made ready.
+// Steps of a solver that knows its own cost.
 static double own_steps(const Simulation *simulation) {
     const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
     Plan *plan;
-    if (plan_new(&simulation->scene, "", "", &plan, NULL) != STATUS_OK)
+    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
         chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);

@@ -55,16 +55,21 @@ double steps_contact_time(const Plan *plan) {
     return least;
 }
 
-// The shortest time in which a mode swings or dies away [s].
-static double mode_time(const Plan *plan) {
+double steps_mode_time(const Plan *plan) {
     const Modes *modes = &plan->modes;
     double fastest = 0;
+    if (modes->count == 0 && plan->storeys > 1)
+        return TURN / plan->fastest;
     if (modes->count == 0)
         return TURN /
                fmax(sqrt(plan->stiffness[0] / plan->mass[0]), plan->damping[0] / plan->mass[0]);
     for (size_t i = 0; i < modes->count; i++)
         fastest = fmax(fastest, fmax(modes->omega[i], modes->damping[i * modes->count + i]));
     return TURN / fastest;
+}
+
+bool steps_may_couple(const Plan *plan) {
+    return plan->storeys > 1 && !plan->modes.is_classical;
 }
 
 typedef struct Choice {
@@ -79,7 +84,8 @@ static Choice choose(const Plan *plan, const Accuracy *accuracy, double base_int
     double step = asked == NULL ? (double)NAN : asked->step;
     Choice choice = {1, 1, "asked", "the scene asks for it"};
     if (isnan(step)) {
-        const double mode = mode_time(plan) / PARTS, contact = steps_contact_time(plan) / PARTS;
+        const double mode = steps_mode_time(plan) / PARTS,
+                     contact = steps_contact_time(plan) / PARTS;
         choice.chose = mode < contact ? "mode" : "contact";
         choice.why = mode < contact ? "a 30th of the period of the fastest mode"
                                     : "a 30th of the shortest contact";
@@ -128,10 +134,9 @@ Status steps_decide(const Accuracy *accuracy, const Stepper *stepper, double bas
 
 double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_interval,
                   const Plan *plan) {
-    const Modes *modes = &plan->modes;
     double making;
-    const double each = stepper->cost(plan->storeys, plan->damper_count,
-                                      modes->count > 0 && !modes->is_classical, &making);
+    const double each =
+        stepper->cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
     const double steps =
         choose(plan, accuracy, base_interval).share * plan->duration * plan->sample_rate;
     return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
