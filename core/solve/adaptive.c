@@ -240,14 +240,27 @@ static FrameEvent event_of(const Frame *frame, size_t d, int which) {
 
 // What is beyond its end already, though no step has shown it come there: a buffer let go without
 // having been pressed, a stop that rounding or a miss has put behind the mass, a rest without a
-// push.
-static bool find_beyond(Frame *frame, FrameEvent *event) {
+// push. A force may still be rounding's before the motion `has_moved`.
+static bool find_beyond(Frame *frame, bool has_moved, FrameEvent *event) {
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         if (damper->phase == FRAME_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
             *event = event_of(frame, d, FIRST);
             return true;
+        }
+        if (damper->phase == FRAME_INSIDE && sign * damper->r < 0) {
+            *event = event_of(frame, d, SECOND);
+            return true;
+        }
+        if (has_moved &&
+            (damper->phase == FRAME_INSIDE || (damper->phase == FRAME_CONTACT &&
+                                               frame->plan->separation == SEPARATION_ZERO_FORCE))) {
+            const double push = sign * steps_contact(frame, d, damper->r, damper->w).value;
+            if (damper->phase == FRAME_INSIDE ? push > 0 : push < 0) {
+                *event = event_of(frame, d, FIRST);
+                return true;
+            }
         }
         // An acceleration that may be rounding alone.
         const double noise =
@@ -267,7 +280,10 @@ static bool find_beyond(Frame *frame, FrameEvent *event) {
             const double pull = toward * frame_acceleration(frame, d);
             const bool is_back = speed <= 0 && -2 * speed < pull * frame_clock(frame) &&
                                  (damper->leaving == 0 || pull > noise);
-            if (!(speed > 0 || is_back || damper->plan->clearance == 0))
+            // Between stops without clearance an impulse holds whatever the speed.
+            const bool is_held =
+                frame->plan->form == CONTACT_IMPULSIVE && damper->plan->clearance == 0;
+            if (!(speed > 0 || is_back || is_held))
                 continue;
             damper->w = is_back ? -damper->w : damper->w;
             *event = event_of(frame, d, side);
@@ -305,7 +321,7 @@ static Status advance(Adaptive *own, double length) {
     frame->ground = own->slice.value;
     if (own->events != frame->events) {
         frame_feel(frame);
-        if (find_beyond(frame, &event))
+        if (find_beyond(frame, false, &event))
             return happen(frame, &event);
         TRY(start(own));
     }
@@ -329,7 +345,7 @@ static Status advance(Adaptive *own, double length) {
         if (!is_peak)
             return happen(frame, &event);
     }
-    return find_beyond(frame, &event) ? happen(frame, &event) : STATUS_OK;
+    return find_beyond(frame, taken > 0, &event) ? happen(frame, &event) : STATUS_OK;
 }
 
 static Status adaptive_cross(Steps *steps, double length) {
@@ -378,7 +394,7 @@ static Status adaptive_make(Steps *steps) {
     own->strain = own->force + m;
     // A mass that starts on a stop may touch it at t = 0.
     FrameEvent event;
-    for (frame_feel(frame); find_beyond(frame, &event); frame_feel(frame))
+    for (frame_feel(frame); find_beyond(frame, false, &event); frame_feel(frame))
         TRY(happen(frame, &event));
     return STATUS_OK;
 }

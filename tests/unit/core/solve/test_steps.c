@@ -315,6 +315,49 @@ static void stops_without_clearance_hold_the_mass(void **state) {
     plan_free(plan);
 }
 
+// A mass that leaves one buffer is in the other one at once.
+static void buffers_without_room_between_them_serve_too(void **state) {
+    (void)state;
+    const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 9};
+    for (int i = 0; i < 2; i++) {
+        Plan *plan = frames_new(1, 1, 1, 500);
+        frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
+        frames_damper(plan, 0, 0, 0.5, 0, 0.8, 0.01);
+        plan->displacement[0] = 0.01;
+        plan->dampers[0].velocity = 0.1;
+        plan->separation = i == 0 ? SEPARATION_ZERO_PENETRATION : SEPARATION_ZERO_FORCE;
+        for (double tolerance = 1e-3; tolerance > 1e-13; tolerance /= 1e3) {
+            double estimate;
+            const double error = miss(&solver_adaptive, tolerance, plan, &sine, &estimate);
+            if (!(error < fmax(1e-3 * tolerance, 1e-6) && error < fmax(4 * estimate, 1e-12)))
+                fail_msg("%d: adaptive at %g misses by %g and says %g", i, tolerance, error,
+                         estimate);
+        }
+        for (size_t k = 0; k < COUNT(fixed); k++)
+            assert_true(miss(fixed[k], 1e-5, plan, &sine, NULL) < 1e-3);
+        plan_free(plan);
+    }
+}
+
+// Runs with steps of twice the length may be late by the same time: that must not be taken for
+// none.
+static void few_impacts_are_not_taken_for_exact(void **state) {
+    (void)state;
+    for (int i = 0; i < 40; i++) {
+        Plan *plan = frames_new(1, 1, 0.2, 1000);
+        frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
+        frames_damper(plan, 0, 0, 0.1, 0.004 + 1e-5 * i, 0.5, NAN);
+        plan->displacement[0] = 0.01;
+        for (double share = 1; share <= 16; share *= 2) {
+            double estimate;
+            const double error = miss(&solver_rk4, 1e-3 / share, plan, &still, &estimate);
+            if (!(error < 5 * estimate))
+                fail_msg("clearance %d, %g steps: %g, says %g", i, share, error, estimate);
+        }
+        plan_free(plan);
+    }
+}
+
 static void a_step_that_cannot_be_stable_is_told(void **state) {
     (void)state;
     Plan *plan = frames_new(1, 1, 2, 1000);
@@ -509,6 +552,8 @@ int main(void) {
         cmocka_unit_test(frames_of_many_dampers_come_to_the_exact_answer),
         cmocka_unit_test(a_pushed_mass_bounces_and_rests),
         cmocka_unit_test(stops_without_clearance_hold_the_mass),
+        cmocka_unit_test(buffers_without_room_between_them_serve_too),
+        cmocka_unit_test(few_impacts_are_not_taken_for_exact),
         cmocka_unit_test(a_step_that_cannot_be_stable_is_told),
         cmocka_unit_test(precise_at_a_millisecond_is_wrong_and_says_so),
         cmocka_unit_test(the_plan_says_which_step_and_why),
