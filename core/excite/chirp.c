@@ -77,6 +77,11 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     return STATUS_OK;
 }
 
+static double chirp_interval(const Excitation *excitation) {
+    const ExcitationChirp *chirp = chirp_of(excitation);
+    return chirp->sweep_time / line_count(chirp);
+}
+
 static Status chirp_make(const Excitation *excitation, const Span *span, const Watch *watch,
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
@@ -89,7 +94,7 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const W
     double *values = malloc(count * sizeof *values);
     if (values == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a sweep of %zu knots", count);
-    const double interval = chirp->sweep_time / line_count(chirp);
+    const double interval = chirp_interval(excitation);
     const long double f0 = chirp->start_frequency, f1 = chirp->end_frequency;
     const long double climb = (f1 - f0) / chirp->sweep_time;
     const double bend = (double)(2 * PI * climb), share = interval * interval / 12;
@@ -135,6 +140,7 @@ const ExcitationKind excitation_chirp = {
              chirp_fields, sizeof(ExcitationChirp)},
     .complete = chirp_complete,
     .fastest = chirp_fastest,
+    .interval = chirp_interval,
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

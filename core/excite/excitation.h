@@ -33,6 +33,8 @@ typedef struct ExcitationKind {
     // The fastest the base moves, beyond what its samples show [rad/s]. NULL: it has nothing
     // faster.
     double (*fastest)(const Excitation *excitation);
+    // Between the samples by which the base is known [s]. NULL: it is known in closed form.
+    double (*interval)(const Excitation *excitation);
     // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
     // `watch` says so.
     Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,

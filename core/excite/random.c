@@ -208,11 +208,16 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
     return status;
 }
 
+static double random_interval(const Excitation *excitation) {
+    return 1 / ((const ExcitationRandom *)(const void *)excitation)->rate;
+}
+
 const ExcitationKind excitation_random = {
     .kind = {.name = "random",
              .doc = "band-limited Gaussian acceleration of the base, the same for the same seed",
              .fields = random_fields,
              .size = sizeof(ExcitationRandom)},
     .complete = random_complete,
+    .interval = random_interval,
     .make = random_make,
 };

@@ -104,9 +104,14 @@ static void record_doubt(const Excitation *excitation, const Span *span, const c
                           look.end_velocity, look.peak_velocity);
 }
 
+static double record_interval(const Excitation *excitation) {
+    return ((const ExcitationRecord *)(const void *)excitation)->interval;
+}
+
 const ExcitationKind excitation_record = {
     .kind = {"record", "a measured base acceleration", record_fields, sizeof(ExcitationRecord)},
     .complete = record_complete,
+    .interval = record_interval,
     .make = record_make,
     .doubt = record_doubt,
 };

@@ -50,7 +50,7 @@ const Field summary_fields[] = {
     FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
     FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
-    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond only statistics hold; null with an error_estimate: not within the run"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
     FIELD_END
 };
 // clang-format on
@@ -123,6 +123,18 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
+static Status check_solver(const Simulation *simulation, Problem *problem) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    if (!solver->is_linear_only || scene->dampers.count == 0 || law->form != CONTACT_POWER)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/accuracy/solver",
+                       "%s serves linear contact and impulses, not the power law of %s: take "
+                       "exact, rk4, newmark or adaptive",
+                       solver->kind.name, law->kind.name);
+}
+
 // A scene that can be told beforehand to take too long is refused at once.
 static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
                          Problem *problem) {
@@ -131,6 +143,12 @@ static Status check_cost(const Simulation *simulation, const SimulationLimits *l
     const double steps = simulation_cost(simulation).steps;
     if (steps <= limits->steps)
         return STATUS_OK;
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    if (solver->cost != NULL)
+        return problem_add(problem, STATUS_INVALID, "/accuracy",
+                           "would take about %.2g solver steps by %s, must be at most %.2g: take "
+                           "fewer of them, or the solver exact",
+                           steps, solver->kind.name, limits->steps);
     return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
                             "would take about %.2g solver steps, must be at most %.2g: the "
                             "structure or the base moves that fast",
@@ -168,6 +186,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
         return problem->status;
     if (status == STATUS_OK)
         status = check_values(simulation, limits, problem);
+    if (status == STATUS_OK)
+        status = check_solver(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)

@@ -20,9 +20,34 @@ static const Solver *chosen_solver(const Simulation *simulation) {
     return solver->run != NULL ? solver : &solver_exact;
 }
 
+// What the chosen solver is asked for; the settings of "auto" are not the chosen one's.
+static const Accuracy *settings(const Simulation *simulation) {
+    const Variant *accuracy = simulation->accuracy;
+    return accuracy->kind == &chosen_solver(simulation)->kind
+               ? (const Accuracy *)(const void *)accuracy
+               : NULL;
+}
+
+static double base_interval(const Simulation *simulation) {
+    const Excitation *excitation = scene_excitation(&simulation->scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    return kind->interval == NULL ? 0 : kind->interval(excitation);
+}
+
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
-    return plan_new(&simulation->scene, simulation->accuracy->kind->name,
-                    chosen_solver(simulation)->kind.name, plan, problem);
+    const Solver *solver = chosen_solver(simulation);
+    TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
+                 problem));
+    if (solver->decide == NULL)
+        return STATUS_OK;
+    const Status status =
+        solver->decide(settings(simulation), base_interval(simulation), *plan, problem);
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    plan_free(*plan);
+    *plan = NULL;
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the plan")
+                                      : status;
 }
 
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
@@ -181,6 +206,7 @@ static Status travel(Journey *journey, Problem *problem) {
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
+               .accuracy = settings(simulation),
                .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
@@ -290,19 +316,39 @@ static double power_steps(const Scene *scene) {
                                       : 0;
 }
 
-Cost simulation_cost(const Simulation *simulation) {
-    const SpectrumRequest *psd = &simulation->output.psd;
+// Steps of the exact solver.
+static double exact_steps(const Simulation *simulation) {
     const double samples = (double)scene_sample_count(&simulation->scene);
     const bool has_damper = simulation->scene.dampers.count > 0;
-    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each. A
-    // transformed sample costs about a third of a step, and overlap transforms it several times.
+    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
     StructureRates rates;
     if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
         rates.fastest = 0; // a guess without memory: the run will tell
     double planning, step = steps_a_sample(&simulation->scene, &planning);
-    double steps = planning + step * (samples * (has_damper ? 1.1 : 1) +
-                                      flight_arcs(&simulation->scene, rates.fastest));
-    steps += power_steps(&simulation->scene);
+    return planning +
+           step *
+               (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
+           power_steps(&simulation->scene);
+}
+
+// Steps of a solver that knows its own cost.
+static double own_steps(const Simulation *simulation) {
+    const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
+    Plan *plan;
+    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
+        return 0; // the run will tell why
+    const double steps =
+        chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);
+    plan_free(plan);
+    return steps + (storeys > 1 ? 2 * storeys * storeys * storeys : 0);
+}
+
+Cost simulation_cost(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
+    const double samples = (double)scene_sample_count(&simulation->scene);
+    double steps =
+        chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
+    // A transformed sample costs about a third of a step, and overlap transforms it several times.
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /
                  (double)(psd->segment - psd->overlap) / 3;

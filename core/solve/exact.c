@@ -375,7 +375,7 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
 }
 
 const Solver solver_exact = {
-    {"exact", "each contact state propagated exactly, events located to rounding", accuracy_fields,
-     sizeof(Accuracy)},
-    exact_run,
+    .kind = {"exact", "each contact state propagated exactly, events located to rounding",
+             accuracy_fields, sizeof(Accuracy)},
+    .run = exact_run,
 };

@@ -28,6 +28,7 @@ typedef struct Run {
     const Plan *plan;
     const Base *base;
     const Watch *watch;
+    const Accuracy *accuracy; // the solver's settings; NULL: its defaults
     Workspace *workspace;     // or NULL
     const RunColumn *columns; // what is wanted, each once
     size_t column_count;
@@ -41,8 +42,15 @@ typedef struct Solver {
     Kind kind;
     // Fills everything of `response` but its series. The caller clears it, also after a failure.
     Status (*run)(Run *run, Response *response, Problem *problem);
+    // Judges the settings for a scene made ready and adds what it decides of them to the plan's
+    // report; `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to
+    // decide.
+    Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
+    // What a run costs, in steps of the single engine. NULL: as the exact solver's.
+    double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
+    bool is_linear_only; // serves no contact under a power law
 } Solver;
 
-extern const Solver solver_exact;
+extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;
 
 #endif

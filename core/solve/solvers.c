@@ -3,14 +3,12 @@
 const Field accuracy_fields[] = {FIELD_END};
 
 static const Solver solver_auto = {
-    {"auto", "the solver that the plan finds best", accuracy_fields, sizeof(Accuracy)},
-    NULL,
+    .kind = {"auto", "the solver that the plan finds best", accuracy_fields, sizeof(Accuracy)},
 };
 
 const Solver *const solvers[] = {
-    &solver_auto,
-    &solver_exact,
-    NULL,
+    &solver_auto,     &solver_exact, &solver_precise, &solver_rk4, &solver_newmark,
+    &solver_adaptive, NULL,
 };
 
 static const Kind *solver_at(size_t index) {
