@@ -12,8 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double tolerance = 1e-14;
-
 enum { ODE_HALVINGS = 60, ODE_RETAKES = 8, ODE_FAILURES = 60 };
 
 struct Ode {
@@ -119,7 +117,7 @@ static bool is_made(Ode *ode) {
     return ode->stepper != NULL && ERKStepSetErrHandlerFn(ode->stepper, hush, NULL) == 0 &&
            ERKStepSetUserData(ode->stepper, ode) == 0 && set_method(ode->stepper) &&
            ERKStepSetMaxErrTestFails(ode->stepper, ODE_FAILURES) == 0 &&
-           ERKStepSVtolerances(ode->stepper, tolerance, ode->scale) == 0;
+           ERKStepSVtolerances(ode->stepper, ode->system.tolerance, ode->scale) == 0;
 }
 
 Ode *ode_new(const OdeSystem *system) {
@@ -127,6 +125,8 @@ Ode *ode_new(const OdeSystem *system) {
     if (ode == NULL)
         return NULL;
     ode->system = *system;
+    if (!(system->tolerance > 0))
+        ode->system.tolerance = ODE_TOLERANCE;
     if (is_made(ode))
         return ode;
     ode_free(ode);
@@ -165,13 +165,13 @@ Status ode_start(Ode *ode, const double *y, const double *scale, double step, Pr
     const OdeSystem *system = &ode->system;
     memcpy(data(ode->y), y, system->size * sizeof *y);
     for (size_t i = 0; i < system->size; i++)
-        data(ode->scale)[i] = tolerance * fmax(scale[i], 1e-290);
+        data(ode->scale)[i] = system->tolerance * fmax(scale[i], 1e-290);
     ode->t = 0;
     ode->step = step;
     system->watch(system->context, 0, data(ode->y), ode->value, ode->slope);
     // The stepper keeps a copy of the tolerances.
     return place(ode, 0, ode->y, step) &&
-                   ERKStepSVtolerances(ode->stepper, tolerance, ode->scale) == 0
+                   ERKStepSVtolerances(ode->stepper, ode->system.tolerance, ode->scale) == 0
                ? STATUS_OK
                : failed(0, problem);
 }

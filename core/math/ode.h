@@ -1,6 +1,7 @@
 // Motion that no closed form describes: explicit Runge-Kutta steps of order 8 whose error is held
-// at rounding's edge, and where functions of the state first fall to zero. SUNDIALS lives here
-// alone. Not for linear motion (arc.h, frame_arc.h are exact). Used by solve/frame_ode.c.
+// at rounding's edge or at a tolerance, and where functions of the state first fall to zero.
+// SUNDIALS lives here alone. Not for linear motion that must be exact (arc.h, frame_arc.h). Used by
+// solve/frame_ode.c and solve/adaptive.c.
 #ifndef CORE_MATH_ODE_H
 #define CORE_MATH_ODE_H
 
@@ -18,8 +19,10 @@ typedef struct OdeSystem {
     // Functions of the state, and their time derivatives; a slope of NAN is not known, then the
     // function's minimum inside a step is not looked for.
     void (*watch)(const void *context, double t, const double *y, double *value, double *slope);
+    double tolerance; // 0: ODE_TOLERANCE
 } OdeSystem;
 
+#define ODE_TOLERANCE 1e-14
 enum { ODE_NO_ROOT = -1 };
 
 // One motion at a time, any number of them in turn. NULL without memory. Freed by ode_free.
@@ -27,7 +30,7 @@ Ode *ode_new(const OdeSystem *system);
 void ode_free(Ode *ode);
 
 // Begins at t = 0 with y. `scale` says of each component what is large for it: errors are held to
-// 1e-14 of that or of the component itself. `step` is a first guess of the step [s].
+// the tolerance of that or of the component itself. `step` is a first guess of the step [s].
 Status ode_start(Ode *ode, const double *y, const double *scale, double step, Problem *problem);
 
 // One step, at most until `until` (> the present time), cut short where a function that was above

@@ -7,7 +7,8 @@ static const Solver solver_auto = {
 };
 
 const Solver *const solvers[] = {
-    &solver_auto, &solver_exact, &solver_precise, &solver_rk4, &solver_newmark, NULL,
+    &solver_auto,     &solver_exact, &solver_precise, &solver_rk4, &solver_newmark,
+    &solver_adaptive, NULL,
 };
 
 static const Kind *solver_at(size_t index) {

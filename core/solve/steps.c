@@ -2,6 +2,7 @@
 // a rule of the method's own order, so that the energy balance tells of the method's error.
 #include "core/solve/steps.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -147,7 +148,7 @@ static Status unstable(const Steps *steps) {
                        fmin(0.2 / frame_rate(frame), steps->length / 4));
 }
 
-static Status check(Steps *steps) {
+Status steps_check(Steps *steps) {
     Frame *frame = &steps->frame;
     const Run *run = frame->run;
     steps->watched = 0;
@@ -184,7 +185,7 @@ Status steps_note(Steps *steps, double cost) {
     TRY(note(steps));
     steps->frame.run->steps += cost;
     steps->watched += 20 * cost;
-    return steps->watched > WATCH_WORK ? check(steps) : STATUS_OK;
+    return steps->watched > WATCH_WORK ? steps_check(steps) : STATUS_OK;
 }
 
 static void gather(const Frame *frame, double *y) {
@@ -258,18 +259,19 @@ Status steps_interval(Steps *steps) {
 }
 
 Status steps_finish(Steps *steps, double length) {
-    if (steps->stepper->cross != NULL) {
-        if (length > 1e-9 * steps->length)
-            TRY(steps->stepper->cross(steps, length));
-        return check(steps);
-    }
+    const double clock = 8 * DBL_EPSILON * steps->frame.plan->duration; // less is rounding
     const double whole = floor(length / steps->length * (1 + 1e-9));
+    if (steps->stepper->cross != NULL) {
+        if (length > clock)
+            TRY(steps->stepper->cross(steps, length));
+        return steps_check(steps);
+    }
     for (double k = 1; k <= whole; k++)
         TRY(step(steps, steps->length, k * steps->length));
     const double rest = length - whole * steps->length;
-    if (rest > 1e-9 * steps->length)
+    if (rest > clock)
         TRY(step(steps, rest, length));
-    return check(steps);
+    return steps_check(steps);
 }
 
 // Explicit steps that are too long for what is known beforehand to move.
@@ -322,11 +324,12 @@ static Status make_room(Steps *steps) {
     return STATUS_OK;
 }
 
-Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, bool is_shadow,
-                  Response *response, Problem *problem) {
+Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, double tolerance,
+                  bool is_shadow, Response *response, Problem *problem) {
     Frame *frame = &steps->frame;
     memset(steps, 0, sizeof *steps);
     steps->stepper = stepper;
+    steps->tolerance = tolerance;
     TRY(frame_make(frame, run, problem));
     frame->is_shadow = is_shadow;
     steps->share = share;

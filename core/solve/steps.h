@@ -59,8 +59,8 @@ struct Steps {
 };
 
 // `is_shadow`: only the motion is wanted. Cleared by steps_clear, also after a failure.
-Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, bool is_shadow,
-                  Response *response, Problem *problem);
+Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, double tolerance,
+                  bool is_shadow, Response *response, Problem *problem);
 void steps_clear(Steps *steps);
 
 // To the next sample, and takes it.
@@ -95,6 +95,8 @@ void steps_sum(Steps *steps, const double *from, const double *to, double length
 // After each stretch of a run: takes peaks and the energy balance, counts what it cost, asks the
 // watch.
 Status steps_note(Steps *steps, double cost);
+// Whether the limits are kept and the watch lets the run go on.
+Status steps_check(Steps *steps);
 
 // Contacts begin and end, masses bounce: steps_contact.c.
 void steps_turn(Steps *steps, double length);

@@ -3,20 +3,22 @@
 // as the step to the method's order, which makes the run's error of the difference. Across contacts
 // they depend on how far into a stop the steps happen to end: there no more can be said than that
 // the error may be some times the difference, or what the energies are wrong by. Steps without a
-// fixed length go by samples, the neighbour's with ten times the tolerance.
+// fixed length cannot be made longer where samples and kinks end them: there the neighbour is the
+// better one, with half the length at most and a hundredth of the tolerance.
 #include "core/solve/steps_run.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/ode.h"
 #include "core/plan/stops.h"
 
 // Parts of the fastest period and of the shortest contact that a step is of by itself.
 static const double PARTS = 30;
 static const double SHARE_MOST = 1e12;
-static const double COARSER = 10; // tolerance
-static const double CHANCE = 3;   // what the difference is taken for with contacts
+static const double FINER = 10; // tolerance
+static const double CHANCE = 6; // what the difference is taken for with contacts
 static const double TURN = 6.28318530717958647693;
 
 // clang-format off
@@ -134,7 +136,7 @@ double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_
     return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
 }
 
-// The run, and beside it one whose error is known to be larger.
+// The run, and beside it one whose error is known to be another.
 typedef struct Pair {
     Steps run, near;
     Plan plan; // a copy: what it points to is the run's
@@ -157,7 +159,7 @@ static double part_of(const Pair *pair) {
     for (size_t d = 0; d < pair->run.frame.dampers; d++)
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
     if (pair->run.tolerance > 0)
-        return 1;
+        return 2;
     return is_touched ? CHANCE : 1 / (pow(pair->longer, pair->run.stepper->order) - 1);
 }
 
@@ -182,21 +184,27 @@ static void compare(Pair *pair) {
     pair->is_spent = part_of(pair) * difference > pair->largest;
 }
 
-static void follow(Pair *pair) {
+static Status follow(Pair *pair) {
+    Run *run = pair->run.frame.run;
     if (pair->is_spent || pair->run.frame.sample % pair->stride != 0)
-        return;
-    if (steps_interval(&pair->near) == STATUS_OK)
+        return STATUS_OK;
+    pair->near_run.steps = run->steps;
+    const Status status = steps_interval(&pair->near);
+    run->steps = pair->near_run.steps;
+    if (status == STATUS_OK) {
         compare(pair);
-    else
-        pair->is_spent = true, pair->is_known = false;
-    pair->run.frame.run->steps += pair->near_run.steps;
-    pair->near_run.steps = 0;
+        return STATUS_OK;
+    }
+    pair->is_spent = true;
+    pair->is_known = false;
+    return steps_check(&pair->run); // it may have been told to stop
 }
 
 static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double tolerance) {
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
-    const size_t own = pair->run.share / kinks, share = kinks * ((own + 1) / 2);
+    const size_t own = pair->run.share / kinks;
+    const size_t share = tolerance > 0 ? 2 : kinks * ((own + 1) / 2);
     pair->horizon = NAN;
     pair->stride = pair->run.share > 1 || tolerance > 0 ? 1 : 2;
     pair->longer = (double)(pair->run.share * pair->stride) / (double)share;
@@ -206,10 +214,10 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->near_run = (Run){
         .plan = &pair->plan, .base = frame->run->base, .impacts_most = frame->run->impacts_most};
     pair->apart = malloc(frame->storeys * sizeof *pair->apart);
-    pair->is_known =
-        pair->apart != NULL && steps_make(&pair->near, stepper, &pair->near_run, share, true,
-                                          &pair->near_response, NULL) == STATUS_OK;
-    pair->near.tolerance = COARSER * tolerance;
+    pair->is_known = pair->apart != NULL &&
+                     steps_make(&pair->near, stepper, &pair->near_run, share,
+                                fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0), true,
+                                &pair->near_response, NULL) == STATUS_OK;
     pair->is_spent = !pair->is_known;
 }
 
@@ -231,7 +239,7 @@ static Status solve(Pair *pair, Response *response) {
     steps_take_sample(&pair->run);
     while (frame->sample + 1 < plan->count) {
         TRY(steps_interval(&pair->run));
-        follow(pair);
+        TRY(follow(pair));
     }
     tell(pair, response);
     // The duration may end between samples.
@@ -253,9 +261,9 @@ Status steps_run_pair(Run *run, const Stepper *stepper, size_t share, size_t kin
     Pair *pair = calloc(1, sizeof *pair);
     if (pair == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
-    Status status = steps_make(&pair->run, stepper, run, share, false, response, problem);
+    Status status =
+        steps_make(&pair->run, stepper, run, share, tolerance, false, response, problem);
     if (status == STATUS_OK) {
-        pair->run.tolerance = tolerance;
         start_near(pair, stepper, kinks, tolerance);
         status = solve(pair, response);
     }
@@ -274,8 +282,10 @@ Status steps_run(Run *run, const Stepper *stepper, Response *response, Problem *
     const Choice choice =
         choose(run->plan, run->accuracy, base->form == BASE_SAMPLED ? base->interval : 0);
     if (!(choice.share <= SHARE_MOST))
-        return problem_set(problem, STATUS_INVALID,
-                           "a step is too short: %.3g to a sample interval", choice.share);
+        return problem_set(problem, STATUS_LIMIT,
+                           "the scene moves too fast for %s: %.3g steps to a sample interval, at "
+                           "most %.3g are possible",
+                           stepper->name, choice.share, SHARE_MOST);
     if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
         return problem_set(problem, STATUS_INVALID,
                            "%s serves linear contact and impulses, not a power law", stepper->name);

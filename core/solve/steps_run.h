@@ -14,6 +14,12 @@ typedef struct AccuracyStep {
 } AccuracyStep;
 extern const Field accuracy_step_fields[];
 
+// The "accuracy" object of a solver whose steps keep a tolerance.
+typedef struct AccuracyTolerance {
+    Accuracy accuracy;
+    double tolerance;
+} AccuracyTolerance;
+
 // Solver.run, .decide and .cost of such a solver.
 Status steps_run(Run *run, const Stepper *stepper, Response *response, Problem *problem);
 Status steps_decide(const Accuracy *accuracy, const Stepper *stepper, double base_interval,

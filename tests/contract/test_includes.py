@@ -19,9 +19,10 @@ FLOORS = {
                ["options", "command", "main"]],
 }
 
-# The C library as the two halves may use it. Not here: files, clocks, threads and processes in the core.
-PURE = set("assert complex ctype errno float inttypes limits math stdalign stdarg stdatomic stdbool stddef "
-           "stdint stdio stdlib string".split())
+# The C library as the two halves may use it, and the processor's vectors. Not here: files, clocks, threads and
+# processes in the core.
+PURE = set("assert complex ctype errno float immintrin inttypes limits math stdalign stdarg stdatomic stdbool "
+           "stddef stdint stdio stdlib string".split())
 SYSTEM = PURE | set("dirent fcntl grp libgen netdb poll pthread pwd sched semaphore signal strings "
                     "termios time unistd arpa/inet net/if netinet/in netinet/tcp sys/epoll sys/eventfd "
                     "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "

@@ -33,7 +33,8 @@ static Problem problem;
 static const double scale[2] = {1, 1};
 
 static Ode *swing_new(const Swing *swing) {
-    const OdeSystem system = {swing, 2, 2, rate, watch};
+    const OdeSystem system = {
+        .context = swing, .size = 2, .roots = 2, .rate = rate, .watch = watch};
     Ode *ode = ode_new(&system);
     assert_non_null(ode);
     return ode;
