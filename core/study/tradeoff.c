@@ -24,7 +24,7 @@ static const Field study_fields[] = {
     FIELD_CHOICE(TradeoffStudy, metric, tradeoff_metric_names, TRADEOFF_DISPLACEMENT, "what the error is of"),
     FIELD_COUNT(TradeoffStudy, repeats, NULL, WITHIN(1, REPEATS), 5, "timings of each point; the smallest and the median are told"),
     FIELD_TEXTS(TradeoffStudy, solvers, NULL, NULL, SOLVERS, PRESENCE_OPTIONAL, 0, "solvers that are tried; all if absent"),
-    FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 1e7, "solver steps that a point may be foretold to take; it is refused beyond"),
+    FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 5e7, "solver steps that a point may be foretold to take; it is refused beyond"),
     FIELD_COUNT(TradeoffStudy, trial, NULL, AT_LEAST(1), 1, "another number measures the CPU times anew; the same one is answered from what was measured"),
     FIELD_END
 };
@@ -169,9 +169,10 @@ static Status study_cost(const Study *asked, const Simulation *simulation,
     if (status == STATUS_OK && each == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
     if (status == STATUS_OK) {
-        budget_foretell(simulation, &points, budget_point(study, limits).steps, each);
+        const double most = budget_point(study, limits).steps;
+        budget_foretell(simulation, &points, each);
         for (size_t i = 0; i < points.count; i++)
-            if (!isnan(each[i]))
+            if (each[i] <= most)
                 *steps += budget_timed(study, each[i]);
     }
     free(each);

@@ -13,8 +13,7 @@ SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits
 
 // Steps of one solver cost as many as there are: making ready a large structure once for each
 // solver is enough.
-void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double most,
-                     double *steps) {
+void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double *steps) {
     size_t first = 0; // of this solver's
     double cost = 0;
     for (size_t i = 0; i < points->count; i++) {
@@ -27,8 +26,6 @@ void budget_foretell(const Simulation *simulation, const TradeoffPoints *points,
             cost = ladder_cost(simulation, point);
         }
         steps[i] = is_alike && !isnan(point->step) ? cost * other->step / point->step : cost;
-        if (steps[i] > most)
-            steps[i] = (double)NAN;
     }
 }
 

@@ -11,9 +11,8 @@
 // The limits of one point, of those of every run (or NULL).
 SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits *limits);
 
-// Foretold steps of one run of each point; NAN where that is more than `most`.
-void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double most,
-                     double *steps);
+// Foretold steps of one run of each point.
+void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double *steps);
 
 // A point whose run takes so many steps, with its timings.
 double budget_timed(const TradeoffStudy *study, double steps);

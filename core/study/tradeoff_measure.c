@@ -3,6 +3,7 @@
 // many at once.
 #include "core/study/tradeoff_measure.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -63,7 +64,19 @@ static Status set_aside(TradeoffPoint *point, TradeoffStatus as, Status status,
     if (ends_all(status))
         return problem_set(problem, status, "%s", fault->detail);
     point->status = as;
-    return copy_text(&point->why, fault->detail, problem);
+    return copy_text(&point->why, fault->count > 0 ? fault->faults[0].detail : fault->detail,
+                     problem);
+}
+
+// As set_aside, before anything of it is made.
+static Status refuse_long(const Session *session, size_t index, Problem *problem) {
+    char text[160];
+    snprintf(text, sizeof text,
+             "would take about %.2g solver steps, more than the %.2g that a point may",
+             session->steps[index], session->limits.steps);
+    TradeoffPoint *point = &session->answer->points.at[index];
+    point->status = TRADEOFF_REFUSED;
+    return copy_text(&point->why, text, problem);
 }
 
 static Status make_reference(Session *session, Problem *problem) {
@@ -96,7 +109,9 @@ static Compared compare(const Outcome *outcome, const Simulation *simulation,
 
 static Status measure_errors(Session *session, size_t index, Problem *problem) {
     TradeoffPoint *point = &session->answer->points.at[index];
-    const double steps = isnan(session->steps[index]) ? 0 : session->steps[index];
+    const double steps = session->steps[index];
+    if (steps > session->limits.steps)
+        return refuse_long(session, index, problem);
     Simulation simulation = {0};
     Outcome *outcome = NULL;
     problem_clear(session->fault);
@@ -113,7 +128,7 @@ static Status measure_errors(Session *session, size_t index, Problem *problem) {
         const Compared from = compare(session->reference, session->simulation, NULL);
         const Compared to = compare(outcome, &simulation, point);
         point->status = TRADEOFF_MEASURED;
-        point->steps = outcome->steps;
+        point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
         point->errors = errors_measure(&from, &to);
     } else {
         status = set_aside(point, as, status, session->fault, problem);
@@ -213,9 +228,9 @@ Status tradeoff_measure(const TradeoffStudy *study, const Simulation *simulation
     if (session.steps == NULL || session.times == NULL || session.fault == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
     if (status == STATUS_OK) {
-        budget_foretell(simulation, &answer->points, session.limits.steps, session.steps);
+        budget_foretell(simulation, &answer->points, session.steps);
         for (size_t i = 0; i < count; i++)
-            if (!isnan(session.steps[i]))
+            if (session.steps[i] <= session.limits.steps)
                 session.all += budget_timed(study, session.steps[i]);
         status = measure_all(&session, problem);
     }

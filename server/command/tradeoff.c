@@ -39,7 +39,7 @@ static const Field tradeoff_fields[] = {
     FIELD_TEXTS(TradeoffSettings, solver, NULL, NULL, SOLVERS, PRESENCE_OPTIONAL, 0,
                 "try this solver only; may be given again"),
     FIELD_REAL(TradeoffSettings, point_steps, NULL, ANY, OPTIONAL,
-               "solver steps a point may be foretold to take (1e7)"),
+               "solver steps a point may be foretold to take (5e7)"),
     FIELD_END,
 };
 
@@ -73,7 +73,7 @@ static void point_print(const Tradeoff *tradeoff, size_t index, int width) {
                                                                   : ' ';
     char cell[8][24];
     if (point->status != TRADEOFF_MEASURED) {
-        printf("  %-*s  %s: %s\n", width, point->name, tradeoff_status_names[point->status],
+        printf("  %-*s %8s: %s\n", width, point->name, tradeoff_status_names[point->status],
                point->why != NULL ? point->why : "");
         return;
     }

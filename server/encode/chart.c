@@ -135,7 +135,8 @@ static void put_style(Bytes *bytes) {
     bytes_text(bytes,
                "<style>\n"
                "svg { font: 12px system-ui, sans-serif; color-scheme: light dark; }\n"
-               ".page { fill: #ffffff; } text { fill: #222222; } .small { font-size: 11px; }\n"
+               ".page { fill: #ffffff; } text { fill: #222222; } .halo { paint-order: stroke; "
+               "stroke: #ffffff; stroke-width: 4; stroke-opacity: 0.85; }\n"
                ".grid { stroke: #dddddd; fill: none; } .frame { stroke: #777777; fill: none; }\n"
                ".best { stroke: #222222; stroke-opacity: 0.28; stroke-width: 6; fill: none; "
                "stroke-linejoin: round; }\n"
@@ -148,7 +149,7 @@ static void put_style(Bytes *bytes) {
     bytes_text(bytes, "@media (prefers-color-scheme: dark) {\n"
                       ".page { fill: #16181c; } text { fill: #e4e4e4; } .grid { stroke: #363a41; } "
                       ".frame { stroke: #8a8f98; }\n"
-                      ".best, .wanted, .ring { stroke: #f2f2f2; }\n");
+                      ".best, .wanted, .ring { stroke: #f2f2f2; } .halo { stroke: #16181c; }\n");
     for (size_t i = 0; i < GROUPS; i++)
         bytes_format(bytes, ".mark.s%zu { fill: %s; } .line.s%zu { stroke: %s; }\n", i, dark[i], i,
                      dark[i]);
@@ -228,14 +229,20 @@ static void put_best(const Chart *chart) {
 
 static void put_wanted(const Chart *chart) {
     const double error = chart->tradeoff->error;
-    if (!(error > 0))
-        return;
-    const double y = y_of(chart, error);
-    bytes_format(chart->bytes, "<path class=\"wanted\" d=\"M%.0f %.1fH%.0f\"/>", left, y, right);
-    bytes_format(
-        chart->bytes,
-        "<text class=\"small\" x=\"%.0f\" y=\"%.1f\" text-anchor=\"end\">wanted %.3g%s</text>\n",
-        right - 6, y - 5, error, tradeoff_metric_units[chart->tradeoff->metric]);
+    if (error > 0)
+        bytes_format(chart->bytes, "<path class=\"wanted\" d=\"M%.0f %.1fH%.0f\"/>\n", left,
+                     y_of(chart, error), right);
+}
+
+// Above the marks, on the page's colour.
+static void put_wanted_label(const Chart *chart) {
+    const double error = chart->tradeoff->error;
+    if (error > 0)
+        bytes_format(chart->bytes,
+                     "<text class=\"halo\" x=\"%.0f\" y=\"%.1f\" "
+                     "text-anchor=\"end\">wanted %.3g%s</text>\n",
+                     right - 6, y_of(chart, error) - 6, error,
+                     tradeoff_metric_units[chart->tradeoff->metric]);
 }
 
 static void put_point(Chart *chart, const TradeoffPoint *point) {
@@ -347,6 +354,7 @@ void chart_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
         if (is_drawn(&chart, &tradeoff->points.at[i]))
             put_point(&chart, &tradeoff->points.at[i]);
     put_choice(&chart);
+    put_wanted_label(&chart);
     put_legend(&chart);
     bytes_text(bytes, "</svg>\n");
 }
