@@ -102,13 +102,10 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
     bytes_text(bytes, ", \"study\": ");
-    if (answer->study != NULL) {
-        bytes_format(bytes, "{\"kind\": \"%s\", ", answer->study->kind->name);
-        (void)write_members(bytes, answer->study->kind->fields, answer->study, WRITE_REPORT);
-        bytes_text(bytes, "}");
-    } else {
+    if (answer->study != NULL)
+        document_answer(bytes, answer->study);
+    else
         bytes_text(bytes, "null");
-    }
     bytes_text(bytes, ", \"links\": ");
     write_links(bytes, row->id, answer);
     bytes_text(bytes, "}\n");

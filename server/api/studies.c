@@ -9,10 +9,10 @@
 #include "core/study/tradeoff.h"
 #include "server/api/app.h"
 #include "server/codec/read.h"
-#include "server/codec/write.h"
 #include "server/encode/chart.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/jobs/documents.h"
 
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
@@ -38,7 +38,7 @@ static Status write_tradeoff(const ResultRow *row, bool is_chart, Bytes *bytes, 
     if (status == STATUS_OK && is_chart)
         chart_tradeoff((const Tradeoff *)(const void *)answer.study, bytes);
     else if (status == STATUS_OK) {
-        write_item(bytes, answer.study->kind->fields, answer.study, WRITE_REPORT);
+        document_answer(bytes, answer.study);
         bytes_text(bytes, "\n");
     }
     fields_clear(study_answer_fields, &answer);

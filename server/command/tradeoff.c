@@ -7,11 +7,11 @@
 
 #include "core/study/tradeoff.h"
 #include "server/base/clock.h"
-#include "server/codec/write.h"
 #include "server/command/bar.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
 #include "server/encode/chart.h"
+#include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
 #include "server/options.h"
 
@@ -117,7 +117,7 @@ static Status file_write(const char *path, const Tradeoff *tradeoff, Problem *pr
     if (is_chart(path)) {
         chart_tradeoff(tradeoff, &bytes);
     } else {
-        write_item(&bytes, tradeoff->variant.kind->fields, tradeoff, WRITE_REPORT);
+        document_answer(&bytes, &tradeoff->variant);
         bytes_text(&bytes, "\n");
     }
     Status status = bytes.is_failed

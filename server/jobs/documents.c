@@ -90,3 +90,11 @@ void document_scene(Bytes *bytes, const Inquiry *inquiry) {
 void document_study(Bytes *bytes, const StudyAnswer *answer) {
     write_item(bytes, study_answer_fields, answer, WRITE_SCENE);
 }
+
+void document_answer(Bytes *bytes, const Variant *answer) {
+    bytes_text(bytes, "{\"kind\": ");
+    bytes_json_string(bytes, answer->kind->name);
+    bytes_text(bytes, ", ");
+    (void)write_members(bytes, answer->kind->fields, answer, WRITE_REPORT);
+    bytes_text(bytes, "}");
+}

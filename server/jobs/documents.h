@@ -19,5 +19,7 @@ void document_psd(Bytes *bytes, const Spectrum *spectrum);
 void document_scene(Bytes *bytes, const Inquiry *inquiry);
 // A study's answer, as it is kept: what is unknown is left out, so that it can be read again.
 void document_study(Bytes *bytes, const StudyAnswer *answer);
+// The same as people get it: {"kind": ..., what is unknown null}.
+void document_answer(Bytes *bytes, const Variant *answer);
 
 #endif

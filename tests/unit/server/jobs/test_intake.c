@@ -311,18 +311,18 @@ static void a_failing_job_says_why(void **state) {
 static void names_are_resolved_and_all_faults_told(void **state) {
     (void)state;
     Room room = room_make(1);
-    Simulation simulation;
+    Inquiry inquiry;
     Warnings warnings = {NULL, 0};
     char text[1024];
     scene_text(text, 0.015, 1, "spnge");
     problem_clear(&problem);
     assert_int_equal(
-        intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+        intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
         STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
     assert_string_equal(problem.faults[0].did_you_mean, "sponge");
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     static const struct {
         const char *buffer, *pointer, *did_you_mean;
@@ -341,7 +341,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
                  cases[i].buffer);
         problem_clear(&problem);
         assert_int_equal(
-            intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+            intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
             STATUS_INVALID);
         assert_true(problem_concerns(&problem, "/structure/mass"));
         if (problem.count != 2 || !problem_concerns(&problem, cases[i].pointer))
@@ -350,7 +350,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
         for (size_t k = 0; k < problem.count; k++)
             if (strncmp(problem.faults[k].pointer, "/dampers", 8) == 0)
                 assert_string_equal(problem.faults[k].did_you_mean, cases[i].did_you_mean);
-        simulation_clear(&simulation);
+        inquiry_clear(&inquiry);
         warnings_clear(&warnings);
     }
     room_end(&room);
