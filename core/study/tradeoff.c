@@ -53,7 +53,7 @@ const Field tradeoff_point_fields[] = {
     FIELD_TEXT(TradeoffPoint, why, 0, PRESENCE_OPTIONAL, 0, "why it was not measured"),
     FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, another time will differ"),
     FIELD_REAL(TradeoffPoint, cpu_median, "s", ANY, OPTIONAL, "median of the timings; a measurement"),
-    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_LEAST(0), OPTIONAL, "runs that were timed: short ones are timed many at once"),
+    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_LEAST(0), 0, "runs that were timed: short ones are timed many at once"),
     FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
     FIELD_ITEM(TradeoffPoint, errors, tradeoff_error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
     FIELD_FLAG(TradeoffPoint, is_best, false, "no other point is both cheaper and closer by the metric; follows from measured times"),
