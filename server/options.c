@@ -4,6 +4,7 @@
 
 #include <ctype.h>
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -52,6 +53,16 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
         text_fit(fault.did_you_mean, sizeof fault.did_you_mean, near);
     snprintf(fault.detail, sizeof fault.detail, "must be %s, is %.100s", detail, value);
     return problem_put(reader->problem, STATUS_USAGE, &fault);
+}
+
+static Status refuse_choice(const Reader *reader, const char *typed, const char *value,
+                            const Field *row) {
+    char all[160] = "one of ";
+    for (size_t i = 0; row->choices[i] != NULL; i++) {
+        const size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%s", i > 0 ? ", " : "", row->choices[i]);
+    }
+    return refuse(reader, typed, value, row, all);
 }
 
 static Status text_set(char **target, const char *value) {
@@ -129,7 +140,7 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
         while (row->choices[index] != NULL && strcmp(row->choices[index], value) != 0)
             index++;
         if (row->choices[index] == NULL)
-            return refuse(reader, typed, value, row, "one of the choices");
+            return refuse_choice(reader, typed, value, row);
         *(int *)member(reader, row) = index;
         break;
     }

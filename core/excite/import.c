@@ -133,12 +133,11 @@ static Status take_times(Numbers *numbers, const ImportHeader *header, double *i
         if (gained > 0 && fabs(gained - mean) <= 0.6 * mean &&
             fabs(at[2 * i] - at[0] - (double)i * mean) <= 0.3 * mean)
             continue;
-        // The mean is bent by what is wrong; the first step usually is not.
+        // What is wrong bends the mean, and with it what is behind; itself it is furthest from it.
         size_t row = 1;
-        while (row < rows &&
-               fabs(at[2 * row] - at[2 * row - 2] - (at[2] - at[0])) <= 0.6 * (at[2] - at[0]))
-            row++;
-        row = row < rows ? row : i;
+        for (size_t j = 2; j < rows; j++)
+            if (fabs(at[2 * j] - at[2 * j - 2] - mean) > fabs(at[2 * row] - at[2 * row - 2] - mean))
+                row = j;
         return problem_add(problem, STATUS_UNREADABLE,
                            text_place(place, row_line(header->data, row), 0),
                            "times must rise evenly: is %s s after %s s, where steps are %s s",

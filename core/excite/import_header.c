@@ -141,11 +141,30 @@ static void keep_text(ImportHeader *header, const TextLine *line) {
         header->text[used++] = *at == '\t' ? ' ' : isprint((unsigned char)*at) ? *at : '?';
 }
 
+// Nowhere is a line of numbers: is it commas that keep them from being numbers?
+static Status refuse_text(TextReader reader, size_t lines, Problem *problem) {
+    TextLine line;
+    TextWord word;
+    char place[64];
+    while (reader.line < HEADER_LINES && text_line(&reader, &line)) {
+        const char *at = line.at;
+        while (text_word(&line, &at, &word))
+            if (strchr("+-.0123456789", *word.at) != NULL &&
+                memchr(word.at, ',', (size_t)(word.end - word.at)) != NULL)
+                return text_refuse_word(&line, &word, problem);
+    }
+    return problem_add(problem, STATUS_UNREADABLE, text_place(place, lines > 0 ? lines : 1, 0),
+                       lines < HEADER_LINES
+                           ? "must hold a line of numbers up to here, the end of the file"
+                           : "must hold a line of numbers up to here");
+}
+
 // How many lines stand before the numbers.
 static Status count_lines(TextReader reader, size_t *lines, size_t *count_line, Problem *problem) {
     TextLine line;
     char seen[LINE_SEEN];
     size_t first_numbers = 0, text_lines = 0;
+    const TextReader start = reader;
     *lines = *count_line = 0;
     while (reader.line < HEADER_LINES && text_line(&reader, &line)) {
         text_capitals(&line, seen, sizeof seen);
@@ -159,14 +178,8 @@ static Status count_lines(TextReader reader, size_t *lines, size_t *count_line, 
     }
     if (*lines > 0)
         return STATUS_OK;
-    if (first_numbers == 0) {
-        char place[64];
-        return problem_add(problem, STATUS_UNREADABLE,
-                           text_place(place, text_lines > 0 ? text_lines : 1, 0),
-                           text_lines < HEADER_LINES
-                               ? "must hold a line of numbers up to here, the end of the file"
-                               : "must hold a line of numbers up to here");
-    }
+    if (first_numbers == 0)
+        return refuse_text(start, text_lines, problem);
     *lines = first_numbers - 1;
     return STATUS_OK;
 }

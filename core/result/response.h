@@ -27,6 +27,7 @@ typedef struct Impact {
     double peak_force;       // largest |N| of the contact [N]
     double impulse;          // |integral of N| [N s]
     double energy_lost;      // work of the dissipative part [J]
+    bool is_resumed;         // N rose again inside the buffer: the contact before it goes on
 } Impact;
 
 typedef struct Impacts {

@@ -49,8 +49,8 @@ static Status check_square(const Checked *matrix, size_t storeys, const char *pl
                            Problem *problem) {
     if (matrix->rows->count != storeys)
         return problem_add(problem, STATUS_INVALID, place,
-                           "must have %zu rows, as many as mass, has %zu", storeys,
-                           matrix->rows->count);
+                           "must have %zu row%s, as many as mass, has %zu", storeys,
+                           storeys == 1 ? "" : "s", matrix->rows->count);
     Status status = STATUS_OK;
     for (size_t i = 0; i < storeys; i++) {
         if (matrix->rows->at[i].count == storeys)
@@ -58,8 +58,8 @@ static Status check_square(const Checked *matrix, size_t storeys, const char *pl
         char row[sizeof((Fault){0}.pointer)];
         pointer_index(row, sizeof row, place, i);
         status = problem_add(problem, STATUS_INVALID, row,
-                             "must have %zu numbers, one per row of the matrix, has %zu", storeys,
-                             matrix->rows->at[i].count);
+                             "must have %zu number%s, one per row of the matrix, has %zu", storeys,
+                             storeys == 1 ? "" : "s", matrix->rows->at[i].count);
     }
     return status;
 }

@@ -62,8 +62,21 @@ static void clear(Texts *names) {
     *names = (Texts){NULL, 0};
 }
 
+// The names that one entry of the list became.
+typedef struct Expanded {
+    size_t at, count;
+} Expanded;
+
+// Where the list as it was asked for has what is now name `i`.
+static size_t asked_at(const Expanded *expanded, size_t i) {
+    if (i < expanded->at)
+        return i;
+    return i < expanded->at + expanded->count ? expanded->at : i - expanded->count + 1;
+}
+
 // CHANNEL_USUAL where it first stands; a second one is left to be refused as such.
-static Status expand(Texts *names, const Owners *owners, bool is_spectrum, Problem *problem) {
+static Status expand(Texts *names, const Owners *owners, bool is_spectrum, Expanded *expanded,
+                     Problem *problem) {
     size_t place = 0;
     while (place < names->count && strcmp(names->at[place], CHANNEL_USUAL) != 0)
         place++;
@@ -82,6 +95,8 @@ static Status expand(Texts *names, const Owners *owners, bool is_spectrum, Probl
         else
             status = STATUS_NO_MEMORY;
     }
+    if (status == STATUS_OK)
+        *expanded = (Expanded){place, all.count - names->count + 1};
     clear(status == STATUS_OK ? names : &all);
     if (status != STATUS_OK)
         return problem_set(problem, status, "no memory for the channels");
@@ -125,16 +140,18 @@ static Status refuse_name(const char *name, const Owners *owners, const char *po
                            "%s needs a damper, the scene has none", name);
     const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
     const size_t most = owners_count(owners, channel);
-    char meant[NAME_SIZE], last[NAME_SIZE], detail[sizeof((Fault){0}.detail)];
+    char meant[NAME_SIZE], last[NAME_SIZE], names[160], detail[sizeof((Fault){0}.detail)];
     put_name(meant, owners, channel,
              number > most || channel->owner == CHANNEL_OF_STOREY ? most : 1);
     put_name(last, owners, channel, most);
+    if (most == 1)
+        snprintf(names, sizeof names, "be %s", last);
+    else
+        snprintf(names, sizeof names, "carry the number of a %s, from %s_1 to %s",
+                 channel->owner == CHANNEL_OF_STOREY ? "storey" : "damper", channel->name, last);
     if (is_numbered)
-        snprintf(detail, sizeof detail,
-                 "must carry the number of a %s, from %s_1 to %s: the scene has %zu storey%s and "
-                 "%zu damper%s",
-                 channel->owner == CHANNEL_OF_STOREY ? "storey" : "damper", channel->name, last,
-                 owners->storeys, owners->storeys == 1 ? "" : "s", owners->dampers,
+        snprintf(detail, sizeof detail, "must %s: the scene has %zu storey%s and %zu damper%s",
+                 names, owners->storeys, owners->storeys == 1 ? "" : "s", owners->dampers,
                  owners->dampers == 1 ? "" : "s");
     else
         snprintf(detail, sizeof detail, "must be %s, without a number: there is but one", meant);
@@ -146,8 +163,9 @@ Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, cons
     const Owners owners = {scene_storeys(scene, problem), scene->dampers.count,
                            scene_storeys(scene, problem) > 1 || scene->dampers.count > 1};
     const bool are_known = owners.storeys > 0 && !problem_concerns(problem, "/dampers");
+    Expanded expanded = {0, 1};
     if (are_known)
-        TRY(expand(names, &owners, is_spectrum, problem));
+        TRY(expand(names, &owners, is_spectrum, &expanded, problem));
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
         size_t first = 0;
@@ -158,12 +176,12 @@ Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, cons
             continue;
         status = STATUS_INVALID;
         char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, i);
+        pointer_index(place, sizeof place, pointer, asked_at(&expanded, i));
         if (is_wrong)
             (void)refuse_name(names->at[i], &owners, place, problem);
         if (first < i)
             problem_add(problem, STATUS_INVALID, place, "%.64s is asked for twice, first at %s/%zu",
-                        names->at[i], pointer, first);
+                        names->at[i], pointer, asked_at(&expanded, first));
     }
     return status;
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
@@ -175,36 +176,6 @@ static void summarize(Outcome *outcome) {
                   .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
 }
 
-// What steps are wrong by is not rounding's.
-static Status warn_of_steps(Outcome *outcome) {
-    const Summary *summary = &outcome->summary;
-    if (isnan(summary->error_estimate))
-        return warnings_add(&outcome->warnings, "/accuracy",
-                            "the error of these steps is not known: the run beside this one that "
-                            "would tell it came to no end");
-    if (summary->error_estimate <= RESPONSE_PARTING)
-        return STATUS_OK;
-    return warnings_add(&outcome->warnings, "/accuracy",
-                        "with these steps the displacement is wrong by about %.2g of its largest "
-                        "value%s: shorter steps, or the solver exact, are closer",
-                        summary->error_estimate,
-                        summary->error_estimate > 0.1 ? ", and only statistics hold" : "");
-}
-
-static Status warn_of_horizon(Outcome *outcome, Problem *problem) {
-    if (outcome->response.is_stepped)
-        return warn_of_steps(outcome) == STATUS_OK
-                   ? STATUS_OK
-                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-    if (isnan(outcome->summary.trust_horizon) ||
-        warnings_add(&outcome->warnings, "/duration",
-                     "the run goes on beyond t = %.6g s: there rounding has moved the displacement "
-                     "by %g of its largest value, and from there on only statistics hold",
-                     outcome->summary.trust_horizon, RESPONSE_PARTING) == STATUS_OK)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-}
-
 // Finite inputs can still be too large for their products.
 static Status check_finite(const Outcome *outcome, Problem *problem) {
     const Summary *summary = &outcome->summary;
@@ -253,7 +224,8 @@ static Status travel(Journey *journey, Problem *problem) {
     outcome->steps = run.steps;
     summarize(outcome);
     TRY(check_finite(outcome, problem));
-    TRY(warn_of_horizon(outcome, problem));
+    if (caution_warn(scene, outcome) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(make_spectrum(journey, problem));
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);

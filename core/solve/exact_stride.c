@@ -255,7 +255,8 @@ void exact_stride_enter(Exact *exact) {
     Stretch *stretch = &exact->stretch;
     Peaks *peaks = &exact->ledger.response->peaks;
     lanes_take_sums(stretch, sums);
-    peaks->velocity = ledger_larger(peaks->velocity, lanes_take_peak(stretch, OF_VELOCITY));
+    const double speed = lanes_take_peak(stretch, OF_VELOCITY);
+    peaks->velocity = ledger_larger(peaks->velocity, speed);
     peaks->acceleration =
         ledger_larger(peaks->acceleration, lanes_take_peak(stretch, OF_ACCELERATION));
     const double damper = lanes_take_peak(stretch, OF_DAMPER);
@@ -272,6 +273,9 @@ void exact_stride_enter(Exact *exact) {
                       lanes->damping * lanes->damping * sums[VV] +
                           2 * lanes->damping * lanes->omega2 * sums[XV] +
                           lanes->omega2 * lanes->omega2 * sums[XX]);
+    // It may all be gone again by the time that the balance is taken.
+    ledger_held(&exact->ledger, plan->mass[0] * speed * speed / 2);
+    ledger_held(&exact->ledger, plan->stiffness[0] * peaks->displacement * peaks->displacement / 2);
     exact->free_work = 0;
     exact->pending = 0;
     if (exact->phase != FLIGHT) // a contact's work is entered at its end

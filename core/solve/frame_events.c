@@ -49,6 +49,7 @@ static void resume_contact(Frame *frame, size_t d) {
     damper->is_fresh = true;
     ledger_open(&damper->row, IMPACT_IMPACT, frame_time(frame), d, damper->side,
                 fmax(frame_sign(damper->side) * damper->w, 0));
+    damper->row.impact.is_resumed = true;
     ledger_stretch(&frame->ledger, &damper->row, 0, 0, -spring(damper));
 }
 

@@ -73,6 +73,12 @@ void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double
 static inline void ledger_work(Ledger *ledger, double input, double structural_damping) {
     ledger->energy.input += input;
     ledger->energy.structural_damping += structural_damping;
+    ledger->largest_energy = ledger_larger(ledger->largest_energy, fabs(ledger->energy.input));
+}
+
+// So much energy was held at some time, be the balance taken there or not [J].
+static inline void ledger_held(Ledger *ledger, double energy) {
+    ledger->largest_energy = ledger_larger(ledger->largest_energy, energy);
 }
 
 void ledger_balance(Ledger *ledger, const EnergyState *energy);

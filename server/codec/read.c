@@ -3,6 +3,8 @@
 #include "server/codec/read.h"
 
 #include <jansson.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "server/codec/scan.h"
 #include "server/codec/walk.h"
@@ -23,6 +25,7 @@ static Status refuse_parse(Problem *problem, const char *text, size_t size,
     if (position > 0 && json_error_code(error) != json_error_invalid_utf8)
         position--;
     const char *sentence = error->text;
+    char token[sizeof error->text + 80];
     switch (json_error_code(error)) {
     case json_error_out_of_memory:
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
@@ -47,6 +50,13 @@ static Status refuse_parse(Problem *problem, const char *text, size_t size,
         break;
     case json_error_null_byte_in_key:
         sentence = "\\u0000 is not allowed in a key";
+        break;
+    case json_error_invalid_syntax:
+        snprintf(token, sizeof token,
+                 "%s; a number is like 0.5 or 2e-3 (not NaN, .5 or 01), a text stands in quotes",
+                 error->text);
+        if (strncmp(error->text, "invalid token", 13) == 0)
+            sentence = token;
         break;
     default:
         break;

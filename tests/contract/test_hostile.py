@@ -17,33 +17,58 @@ SANITIZED = True
 HOST = b"Host: localhost\r\n"
 GET = b"GET /version HTTP/1.1\r\n"
 POST = b"POST /v1/jobs HTTP/1.1\r\n" + HOST + b"Content-Type: application/json\r\n"
+WAIT = POST + b"Prefer: wait=30\r\n"
 SECOND = GET + HOST + b"\r\n"
 
 
+LIVE = b"GET /health/live HTTP/1.1\r\n" + HOST + b"\r\n"
+
+# What must come is waited for this long [s], however busy the machine; less than the daemon bears an idle connection.
+PATIENCE = 45
+
+
 def connect(daemon):
-    made = socket.create_connection(("127.0.0.1", daemon.port), timeout=10)
+    made = socket.create_connection(("127.0.0.1", daemon.port), timeout=PATIENCE)
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return made
 
 
-def exchange(daemon, data, seconds=0.4):
-    """Sends bytes; returns the replies' statuses, whether the daemon closed, and all it sent."""
+def exchange(daemon, data, ends=False):
+    """Sends bytes, then nothing more if `ends`; returns the statuses of all that the daemon sends until it closes."""
     with connect(daemon) as client:
-        client.sendall(data)
-        client.settimeout(seconds)
-        got, is_closed = b"", False
+        got = b""
         try:
-            while True:
-                piece = client.recv(65536)
-                if not piece:
-                    is_closed = True
-                    break
+            client.sendall(data)
+            if ends:
+                client.shutdown(socket.SHUT_WR)
+            while piece := client.recv(65536):
                 got += piece
         except ConnectionError:
-            is_closed = True
-        except TimeoutError:
             pass
-    return [int(code) for code in re.findall(rb"^HTTP/1\.1 (\d{3}) ", got, re.M)], is_closed, got
+        except TimeoutError:
+            raise AssertionError(("left open", data[:80], got)) from None
+    return [int(code) for code in re.findall(rb"^HTTP/1\.1 (\d{3}) ", got, re.M)], got
+
+
+def converse(daemon, data, count):
+    """Sends bytes; returns the statuses of so many answers and all of them. Then the connection must be open: the next
+    answer is the next request's."""
+    with connect(daemon) as client, client.makefile("rb") as stream:
+        client.sendall(data)
+        statuses, got = [], b""
+        for _ in range(count):
+            head = b""
+            while not head.endswith(b"\r\n\r\n"):
+                line = stream.readline()
+                assert line, ("closed too early", data[:80], got + head)
+                head += line
+            statuses.append(int(head.split()[1]))
+            got += head + stream.read(int(re.search(rb"^Content-Length: (\d+)", head, re.M | re.I)[1]))
+        client.sendall(LIVE + LIVE.replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n"))
+        last = stream.read()
+    assert re.findall(rb"^HTTP/1\.1 (\d{3}) ", last, re.M) == [b"200", b"200"], ("not left open", data[:80], last)
+    assert last.count(b'{"status": "live"}') == 2, ("answered more than was asked", data[:80], got, last)
+    return statuses, got
 
 
 def test_ambiguous_heads_are_refused_and_the_connection_closed():
@@ -90,9 +115,8 @@ def test_ambiguous_heads_are_refused_and_the_connection_closed():
     ]
     with program.daemon() as daemon:
         for expected, head in cases:
-            statuses, is_closed, got = exchange(daemon, head + b"\r\n" + SECOND)
+            statuses, got = exchange(daemon, head + b"\r\n" + SECOND)
             assert b'"engine"' not in got, (head[:80], "a second request was served", got)
-            assert is_closed, (head[:80], "left open", got)
             assert statuses[:1] == [expected], (head[:80], got[:300])
         assert daemon.get("/version").status == 200
 
@@ -103,7 +127,7 @@ def test_garbage_is_not_served():
         for data in (b"garbage\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"GET\r\n\r\n", b"GET /version\r\n\r\n",
                      b"\x00" * 5000, b"\r\n" * 3000, os.urandom(3000), b"GET /version HTTP/1.1 extra\r\n" + HOST + b"\r\n",
                      GET + HOST + b" folded: x\r\n\r\n", GET + b": x\r\n" + HOST + b"\r\n", b"A" * 70000):
-            statuses, _, got = exchange(daemon, data, 0.2)
+            statuses, got = exchange(daemon, data, ends=True)
             assert all(status >= 400 for status in statuses), (data[:60], got)
         assert daemon.get("/version").status == 200
 
@@ -116,19 +140,19 @@ def test_old_and_unusual_but_good_requests_are_served():
                              (GET + b"Host: [::1]:65535\r\n\r\n", False), (GET + b"Host: LocalHost:1\r\n\r\n", False),
                              (b"\r\n" + SECOND, False), (GET + HOST + b"Connection: close\r\n\r\n", True),
                              (GET + HOST + b"Content-Length: 3\r\n\r\nabc", False)):
-            statuses, is_closed, got = exchange(daemon, data)
-            assert statuses == [200] and is_closed == closes, (data, got)
+            statuses, got = exchange(daemon, data) if closes else converse(daemon, data, 1)
+            assert statuses == [200], (data, got)
         half = len(body) // 2
         chunked = b"%x\r\n%s\r\n%x;a=b\r\n%s\r\n0\r\nTrailer: x\r\n\r\n" % (half, body[:half], len(body) - half, body[half:])
-        statuses, _, got = exchange(daemon, POST + b"Transfer-Encoding: chunked\r\n\r\n" + chunked, 2)
+        statuses, got = converse(daemon, WAIT + b"Transfer-Encoding: chunked\r\n\r\n" + chunked, 1)
         assert statuses == [200] and b'"successful"' in got, got
         with connect(daemon) as client:
-            client.sendall(POST + b"Expect: 100-continue\r\nContent-Length: %d\r\n\r\n" % len(body))
+            client.sendall(WAIT + b"Expect: 100-continue\r\nContent-Length: %d\r\n\r\n" % len(body))
             assert client.recv(100).startswith(b"HTTP/1.1 100 "), "the body is asked for"
             client.sendall(body)
             assert client.recv(100).startswith(b"HTTP/1.1 200 ")
-        statuses, is_closed, got = exchange(daemon, POST + b"Expect: 100-continue\r\nContent-Length: 20000000\r\n\r\n")
-        assert statuses == [413] and is_closed, got
+        statuses, got = exchange(daemon, POST + b"Expect: 100-continue\r\nContent-Length: 20000000\r\n\r\n")
+        assert statuses == [413], got
 
 
 def test_pipelined_requests_are_answered_in_order():
@@ -136,33 +160,39 @@ def test_pipelined_requests_are_answered_in_order():
     with program.daemon() as daemon:
         body = json.dumps(program.scene("paper_random_sponge")).encode()
         data = (b"".join(b"GET /v1/materials/m%d HTTP/1.1\r\n" % i + HOST + b"\r\n" for i in range(20))
-                + POST + b"Content-Length: %d\r\n\r\n" % len(body) + body + SECOND)
-        statuses, is_closed, got = exchange(daemon, data, 2)
-        assert statuses == [404] * 20 + [200, 200] and not is_closed, statuses
+                + WAIT + b"Content-Length: %d\r\n\r\n" % len(body) + body + SECOND)
+        statuses, got = converse(daemon, data, 22)
+        assert statuses == [404] * 20 + [200, 200], statuses
         order = [int(i) for i in re.findall(rb'"instance": "/v1/materials/m(\d+)"', got)]
         assert order == list(range(20)), order
         assert got.index(b'"successful"') < got.index(b'"engine"')
+
+
+def usual_time(daemon):
+    """How long 45 of 50 short requests take at most, one after the other [s]."""
+    times = []
+    for _ in range(50):
+        began = time.monotonic()
+        assert daemon.get("/health/live").status == 200
+        times.append(time.monotonic() - began)
+    return sorted(times)[45]
 
 
 def test_slow_and_silent_clients_hold_up_nobody():
     """400 clients who stop in the middle of head or body: others are answered at once, and descriptors come back."""
     with program.daemon() as daemon:
         folder = f"/proc/{daemon.process.pid}/fd"
-        daemon.get("/version")
+        alone = usual_time(daemon)  # says how busy the machine is
         before = len(os.listdir(folder))
         slow = [connect(daemon) for _ in range(400)]
         for i, client in enumerate(slow):
             client.sendall((b"GET /ver", GET + b"X-A: b", POST + b"Content-Length: 100\r\n\r\n{",
                             POST + b"Transfer-Encoding: chunked\r\n\r\n5\r\n{")[i % 4])
-        times = []
-        for _ in range(50):
-            began = time.monotonic()
-            assert daemon.get("/health/live").status == 200
-            times.append(time.monotonic() - began)
-        assert sorted(times)[45] < (2 if program.is_sanitized() else 0.2), times
+        crowded = usual_time(daemon)
+        assert crowded < max(2 if program.is_sanitized() else 0.2, 10 * alone), (crowded, alone)
         for client in slow:
             client.close()
-        end = time.monotonic() + 5
+        end = time.monotonic() + 9  # less than silence is borne
         while len(os.listdir(folder)) > before + 2 and time.monotonic() < end:
             time.sleep(0.05)
         assert len(os.listdir(folder)) <= before + 2, "descriptors are lost"
@@ -175,14 +205,14 @@ def test_a_dripping_head_is_cut_off():
         client.sendall(GET)
         began = time.monotonic()
         try:
-            while time.monotonic() - began < 20:
+            while time.monotonic() - began < 30:
                 client.sendall(b"a")
                 time.sleep(0.3)
             seconds = None
         except OSError:
             seconds = time.monotonic() - began
         client.close()
-        assert seconds is not None and 8 < seconds < 14, seconds
+        assert seconds is not None and 8 < seconds < 20, seconds
 
 
 def test_clients_who_leave_while_waiting():
@@ -191,7 +221,7 @@ def test_clients_who_leave_while_waiting():
     scene.update(sample_rate=10, output={"channels": [], "psd": None})
     with program.daemon("--workers", "1") as daemon:
         def leave(i):
-            body = json.dumps({**scene, "duration": 1e5 + i}).encode()
+            body = json.dumps({**scene, "duration": 2e5 + i}).encode()
             client = connect(daemon)
             client.sendall(POST + b"Prefer: wait=3\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
             time.sleep(0.01 * (i % 5))
@@ -203,18 +233,29 @@ def test_clients_who_leave_while_waiting():
             thread.start()
         for thread in threads:
             thread.join()
-        for _ in range(2):
-            for job in daemon.get("/v1/jobs?limit=100").json()["jobs"]:
-                daemon.request("DELETE", f"/v1/jobs/{job['id']}")
-        time.sleep(3.2)
-        assert daemon.submit(program.scene("paper_free_sponge")).json()["status"] == "successful"
+        def dismiss(but=None):
+            for other in daemon.get("/v1/jobs?limit=100").json()["jobs"]:
+                if other["id"] != but and other["status"] in ("accepted", "running"):
+                    daemon.request("DELETE", f"/v1/jobs/{other['id']}")
+
+        dismiss()
+        time.sleep(3.2)  # nobody is there when their waits end
+        job = daemon.submit(program.scene("paper_free_sponge"), headers={"Prefer": "respond-async"}).json()
+        end = time.monotonic() + PATIENCE
+        while job["status"] in ("accepted", "running") and time.monotonic() < end:
+            dismiss(job["id"])  # also those whose request was still being read
+            job = daemon.get(f"/v1/jobs/{job['id']}?wait=1").json()
+        assert job["status"] == "successful", job
+        others = [other["status"] for other in daemon.get("/v1/jobs?limit=100").json()["jobs"] if other["id"] != job["id"]]
+        assert len(others) == 60 and others.count("dismissed") > 50, others
 
 
 def test_the_number_of_connections_makes_no_stall():
     """Keep-alive connections around multiples of 128: every one is answered, round after round."""
     with program.daemon() as daemon:
+        alone = usual_time(daemon)  # says how busy the machine is
         for count in (127, 128, 129, 256):
-            clients = [http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=10) for _ in range(count)]
+            clients = [http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=PATIENCE) for _ in range(count)]
             began = time.monotonic()
             for _ in range(5):
                 for client in clients:
@@ -222,7 +263,8 @@ def test_the_number_of_connections_makes_no_stall():
                 for client in clients:
                     reply = client.getresponse()
                     assert reply.status == 200 and reply.read() == b'{"status": "live"}\n'
-            assert time.monotonic() - began < (30 if program.is_sanitized() else 5), count
+            took = time.monotonic() - began
+            assert took < max(30 if program.is_sanitized() else 5, 5 * count * alone), (count, took, alone)
             for client in clients:
                 client.close()
 

@@ -1,5 +1,6 @@
 #include "tests/support/doubles.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -22,4 +23,11 @@ double *doubles_read(size_t *count) {
 
 bool doubles_write(const double *values, size_t count) {
     return fwrite(values, sizeof *values, count, stdout) == count && fflush(stdout) == 0;
+}
+
+double doubles_largest(const double *values, size_t count) {
+    double most = 0;
+    for (size_t i = 0; i < count; i++)
+        most = fmax(most, fabs(values[i]));
+    return most;
 }

@@ -11,7 +11,7 @@
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
-static uint64_t draw(Draws *draws) {
+uint64_t draws_bits(Draws *draws) {
     uint64_t z = draws->state += 0x9e3779b97f4a7c15U;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
@@ -19,7 +19,7 @@ static uint64_t draw(Draws *draws) {
 }
 
 double draws_uniform(Draws *draws, double a, double b) {
-    return a + (b - a) * (double)(draw(draws) >> 11) * 0x1p-53;
+    return a + (b - a) * (double)(draws_bits(draws) >> 11) * 0x1p-53;
 }
 
 double draws_scattered(Draws *draws, double a, double b) {
@@ -63,9 +63,9 @@ void drawn_scene(ReferenceScene *scene, uint64_t number, double duration) {
         }
     }
     const double rates[] = {1000, 1000, 1000, 1000, 200, 50, 20, 333, 5000, 1234.5};
-    scene->sample_rate = rates[draw(draws) % COUNT(rates)];
+    scene->sample_rate = rates[draws_bits(draws) % COUNT(rates)];
     scene->duration = duration;
-    scene->base = (ReferenceBase)(draw(draws) % 3);
+    scene->base = (ReferenceBase)(draws_bits(draws) % 3);
     if (scene->base == REFERENCE_STILL || draws_chance(draws, 0.3)) {
         scene->displacement = reach * draws_uniform(draws, -1, 1);
         scene->velocity =
@@ -81,8 +81,9 @@ void drawn_scene(ReferenceScene *scene, uint64_t number, double duration) {
     }
     if (scene->base == REFERENCE_RECORD) {
         const double intervals[] = {1e-3, 0.005, 0.01, 0.0123, 1 / 300.0, 0.0007, 0.02, 0.11};
-        scene->interval = draws_chance(draws, 0.2) ? 1 / scene->sample_rate
-                                                   : intervals[draw(draws) % COUNT(intervals)];
+        scene->interval = draws_chance(draws, 0.2)
+                              ? 1 / scene->sample_rate
+                              : intervals[draws_bits(draws) % COUNT(intervals)];
         const double length =
             draws_chance(draws, 0.4) ? duration * draws_uniform(draws, 0.07, 0.93) : duration + 0.1;
         scene->sample_count = (size_t)(length / scene->interval) + 2;

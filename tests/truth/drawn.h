@@ -13,6 +13,7 @@ typedef struct Draws {
     uint64_t state;
 } Draws;
 
+uint64_t draws_bits(Draws *draws);
 double draws_uniform(Draws *draws, double a, double b);
 double draws_scattered(Draws *draws, double a, double b); // its logarithm is uniform
 bool draws_chance(Draws *draws, double p);

@@ -1,4 +1,4 @@
-// reference_walk.h, compiled twice.
+// The three headers below that have no guard, compiled twice.
 #include "tests/truth/reference.h"
 
 #include <math.h>
@@ -32,6 +32,8 @@ __extension__ typedef __float128 Quad;
 #define real_log logq
 #define REAL_EPSILON ((Quad)1e-34)
 #define CLOSING ((Quad)1e-18)
+#include "tests/truth/reference_polynomial.h"
+#include "tests/truth/reference_start.h"
 #include "tests/truth/reference_walk.h"
 #undef real
 #undef NAME
@@ -54,6 +56,8 @@ __extension__ typedef __float128 Quad;
 #define real_log log
 #define REAL_EPSILON 1.1e-16
 #define CLOSING 1e-14
+#include "tests/truth/reference_polynomial.h"
+#include "tests/truth/reference_start.h"
 #include "tests/truth/reference_walk.h"
 
 void reference_quad(const ReferenceScene *scene, double stride, double most,

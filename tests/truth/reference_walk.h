@@ -1,139 +1,11 @@
-// The body of reference.c for one type `real`; no guard, for it is included once for each.
+// A run of one type `real` from its start to its end; no guard, for reference.c includes it once
+// for each.
 //
 // Between two events and kinks the system is linear with a polynomial or sine input. Its power
 // series is summed over sub-steps so short that the fastest rate turns less than a radian; each is
-// scanned in PARTS pieces, every piece is cut where f''', f'' and f' change sign, and f, monotone
-// then, is bisected with Newton's help. Contact integrals are Gauss's. r is counted from the stop
-// last touched, from mid-clearance before. Contact adds n = N / m_e:
+// searched for its first event. Contact integrals are Gauss's. Contact adds n = N / m_e:
 //   x'' = -a_g - s + share n,  r'' = s - n,  s = (C x' + K x) / M,  n = (c r' + k r) / m_e, or s
 //   while resting.
-// Under zero_force a contact ends where n comes to 0; until the mass is out of the buffer (INSIDE)
-// it flies, and n is what the buffer would press.
-
-typedef enum NAME(Phase) { NAME(FLIGHT), NAME(INSIDE), NAME(CONTACT), NAME(REST) } NAME(Phase);
-
-typedef struct NAME(Series) {
-    int degree;
-    real h, x[TERMS], r[TERMS], g[TERMS], n[TERMS];
-} NAME(Series);
-
-typedef struct NAME(Walk) {
-    const ReferenceScene *scene;
-    ReferenceAnswer *answer;
-    real omega2, damping, share, effective, base_omega, base_amplitude;
-    real contact_omega2[2], contact_damping[2], restitution[2], rate[2], flight_rate;
-    real t, x, v, r, w, origin;
-    real room[2]; // to either stop at r = 0
-    NAME(Phase) phase;
-    int side;
-    int leaving; // the stop whose force has just come to 0, so that only later crossings count; -1:
-                 // none
-    size_t sample; // the next one
-    size_t kink;   // the record's interval
-    real base_speed, last_v;
-    ReferenceImpact open;
-    real peak, impulse, lost;
-    size_t idle;
-    real nodes[NODES], weights[NODES];
-} NAME(Walk);
-
-static real NAME(value)(const real *f, int degree, real s) {
-    real sum = f[degree];
-    for (int i = degree; i-- > 0;)
-        sum = sum * s + f[i];
-    return sum;
-}
-
-static void NAME(derive)(const real *f, int degree, real *out) {
-    for (int i = 0; i < degree; i++)
-        out[i] = (real)(i + 1) * f[i + 1];
-    out[degree] = 0;
-}
-
-// Of f, monotone on [a, b] and of different sign at its ends; f(a) may be 0 but counts as the other
-// sign than f(b).
-static real NAME(root)(const real *f, const real *df, int degree, real a, real b) {
-    const bool is_rising = NAME(value)(f, degree, b) > 0;
-    real s = b, step = b - a, before = step;
-    for (int i = 0; i < 400; i++) {
-        const real here = NAME(value)(f, degree, s), slope = NAME(value)(df, degree, s);
-        if (here == 0)
-            return s;
-        if ((here > 0) == is_rising)
-            b = s;
-        else
-            a = s;
-        // Newton while it stays inside and at least halves its steps.
-        real next = slope != 0 ? s - here / slope : a;
-        if (!(next > a && next < b) || real_abs(2 * here) > real_abs(before * slope))
-            next = (a + b) / 2;
-        before = step;
-        step = next - s;
-        if (real_abs(step) <= REAL_EPSILON * real_abs(next))
-            return next;
-        s = next;
-    }
-    return s;
-}
-
-// The first s in [0, 1] behind which f is negative. f(0) counts as positive; `late` leaves out what
-// is at the start.
-static bool NAME(crossing)(const real *f, int degree, bool late, real *s) {
-    real d[4][TERMS], most = 0;
-    for (int i = 1; i <= degree; i++)
-        most += real_abs(f[i]);
-    if (f[0] > most)
-        return false;
-    if (!late && f[0] <= 0) {
-        int i = 1;
-        while (i < degree && f[i] == 0)
-            i++;
-        if (f[i] < 0) {
-            *s = 0;
-            return true;
-        }
-        if (f[i] == 0)
-            return false;
-    }
-    memcpy(d[0], f, (size_t)(degree + 1) * sizeof *f);
-    real most_slope = 0;
-    for (int i = 0; i < 3; i++)
-        NAME(derive)(d[i], degree, d[i + 1]);
-    for (int i = 0; i < degree; i++)
-        most_slope += real_abs(d[1][i]);
-    for (int part = 0; part < PARTS; part++) {
-        real cuts[16] = {(real)part / PARTS, (real)(part + 1) / PARTS};
-        int count = 2;
-        if (NAME(value)(f, degree, cuts[0]) > most_slope / PARTS)
-            continue;
-        for (int level = 3; level >= 1; level--) {
-            real finer[16];
-            int many = 0;
-            for (int i = 0; i + 1 < count; i++) {
-                finer[many++] = cuts[i];
-                const real left = NAME(value)(d[level], degree, cuts[i]);
-                const real right = NAME(value)(d[level], degree, cuts[i + 1]);
-                if ((left < 0 && right > 0) || (left > 0 && right < 0)) {
-                    real further[TERMS];
-                    NAME(derive)(d[level], degree, further);
-                    finer[many++] = NAME(root)(d[level], further, degree, cuts[i], cuts[i + 1]);
-                }
-            }
-            finer[many++] = cuts[count - 1];
-            memcpy(cuts, finer, sizeof cuts);
-            count = many;
-        }
-        for (int i = 0; i + 1 < count; i++) {
-            if (late && cuts[i + 1] < (real)1e-6)
-                continue;
-            if (NAME(value)(f, degree, cuts[i + 1]) < 0) {
-                *s = NAME(root)(d[0], d[1], degree, cuts[i], cuts[i + 1]);
-                return true;
-            }
-        }
-    }
-    return false;
-}
 
 // a_g and its slope (sine: the cosine part) from time t on, and the next kink.
 static real NAME(base)(NAME(Walk) * walk, real *value, real *slope) {
@@ -206,13 +78,6 @@ static void NAME(series)(const NAME(Walk) * walk, real h, real value, real slope
         x[i + 2] = h2 * over * (walk->share * force - g[i] - s);
         r[i + 2] = walk->phase == NAME(REST) ? 0 : h2 * over * (s - force);
     }
-}
-
-static real NAME(integral)(const real *f, int degree, real s) {
-    real sum = 0;
-    for (int i = degree + 1; i-- > 0;)
-        sum = sum * s + f[i] / (real)(i + 1);
-    return sum * s;
 }
 
 // Peak, impulse and loss of the open contact over the series' part [0, end].
@@ -357,94 +222,6 @@ static void NAME(sample)(NAME(Walk) * walk) {
     walk->last_v = walk->v;
     walk->base_speed = 0;
     walk->sample++;
-}
-
-// At least sqrt(y); rates need no more.
-static real NAME(root_bound)(real y) {
-    return (real)(sqrt((double)y) * (1 + 1e-9));
-}
-
-// Nodes and weights of Gauss and Legendre on [0, 1].
-static void NAME(gauss)(NAME(Walk) * walk) {
-    for (int i = 0; i < NODES; i++) {
-        real z = (real)cos(3.141592653589793 * (i + 0.75) / (NODES + 0.5)), slope = 0;
-        for (int turn = 0; turn < 8; turn++) {
-            real last = 1, here = z;
-            for (int j = 2; j <= NODES; j++) {
-                const real next = ((real)(2 * j - 1) * z * here - (real)(j - 1) * last) / (real)j;
-                last = here, here = next;
-            }
-            slope = (real)NODES * (z * here - last) / (z * z - 1);
-            z -= here / slope;
-        }
-        walk->nodes[i] = (1 + z) / 2;
-        walk->weights[i] = 1 / ((1 - z * z) * slope * slope);
-    }
-}
-
-// (w T_c)^2 under zero_force. With Z = cos a: a / tan a = -ln(e) / 2 and w T_c = 2 a / sin a;
-// beyond critical damping the same with hyperbolic functions.
-static real NAME(zero_force)(real loss, real pi) {
-    const real half = -loss / 2;
-    const bool is_over = half > 1;
-    real low = 0, high = is_over ? half + 1 : pi / 2;
-    if (half == 1)
-        return 4;
-    for (int i = 0; i < 150; i++) {
-        const real a = (low + high) / 2;
-        const real here = is_over ? a * real_cosh(a) / real_sinh(a) : a * real_cos(a) / real_sin(a);
-        if ((here < half) == is_over)
-            low = a;
-        else
-            high = a;
-    }
-    const real turn = (low + high) / (is_over ? real_sinh(low) : real_sin(low));
-    return turn * turn;
-}
-
-static void NAME(start)(NAME(Walk) * walk, const ReferenceScene *scene, ReferenceAnswer *answer) {
-    memset(walk, 0, sizeof *walk);
-    walk->scene = scene;
-    walk->answer = answer;
-    const real M = scene->mass, m = scene->damper_mass;
-    // pi by Machin's formula, since the types have no constant in common.
-    real pi = 0;
-    for (int part = 0; part < 2; part++) {
-        const real z = part == 0 ? (real)1 / 5 : (real)1 / 239;
-        real power = z, sum = 0;
-        for (int i = 0; i < 60; i++, power *= -z * z)
-            sum += power / (real)(2 * i + 1);
-        pi += (part == 0 ? 16 : -4) * sum;
-    }
-    walk->omega2 = (real)scene->stiffness / M;
-    walk->damping = (real)scene->damping / M;
-    walk->share = m / (M + m);
-    walk->effective = M * m / (M + m);
-    if (scene->base == REFERENCE_SINE) {
-        walk->base_omega = 2 * pi * (real)scene->frequency;
-        walk->base_amplitude = scene->amplitude;
-        if (scene->is_amplitude_displacement)
-            walk->base_amplitude *= -walk->base_omega * walk->base_omega;
-    }
-    walk->flight_rate = NAME(root_bound)(walk->omega2) + walk->damping + walk->base_omega;
-    for (int side = 0; side < 2; side++) {
-        walk->restitution[side] = scene->restitution[side];
-        walk->rate[side] = walk->flight_rate;
-        if (scene->is_impulse)
-            continue;
-        const real T = scene->contact_time[side], loss = real_log((real)scene->restitution[side]);
-        const real turn = scene->is_zero_force ? NAME(zero_force)(loss, pi) : pi * pi + loss * loss;
-        walk->contact_omega2[side] = turn / (T * T);
-        walk->contact_damping[side] = -2 * loss / T;
-        walk->rate[side] +=
-            NAME(root_bound)(walk->contact_omega2[side]) + walk->contact_damping[side];
-    }
-    walk->x = scene->displacement, walk->v = scene->velocity;
-    walk->r = scene->position, walk->w = scene->relative_velocity;
-    walk->origin = scene->offset;
-    walk->room[0] = walk->room[1] = (real)scene->clearance / 2;
-    walk->leaving = -1;
-    NAME(gauss)(walk);
 }
 
 // Goes to the series' end or to the first event before it. False where the run must end.

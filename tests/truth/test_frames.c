@@ -13,7 +13,9 @@
 #include <cmocka.h>
 
 #include "core/solve/frame.h"
+#include "tests/support/doubles.h"
 #include "tests/support/frames.h"
+#include "tests/truth/drawn.h"
 #include "tests/truth/frame_reference.h"
 
 static size_t scenes = 16;
@@ -25,30 +27,27 @@ static const double FLOOR = 1e-11;   // what is always allowed
 static const double FACTOR = 100;    // of what one last digit changes
 static const double CHAOTIC = 1e-11; // a scene that a last digit changes more is not judged
 
-static uint64_t random_state;
-static uint64_t draw(void) {
-    uint64_t z = random_state += 0x9e3779b97f4a7c15U;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-    return z ^ (z >> 31);
+static Draws draws;
+static size_t below(size_t count) {
+    return (size_t)(draws_bits(&draws) % count);
 }
 static double uniform(double a, double b) {
-    return a + (b - a) * (double)(draw() >> 11) * 0x1p-53;
+    return draws_uniform(&draws, a, b);
 }
 static double scattered(double a, double b) {
-    return a * pow(b / a, uniform(0, 1));
+    return draws_scattered(&draws, a, b);
 }
 static bool chance(double p) {
-    return uniform(0, 1) < p;
+    return draws_chance(&draws, p);
 }
 
 static const double TURN = 6.283185307179586;
 
-typedef struct Drawn {
+typedef struct DrawnFrame {
     Plan *plan;
     Base base;
     bool is_classical;
-} Drawn;
+} DrawnFrame;
 
 // Not every mass is its own storey's: M has neighbours, C is any positive semi-definite matrix.
 static void couple(Plan *plan) {
@@ -62,11 +61,11 @@ static void couple(Plan *plan) {
         plan->influence[i] = uniform(-0.5, 1.5);
 }
 
-static Drawn scene_draw(uint64_t number) {
-    random_state = number * 0x2545f4914f6cdd1dU;
-    const size_t n = 1 + draw() % 10, m = draw() % 4;
+static DrawnFrame frame_draw(uint64_t number) {
+    draws.state = number * 0x2545f4914f6cdd1dU;
+    const size_t n = 1 + below(10), m = below(4);
     const double rates[] = {1000, 1000, 200, 100, 333};
-    Drawn drawn = {.plan = frames_new(n, m, 2, rates[draw() % 5])};
+    DrawnFrame drawn = {.plan = frames_new(n, m, 2, rates[below(5)])};
     Plan *plan = drawn.plan;
     const double mass = scattered(1, 1000), omega = TURN * scattered(1, 20);
     const double reach = scattered(1e-3, 0.05);
@@ -86,7 +85,7 @@ static Drawn scene_draw(uint64_t number) {
     const bool is_impulse = chance(0.5);
     plan->separation = chance(0.5) ? SEPARATION_ZERO_FORCE : SEPARATION_ZERO_PENETRATION;
     for (size_t d = 0; d < m; d++) {
-        frames_damper(plan, d, draw() % n, mass * scattered(0.01, 2), reach * uniform(0.05, 1),
+        frames_damper(plan, d, below(n), mass * scattered(0.01, 2), reach * uniform(0.05, 1),
                       uniform(0.1, 0.95), is_impulse ? NAN : scattered(1e-3, 0.05));
         PlanDamper *damper = &plan->dampers[d];
         if (chance(0.1))
@@ -100,7 +99,7 @@ static Drawn scene_draw(uint64_t number) {
             damper->stops[1].damping *= uniform(0, 2);
         }
     }
-    const uint64_t base = draw() % 3;
+    const size_t base = below(3);
     for (size_t i = 0; i < n && (base == 0 || chance(0.3)); i++) {
         plan->displacement[i] = reach * uniform(-1, 1);
         plan->velocity[i] = reach * omega * uniform(-0.5, 0.5);
@@ -112,7 +111,7 @@ static Drawn scene_draw(uint64_t number) {
     if (base == 2) {
         const double intervals[] = {1 / plan->sample_rate, 0.01, 0.0123, 0.02};
         drawn.base.form = BASE_SAMPLED;
-        drawn.base.interval = intervals[draw() % 4];
+        drawn.base.interval = intervals[below(4)];
         drawn.base.count = (size_t)(uniform(0.5, 2.5) / drawn.base.interval) + 2;
         drawn.base.values = malloc(drawn.base.count * sizeof *drawn.base.values);
         if (drawn.base.values == NULL)
@@ -126,13 +125,13 @@ static Drawn scene_draw(uint64_t number) {
     return drawn;
 }
 
-static void drawn_clear(Drawn *drawn) {
+static void frame_clear(DrawnFrame *drawn) {
     plan_free(drawn->plan);
     base_clear(&drawn->base);
 }
 
 // The engine's answer in the reference's form.
-static bool engine_run(const Drawn *drawn, FrameTruth *answer, double *residual) {
+static bool engine_run(const DrawnFrame *drawn, FrameTruth *answer, double *residual) {
     static const ChannelId of_storeys[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY,
                                            CHANNEL_ACCELERATION};
     static const ChannelId of_dampers[] = {CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_DAMPER_VELOCITY,
@@ -194,13 +193,6 @@ typedef struct Misses {
     char why[160];
 } Misses;
 
-static double largest(const double *values, size_t count) {
-    double most = 0;
-    for (size_t i = 0; i < count; i++)
-        most = fmax(most, fabs(values[i]));
-    return most;
-}
-
 static void miss(Misses *misses, int metric, double value, double truth, double scale) {
     if ((isnan(truth) && isnan(value)) || value == truth)
         return;
@@ -246,7 +238,7 @@ static void compare(const FrameTruth *answer, const FrameTruth *truth, const Pla
     double scales[METRICS] = {0};
     for (int metric = X; metric <= FORCE; metric++) {
         const size_t rows = metric <= A ? plan->storeys : plan->damper_count;
-        scales[metric] = largest(want[metric], rows * plan->count);
+        scales[metric] = doubles_largest(want[metric], rows * plan->count);
     }
     for (size_t i = 0; i < truth->impact_count; i++) {
         const TruthImpact *impact = &truth->impacts[i];
@@ -306,7 +298,7 @@ static void nudge(Plan *plan) {
 typedef enum Verdict { GOOD, BAD, CHAOS, UNFINISHED } Verdict;
 
 static Verdict judge(uint64_t number) {
-    Drawn drawn = scene_draw(number);
+    DrawnFrame drawn = frame_draw(number);
     const Plan *plan = drawn.plan;
     FrameTruth truth, answer, nudged;
     double residual, other;
@@ -314,7 +306,7 @@ static Verdict judge(uint64_t number) {
     frame_truth(plan, &drawn.base, STEPS_MOST, &truth);
     if (!truth.is_whole) { // bounces within bounces: the engine too would go through millions
         frame_truth_clear(&truth);
-        drawn_clear(&drawn);
+        frame_clear(&drawn);
         return UNFINISHED;
     }
     Verdict verdict = GOOD;
@@ -350,7 +342,7 @@ static Verdict judge(uint64_t number) {
     frame_truth_clear(&truth);
     frame_truth_clear(&answer);
     frame_truth_clear(&nudged);
-    drawn_clear(&drawn);
+    frame_clear(&drawn);
     return verdict;
 }
 

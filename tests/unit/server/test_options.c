@@ -114,6 +114,7 @@ static void every_fault_is_told_under_the_name_that_was_typed(void **state) {
         assert_string_equal(problem.faults[i].pointer, places[i]);
     assert_string_equal(problem.faults[2].did_you_mean, "--quiet");
     assert_string_equal(problem.faults[3].did_you_mean, "high");
+    assert_string_equal(problem.faults[3].detail, "must be one of low, high, is hihg");
     assert_non_null(strstr(problem.faults[0].detail, "100"));
 }
 

@@ -118,6 +118,9 @@ static void times_give_the_interval(void **state) {
           "time_acceleration", 7, 0.00333333333333, 7 * 9.80665);
     bad("Time[s] Accel[g]\n0 1\n0.01 2\n0.02 3\n0.04 4\n0.05 5\n0.06 6\n0.07 7\n", &nothing,
         "line 5", "times must rise evenly: is 0.04 s after 0.02 s, where steps are 0.01 s");
+    // A step that is wrong, but not by an interval, bends the mean more than any before it.
+    bad("0 1\n.01 2\n.02 3\n.03 4\n.04 5\n.05 6\n.06 7\n.075 8\n", &in_g, "line 8",
+        "times must rise evenly: is 0.075 s after 0.06 s, where steps are 0.01 s");
     bad("0 1\n0.01 2\n0.02 3\n\n0.01 4\n0.02 5\n0.03 6\n", &in_g, "line 5", "is 0.01 s after 0.02");
     bad("Time[s] Accel[g]\n0 1\n0.01 2\n0.02\n0.03 4\n", &nothing, "line 4", "has 1");
     bad("0 1 9\n0.01 2 9\n0.02 3 9\n0.03 4 9\n", &whole, "line 4", "two columns");
@@ -158,7 +161,8 @@ static void units_are_found_or_must_be_given(void **state) {
     }
     check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}), "columns", 3, 1, 0.03);
     check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, IMPORT_METRES}), "columns", 3, 1, 3);
-    bad("1\n2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}, "line 1", "must tell the unit, or unit must be given: g, m/s^2");
+    bad("1\n2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}, "line 1",
+        "must tell the unit, or unit must be given: g, m/s^2");
     bad("units (g)\nor m/s^2\nNPTS=2, DT=1\n1 2", &nothing, "line 2",
         "tells another unit than line 1, g");
     bad("VELOCITY TIME HISTORY IN UNITS OF CM/SEC\nNPTS=2, DT=1\n1 2", &nothing, "line 1",
@@ -221,6 +225,10 @@ static void garbage_is_told_with_line_and_column(void **state) {
         bad(text, &whole, rows[i].place, rows[i].detail);
     }
     bad("1 1e308\n", &(ImportRequest){1, IMPORT_G}, "line 1", "finite in m/s^2");
+    // Commas throughout leave no line of numbers to begin with.
+    bad("t, a\n0.00,0.5\n0.01,0.6\n", &whole, "line 2, column 1", "blanks separate them");
+    bad("a motion\nof Nov 5, 1999\n", &whole, "line 2, column 8", "must be a number");
+    bad("a motion\nof words\n", &whole, "line 2", "must hold a line of numbers up to here");
 }
 
 static void what_is_no_text_is_refused(void **state) {

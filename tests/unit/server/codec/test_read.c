@@ -269,7 +269,7 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
     check_unreadable("{\"mass\": 1", "/mass",
                      "line 1, column 10: the document ends before it is complete");
     check_unreadable("{\"left\": {\n  \"stiffness\": NaN}}", "/left/stiffness",
-                     "line 2, column 18: invalid token near 'NaN'");
+                     "line 2, column 18: invalid token near 'NaN'; a number is like 0.5");
     check_unreadable("{\"mass\": 1e400}", "/mass", "line 1, column 14: the number is too large");
     check_unreadable("{\"parts\": [{}, {\"damping\": 123456789012345678901}]}", "/parts/1/damping",
                      "line 1, column 48: the number is too large");
