@@ -30,7 +30,7 @@ static const Field study_fields[] = {
 };
 
 const Field tradeoff_error_fields[] = {
-    FIELD_REAL(TradeoffErrors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error_estimate where that is larger"),
+    FIELD_REAL(TradeoffErrors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),
     FIELD_REAL(TradeoffErrors, mean_acceleration, NULL, ANY, OPTIONAL, "rms of the difference over rms within the horizon"),
     FIELD_REAL(TradeoffErrors, peak_force, NULL, ANY, OPTIONAL, "difference of the largest contact force within the horizon, of that force; unknown where impacts have no force"),
     FIELD_REAL(TradeoffErrors, impacts, NULL, ANY, OPTIONAL, "impacts within the horizon, how many more or fewer"),
@@ -62,7 +62,7 @@ const Field tradeoff_point_fields[] = {
 
 static const Field reference_fields[] = {
     FIELD_TEXT(TradeoffReference, solver, 0, PRESENCE_OPTIONAL, 0, "solver that the points are compared with"),
-    FIELD_REAL(TradeoffReference, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement"),
+    FIELD_REAL(TradeoffReference, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
     FIELD_REAL(TradeoffReference, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
     FIELD_COUNT(TradeoffReference, impacts, NULL, AT_LEAST(0), OPTIONAL, "its impacts within the horizon"),
     FIELD_REAL(TradeoffReference, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),

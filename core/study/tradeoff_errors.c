@@ -14,6 +14,13 @@ static double ratio(double difference, double whole) {
     return difference == 0 ? 0 : (double)NAN;
 }
 
+// How far the reference itself is off in the samples compared: an estimate for the whole run says
+// nothing of those before the horizon, which is where it passes RESPONSE_PARTING.
+static double own_error(const Summary *reference) {
+    return isnan(reference->trust_horizon) ? reference->error_estimate
+                                           : fmin(reference->error_estimate, RESPONSE_PARTING);
+}
+
 // Samples of the reference that can be compared.
 static size_t samples_within(const Outcome *reference) {
     const double horizon = reference->summary.trust_horizon;
@@ -155,7 +162,7 @@ void errors_reference(const Compared *reference, TradeoffReference *told) {
     const double horizon = outcome->summary.trust_horizon;
     const Within within =
         ledger_within(&outcome->response.impacts, isnan(horizon) ? (double)INFINITY : horizon);
-    told->error_estimate = outcome->summary.error_estimate;
+    told->error_estimate = own_error(&outcome->summary);
     told->trust_horizon = horizon;
     told->impacts = within.impacts;
     told->peak_force = within.peak;
@@ -185,7 +192,7 @@ TradeoffErrors errors_measure(const Compared *reference, const Compared *point) 
     if (count > 1) {
         // Nothing closer than the reference itself can be told.
         errors.displacement =
-            fmax(displacement_error(reference, point, count), from->summary.error_estimate);
+            fmax(displacement_error(reference, point, count), own_error(&from->summary));
         errors.mean_acceleration = acceleration_error(reference, point, count);
     }
     const double horizon =

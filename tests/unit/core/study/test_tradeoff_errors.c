@@ -73,6 +73,11 @@ static void samples_are_compared_within_the_horizon_only(void **state) {
     assert_true(fabs(measure(&a, &b).displacement - 0.5 / largest) < 1e-15);
     a.summary.trust_horizon = 0.005; // before the first sample after 0: nothing to compare
     assert_true(isnan(measure(&a, &b).displacement));
+    // What the reference is off by behind the horizon says nothing of what is before it.
+    a.summary.trust_horizon = 0.3;
+    a.summary.error_estimate = 1;
+    b.response.series.at[0].values[20] -= 0.25;
+    assert_true(measure(&a, &b).displacement == RESPONSE_PARTING);
     b.summary.rms_displacement = 1.5; // of the whole run, whatever the horizon
     assert_true(measure(&a, &b).rms_displacement == 0.5);
     outcome_free(&a);
