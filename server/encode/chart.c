@@ -135,8 +135,7 @@ static void put_style(Bytes *bytes) {
     bytes_text(bytes,
                "<style>\n"
                "svg { font: 12px system-ui, sans-serif; color-scheme: light dark; }\n"
-               ".page { fill: #ffffff; } text { fill: #222222; } .halo { paint-order: stroke; "
-               "stroke: #ffffff; stroke-width: 4; stroke-opacity: 0.85; }\n"
+               ".page { fill: #ffffff; } text { fill: #222222; }\n"
                ".grid { stroke: #dddddd; fill: none; } .frame { stroke: #777777; fill: none; }\n"
                ".best { stroke: #222222; stroke-opacity: 0.28; stroke-width: 6; fill: none; "
                "stroke-linejoin: round; }\n"
@@ -149,7 +148,7 @@ static void put_style(Bytes *bytes) {
     bytes_text(bytes, "@media (prefers-color-scheme: dark) {\n"
                       ".page { fill: #16181c; } text { fill: #e4e4e4; } .grid { stroke: #363a41; } "
                       ".frame { stroke: #8a8f98; }\n"
-                      ".best, .wanted, .ring { stroke: #f2f2f2; } .halo { stroke: #16181c; }\n");
+                      ".best, .wanted, .ring { stroke: #f2f2f2; }\n");
     for (size_t i = 0; i < GROUPS; i++)
         bytes_format(bytes, ".mark.s%zu { fill: %s; } .line.s%zu { stroke: %s; }\n", i, dark[i], i,
                      dark[i]);
@@ -234,17 +233,6 @@ static void put_wanted(const Chart *chart) {
                      y_of(chart, error), right);
 }
 
-// Above the marks, on the page's colour.
-static void put_wanted_label(const Chart *chart) {
-    const double error = chart->tradeoff->error;
-    if (error > 0)
-        bytes_format(chart->bytes,
-                     "<text class=\"halo\" x=\"%.0f\" y=\"%.1f\" "
-                     "text-anchor=\"end\">wanted %.3g%s</text>\n",
-                     right - 6, y_of(chart, error) - 6, error,
-                     tradeoff_metric_units[chart->tradeoff->metric]);
-}
-
 static void put_point(Chart *chart, const TradeoffPoint *point) {
     Bytes *bytes = chart->bytes;
     const size_t group = group_of(chart, point);
@@ -301,6 +289,13 @@ static void put_legend(const Chart *chart) {
     bytes_format(bytes, "<path class=\"best\" d=\"M%.0f %.0fh16\"/>", right + 10, y);
     bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\">best of all</text>\n", right + 32, y + 4);
     y += 22;
+    const double error = chart->tradeoff->error;
+    if (error > 0) {
+        bytes_format(bytes, "<path class=\"wanted\" d=\"M%.0f %.0fh16\"/>", right + 10, y);
+        bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\">wanted: %.3g%s</text>\n", right + 32,
+                     y + 4, error, tradeoff_metric_units[chart->tradeoff->metric]);
+        y += 22;
+    }
     bytes_format(bytes, "<circle class=\"ring\" cx=\"%.0f\" cy=\"%.0f\" r=\"7\"/>", right + 18, y);
     bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\">to take</text>\n", right + 32, y + 4);
 }
@@ -354,7 +349,6 @@ void chart_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
         if (is_drawn(&chart, &tradeoff->points.at[i]))
             put_point(&chart, &tradeoff->points.at[i]);
     put_choice(&chart);
-    put_wanted_label(&chart);
     put_legend(&chart);
     bytes_text(bytes, "</svg>\n");
 }
