@@ -146,6 +146,11 @@ static double make_scale(Adaptive *own) {
         const double wide = sqrt(frame_dot(damper->shape, damper->shape, n)) * own->speed;
         const double speed =
             fmax(fabs(damper->w), damper->phase == FRAME_CONTACT ? 1e-3 * wide : wide);
+        // Not far from a stop the mass may be back at once, and the integrator finds a root to a
+        // part of its step alone.
+        const double pull = fabs(own->rates[at_r(frame) + m + d]);
+        if (damper->phase == FRAME_FLIGHT && damper->origin != FRAME_FROM_MIDDLE && pull > 0)
+            time = fmin(time, (fabs(damper->w) + sqrt(2 * pull * fabs(damper->r))) / pull);
         w[d] = speed;
         r[d] = fmax(damper->plan->clearance, speed * frame->interval);
         if (damper->phase == FRAME_CONTACT) {
@@ -181,7 +186,18 @@ static Status start(Adaptive *own) {
     }
     own->at = 0;
     own->events = frame->events;
+    rate(own, 0, own->y, own->rates);
     return ode_start(own->ode, own->y, own->scale, make_scale(own), frame->problem);
+}
+
+// Has the gap of a mass released from rest opened beyond rounding yet?
+static void leave(Frame *frame, FrameDamper *damper) {
+    if (frame_sign((Side)damper->origin) * damper->r < 0) {
+        damper->leaving = 0;
+        return;
+    }
+    damper->r = damper->w = 0;
+    frame->events++; // the motion begins anew
 }
 
 // The frame's state becomes y; what was summed up goes where it belongs.
@@ -198,6 +214,8 @@ static void take(Adaptive *own, double length) {
         double work = y[sums + m + d] - before[sums + m + d];
         damper->r = r[d];
         damper->w = r[m + d];
+        if (damper->leaving > 0)
+            leave(frame, damper);
         if (damper->phase == FRAME_CONTACT) {
             const ContactForce force = steps_contact(frame, d, damper->r, damper->w);
             ledger_force(&frame->ledger, &damper->row, fabs(force.value));
@@ -225,22 +243,33 @@ static FrameEvent event_of(const Frame *frame, size_t d, int which) {
 // push.
 static bool find_beyond(Frame *frame, FrameEvent *event) {
     for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
+        FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         if (damper->phase == FRAME_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
             *event = event_of(frame, d, FIRST);
             return true;
         }
-        if (damper->phase == FRAME_RESTING && sign * damper->force < 0) {
+        // An acceleration that may be rounding alone.
+        const double noise =
+            64 * DBL_EPSILON *
+            (damper->reach * frame_size(frame) + fabs(damper->lean * frame->ground));
+        if (damper->phase == FRAME_RESTING &&
+            sign * damper->force < -noise * damper->effective_mass) {
             *event = event_of(frame, d, FIRST);
             event->is_jump = true;
             return true;
         }
         for (int side = 0; side < 2 && damper->phase == FRAME_FLIGHT; side++) {
-            const double toward = frame_sign((Side)side);
-            if (frame_room(damper, (Side)side) - toward * damper->r > 0 ||
-                !(toward * damper->w > 0))
+            const double toward = frame_sign((Side)side), speed = toward * damper->w;
+            if (frame_room(damper, (Side)side) - toward * damper->r > 0)
                 continue;
+            // A flight that is over before the clock tells: the mass is back as fast as it went.
+            const double pull = toward * frame_acceleration(frame, d);
+            const bool is_back = speed <= 0 && -2 * speed < pull * frame_clock(frame) &&
+                                 (damper->leaving == 0 || pull > noise);
+            if (!(speed > 0 || is_back || damper->plan->clearance == 0))
+                continue;
+            damper->w = is_back ? -damper->w : damper->w;
             *event = event_of(frame, d, side);
             return true;
         }
@@ -274,8 +303,12 @@ static Status advance(Adaptive *own, double length) {
     int root;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &own->slice);
     frame->ground = own->slice.value;
-    if (own->events != frame->events)
+    if (own->events != frame->events) {
+        frame_feel(frame);
+        if (find_beyond(frame, &event))
+            return happen(frame, &event);
         TRY(start(own));
+    }
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
@@ -285,7 +318,7 @@ static Status advance(Adaptive *own, double length) {
     take(own, taken);
     frame->offset += taken;
     frame->ground = slice_at(&own->slice, taken);
-    if (taken > 0)
+    if (taken > frame_clock(frame))
         frame->still_events = 0;
     TRY(steps_note(
         steps, adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making)));
@@ -317,7 +350,7 @@ static Status adaptive_cross(Steps *steps, double length) {
 }
 
 static Status adaptive_make(Steps *steps) {
-    const Frame *frame = &steps->frame;
+    Frame *frame = &steps->frame;
     const size_t m = frame->dampers;
     Adaptive *own = calloc(1, sizeof *own);
     steps->own = own;
@@ -343,6 +376,10 @@ static Status adaptive_make(Steps *steps) {
     own->rates = own->scale + own->size;
     own->force = own->rates + own->size;
     own->strain = own->force + m;
+    // A mass that starts on a stop may touch it at t = 0.
+    FrameEvent event;
+    for (frame_feel(frame); find_beyond(frame, &event); frame_feel(frame))
+        TRY(happen(frame, &event));
     return STATUS_OK;
 }
 

@@ -158,9 +158,13 @@ static bool meet(Steps *steps, double length) {
         if (is_resting || is_pair)
             continue;
         damper->contact = stops_freeze(&damper->plan->stops[damper->side], closing);
-        const double parting = damper->contact.restitution * closing;
+        // The speed at the stop, without what has been gained beyond it: or bounces would not die
+        // away. `closing` is that of now, for momentum is kept.
+        const double pull = sign * frame_acceleration(frame, d);
+        const double square = closing * closing - 2 * pull * depth(damper, damper->side);
+        const double parting = damper->contact.restitution * sqrt(fmax(square, 0));
         // A flight that is over within a step: it rests from now on.
-        damper->is_fresh = 2 * parting < sign * frame_acceleration(frame, d) * length;
+        damper->is_fresh = 2 * parting < pull * length;
         damper->is_bounced = true;
         damper->parting = damper->is_fresh ? 0 : parting;
     }

@@ -36,9 +36,10 @@ static double contact_time(const PlanDamper *damper, const PlanStop *stop, doubl
     if (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER)
         return stop->contact.duration *
                pow(mass * speed * speed / at.stiffness, 1 / (at.exponent + 1)) / speed;
-    const double omega = sqrt(at.stiffness / mass), ratio = at.damping / (2 * mass * omega);
+    const Identified found =
+        identify_given(mass, at.stiffness, at.damping, (Separation)stop->contact.separation);
     // An overdamped one is as fast as its damping.
-    return ratio < 1 ? TURN / 2 / omega : TURN / 2 * mass / at.damping;
+    return isfinite(found.contact_time) ? found.contact_time : mass / at.damping;
 }
 
 double steps_contact_time(const Plan *plan) {

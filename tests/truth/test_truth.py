@@ -15,6 +15,14 @@ SLIGHT = 1e-9              # of the largest approach speed: how many of those th
 RESIDUAL = 1e-9            # of the largest energy
 FIRST_IMPACT, FIRST_IMPACT_ERROR = 0.0416214083419515, 1e-13  # [s]
 SCENES = 13
+FIRST = 21                 # truths in the first second: later on errors have grown to the motion's own size
+# Settings, error allowed there, and how often the stated error may be missed: across contacts it is chance.
+STEPPING = {
+    "precise": ({"step": 1e-5}, 0.03, 3),
+    "rk4": ({"step": 1e-5}, 0.03, 3),
+    "newmark": ({"step": 1e-5}, 0.03, 3),
+    "adaptive": ({"tolerance": 1e-12}, 1e-8, 1.5),
+}
 
 
 def cases():
@@ -122,6 +130,29 @@ def test_daemon_tells_the_truth():
             return job, daemon.get(result + "/series.json").json(), daemon.get(result + "/impacts.json").json()
 
         judge(by_daemon)
+
+
+def test_solvers_that_step_say_how_far_they_are_off():
+    """Each solver that steps meets all 13 scenes within a few times the error it states, and its own allowance."""
+    print(f"      {'measured (stated)':26}" + "".join(f"{solver:>22}" for solver in STEPPING))
+    faults = []
+    for name, truth in cases():
+        row = f"      {name:26}"
+        for solver, (settings, allowed, times) in STEPPING.items():
+            job, series, _ = by_program(dict(truth["scene"], accuracy=dict(settings, solver=solver)))
+            step = round(truth["interval"] * series["sample_rate"])
+            pairs = list(zip(series["channels"]["displacement"]["values"][::step], truth["displacement"]))
+            most = max(abs(true) for _, true in pairs)
+            error = max(abs(one - true) for one, true in pairs) / most
+            first = max(abs(one - true) for one, true in pairs[:FIRST]) / most
+            stated = job["summary"]["error_estimate"]
+            row += f"{f'{error:.2g} ({stated:.2g})':>22}"
+            if not error <= times * stated:
+                faults.append(f"{name} by {solver}: off by {error:.3g}, says {stated:.3g}")
+            if not first <= allowed:
+                faults.append(f"{name} by {solver}: off by {first:.3g} in its first second, allowed is {allowed}")
+        print(row)
+    assert not faults, "\n" + "\n".join(faults)
 
 
 def test_comparison_can_fail():
