@@ -73,7 +73,7 @@ static const Field reference_fields[] = {
 };
 
 static const Field choice_fields[] = {
-    FIELD_COUNT(TradeoffChoice, point, NULL, AT_LEAST(1), OPTIONAL, "number of the cheapest point that keeps the error, from 1; unknown: none does; follows from measured times"),
+    FIELD_COUNT(TradeoffChoice, point, NULL, AT_LEAST(1), OPTIONAL, "number of the point, from 1: the cheapest that keeps the error, or the closest that takes at most 1.25 times as long; unknown: none keeps it; follows from measured times"),
     FIELD_TEXT(TradeoffChoice, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_END
 };

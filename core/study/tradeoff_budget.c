@@ -11,22 +11,30 @@ SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits
     return own;
 }
 
-// Steps of one solver cost as many as there are: making ready a large structure once for each
-// solver is enough.
 void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double *steps) {
-    size_t first = 0; // of this solver's
-    double cost = 0;
+    Plan *plan;
+    if (plan_new(&simulation->scene, "", "", &plan, NULL) != STATUS_OK)
+        plan = NULL; // without memory: each point by itself
+    for (size_t i = 0; i < points->count; i++)
+        steps[i] = ladder_cost(simulation, plan, &points->at[i]);
+    plan_free(plan);
+}
+
+size_t budget_trim(TradeoffPoints *points, double *steps, double most) {
+    size_t count = 0;
     for (size_t i = 0; i < points->count; i++) {
-        const TradeoffPoint *point = &points->at[i], *other = &points->at[first];
-        const bool is_alike = i > 0 && strcmp(point->solver, other->solver) == 0 &&
-                              !isnan(point->step) == !isnan(other->step) &&
-                              (!isnan(point->step) || !isnan(point->tolerance));
-        if (!is_alike) {
-            first = i;
-            cost = ladder_cost(simulation, point);
+        TradeoffPoint *point = &points->at[i];
+        const bool is_finer = count > 0 && !isnan(point->step) && steps[i] > most &&
+                              steps[count - 1] > most &&
+                              strcmp(point->solver, points->at[count - 1].solver) == 0;
+        if (is_finer) {
+            fields_clear(tradeoff_point_fields, point);
+            continue;
         }
-        steps[i] = is_alike && !isnan(point->step) ? cost * other->step / point->step : cost;
+        points->at[count] = *point;
+        steps[count++] = steps[i];
     }
+    return points->count = count;
 }
 
 double budget_timed(const TradeoffStudy *study, double steps) {

@@ -14,6 +14,10 @@ SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits
 // Foretold steps of one run of each point.
 void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double *steps);
 
+// Leaves out the steps that are finer than one that takes more than `most`. Returns how many points
+// are left.
+size_t budget_trim(TradeoffPoints *points, double *steps, double most);
+
 // A point whose run takes so many steps, with its timings.
 double budget_timed(const TradeoffStudy *study, double steps);
 

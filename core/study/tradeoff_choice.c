@@ -1,10 +1,14 @@
-// Cost is the smallest CPU time: what disturbs a run makes it longer, never shorter.
+// Cost is the smallest CPU time: what disturbs a run makes it longer, never shorter. Even so times
+// that are nearly alike change places from one measurement to the next: among those the closest is
+// taken.
 #include "core/study/tradeoff_choice.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+static const double alike = 1.25; // times as long is no longer than the cheapest, measured again
 
 static bool has_both(const TradeoffPoint *point, int metric) {
     return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum) &&
@@ -56,6 +60,18 @@ static const TradeoffPoint *cheapest(const TradeoffPoints *points, int metric, d
     return found;
 }
 
+// The closest of those that take hardly longer than `cpu`.
+static const TradeoffPoint *closest_of_alike(const TradeoffPoints *points, int metric, double cpu,
+                                             const TradeoffPoint *found) {
+    for (size_t i = 0; i < points->count; i++) {
+        const TradeoffPoint *point = &points->at[i];
+        if (has_both(point, metric) && point->cpu_minimum <= alike * cpu &&
+            tradeoff_error(&point->errors, metric) < tradeoff_error(&found->errors, metric))
+            found = point;
+    }
+    return found;
+}
+
 static const TradeoffPoint *closest(const TradeoffPoints *points, int metric) {
     const TradeoffPoint *found = NULL;
     for (size_t i = 0; i < points->count; i++) {
@@ -79,15 +95,24 @@ Status choice_make(const TradeoffPoints *points, int metric, double error, Trade
         return say(choice, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name,
                    error, unit, near->name, tradeoff_error(&near->errors, metric), unit);
     }
+    const TradeoffPoint *first = taken;
+    taken = closest_of_alike(points, metric, first->cpu_minimum, first);
     choice->point = (uint64_t)(taken - points->at) + 1;
     const double reached = tradeoff_error(&taken->errors, metric);
+    const double cpu = taken->cpu_minimum;
+    if (taken != first)
+        return say(choice,
+                   "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than the "
+                   "cheapest, %s, %.2g%s in %.3g s",
+                   taken->name, name, error, unit, reached, unit, cpu, first->name,
+                   tradeoff_error(&first->errors, metric), unit, first->cpu_minimum);
     const TradeoffPoint *next = cheapest(points, metric, error, taken);
     if (next == NULL)
         return say(choice, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
-                   taken->name, name, error, unit, reached, unit, taken->cpu_minimum);
+                   taken->name, name, error, unit, reached, unit, cpu);
     return say(choice,
                "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the next, %s, "
                "takes %.3g times as long",
-               taken->name, name, error, unit, reached, unit, taken->cpu_minimum, next->name,
-               next->cpu_minimum / taken->cpu_minimum);
+               taken->name, name, error, unit, reached, unit, cpu, next->name,
+               next->cpu_minimum / cpu);
 }

@@ -57,30 +57,28 @@ static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char
 
 static const double pi = 3.14159265358979324;
 
-// The shortest contact that a stop's numbers tell [s]; NAN: none is known.
-static double contact_time(const Derived *derived, const Buffer *buffer) {
-    double shortest = derived->contact_time;
-    if (isnan(shortest) && derived->stiffness > 0)
-        shortest = pi * sqrt(derived->effective_mass / derived->stiffness);
+// The shortest contact that a buffer's numbers tell, about, for a free mass [s]; NAN: none.
+static double contact_time(const Buffer *buffer, double mass) {
+    double shortest = buffer->contact_time;
+    if (isnan(shortest) && buffer->stiffness > 0)
+        shortest = pi * sqrt(mass / buffer->stiffness);
     for (size_t i = 0; i < buffer->table.count; i++)
         shortest = fmin(shortest, buffer->table.at[i].contact_time);
     return shortest;
 }
 
 // What the finest step is to resolve [s].
-static Status finest_step(const Simulation *simulation, double *finest, Problem *problem) {
+static Status finest_step(const Simulation *simulation, double *finest) {
     StructureRates rates;
-    PlanReport report;
     TRY(structure_rates(scene_structure(&simulation->scene), &rates));
-    TRY(simulation_plan(simulation, &report, problem));
     *finest = rates.fastest > 0 ? radian_part / rates.fastest : (double)INFINITY;
-    for (size_t i = 0; i < report.derived.count; i++) {
-        const Derived *derived = &report.derived.at[i];
-        const Damper *damper = &simulation->scene.dampers.at[derived->damper - 1];
-        const Buffer *buffer = damper_buffer(damper, (Side)derived->side);
-        *finest = fmin(*finest, contact_part * contact_time(derived, buffer));
+    for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
+        const Damper *damper = &simulation->scene.dampers.at[i];
+        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
+            const Buffer *buffer = damper_buffer(damper, (Side)side);
+            *finest = fmin(*finest, contact_part * contact_time(buffer, damper->mass));
+        }
     }
-    fields_clear(plan_report_fields, &report);
     return STATUS_OK;
 }
 
@@ -191,8 +189,7 @@ Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, Tra
                    Problem *problem) {
     double finest;
     *points = (TradeoffPoints){NULL, 0};
-    TRY(finest_step(simulation, &finest, problem));
-    bool is_whole = true;
+    bool is_whole = finest_step(simulation, &finest) == STATUS_OK;
     for (size_t i = 0; solvers[i] != NULL && is_whole; i++)
         if (solvers[i]->run != NULL && is_asked(study, solvers[i]->kind.name))
             is_whole = add_solver(points, &solvers[i]->kind, simulation, finest);
@@ -302,13 +299,13 @@ bool ladder_has_force(const Simulation *simulation) {
            dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
 }
 
-double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
+double ladder_cost(const Simulation *simulation, const Plan *plan, const TradeoffPoint *point) {
     Simulation view = *simulation; // borrows all but what the point changes
     view.accuracy = NULL;
     if (apply_solver(point, &view) != STATUS_OK)
         return 0; // a guess without memory: the run will tell
     apply_output(point, &view);
-    const double steps = simulation_cost(&view).steps;
+    const double steps = simulation_cost_planned(&view, plan).steps;
     variant_free(view.accuracy);
     return steps;
 }

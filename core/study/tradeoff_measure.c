@@ -229,7 +229,8 @@ Status tradeoff_measure(const TradeoffStudy *study, const Simulation *simulation
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
     if (status == STATUS_OK) {
         budget_foretell(simulation, &answer->points, session.steps);
-        for (size_t i = 0; i < count; i++)
+        const size_t left = budget_trim(&answer->points, session.steps, session.limits.steps);
+        for (size_t i = 0; i < left; i++)
             if (session.steps[i] <= session.limits.steps)
                 session.all += budget_timed(study, session.steps[i]);
         status = measure_all(&session, problem);

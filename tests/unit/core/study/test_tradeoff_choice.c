@@ -84,10 +84,23 @@ static void the_cheapest_that_keeps_the_error_is_taken(void **state) {
     free(choice.why);
 }
 
+static void of_times_that_are_nearly_alike_the_closest_is_taken(void **state) {
+    (void)state;
+    TradeoffPoint all[] = {point("coarse", 1, 1e-4), point("exact", 1.2, 1e-12),
+                           point("closer still", 1.3, 1e-14), point("far", 0.9, 1)};
+    TradeoffPoints points = {all, COUNT(all)};
+    TradeoffChoice choice = {COUNT_ABSENT, NULL};
+    assert_int_equal(choice_make(&points, TRADEOFF_DISPLACEMENT, 1e-3, &choice), STATUS_OK);
+    assert_int_equal(choice.point, 2);
+    assert_non_null(strstr(choice.why, "hardly longer than the cheapest, coarse"));
+    free(choice.why);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_point_is_best_if_none_is_both_cheaper_and_closer),
         cmocka_unit_test(what_was_not_measured_is_neither_best_nor_taken),
+        cmocka_unit_test(of_times_that_are_nearly_alike_the_closest_is_taken),
         cmocka_unit_test(the_cheapest_that_keeps_the_error_is_taken),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
