@@ -1,5 +1,5 @@
-// Two things a run can leave: the time to which rounding lets its trajectory be the scene's own,
-// and the approach speeds at which its buffers were measured. The second is counted from the
+// Two things a run can leave: the time to which rounding, or the solver's steps, let its trajectory
+// be the scene's own, and the approach speeds at which its buffers were measured. The second is counted from the
 // ledger, which holds every impact of a run that succeeds.
 #include "core/simulation/caution.h"
 
@@ -34,6 +34,22 @@ static Status warn_of_horizon(Outcome *outcome) {
                         "displacement by %g of its largest value, and from there on only "
                         "statistics hold",
                         outcome->summary.trust_horizon, RESPONSE_PARTING);
+}
+
+// What steps are wrong by is not rounding's.
+static Status warn_of_steps(Outcome *outcome) {
+    const Summary *summary = &outcome->summary;
+    if (isnan(summary->error_estimate))
+        return warnings_add(&outcome->warnings, "/accuracy",
+                            "the error of these steps is not known: the run beside this one that "
+                            "would tell it came to no end");
+    if (summary->error_estimate <= RESPONSE_PARTING)
+        return STATUS_OK;
+    return warnings_add(&outcome->warnings, "/accuracy",
+                        "with these steps the displacement is wrong by about %.2g of its largest "
+                        "value%s: shorter steps, or the solver exact, are closer",
+                        summary->error_estimate,
+                        summary->error_estimate > 0.1 ? ", and only statistics hold" : "");
 }
 
 // The approach speeds that one stop met.
@@ -92,6 +108,6 @@ static Status warn_of_tables(const Scene *scene, const Impacts *impacts, Warning
 }
 
 Status caution_warn(const Scene *scene, Outcome *outcome) {
-    TRY(warn_of_horizon(outcome));
+    TRY(outcome->response.is_stepped ? warn_of_steps(outcome) : warn_of_horizon(outcome));
     return warn_of_tables(scene, &outcome->response.impacts, &outcome->warnings);
 }

@@ -13,7 +13,10 @@ static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
     frame_engine_take_sample(engine);
     frame_neighbour_start(neighbour, engine);
     while (frame->sample + 1 < plan->count) {
-        TRY(frame_engine_step(engine));
+        const size_t next = (frame->sample / NEIGHBOUR_SAMPLES + 1) * NEIGHBOUR_SAMPLES;
+        const size_t until = next < plan->count - 1 ? next : plan->count - 1;
+        while (frame->sample < until)
+            TRY(frame_engine_step(engine, until));
         frame_neighbour_step(neighbour, frame);
     }
     frame_neighbour_tell(neighbour, frame, frame->ledger.response);

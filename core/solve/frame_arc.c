@@ -22,21 +22,23 @@ static void powers(size_t degree, double s, double *power, double *slope) {
 }
 
 Status frame_arc_room(FrameArc *arc, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, m = frame->dampers;
-    arc->block = calloc((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m + ARC_RULES * NODES * ROW,
-                        sizeof *arc->block);
+    const size_t n = frame->padded, m = frame->dampers;
+    arc->block = calloc(
+        frame_lanes_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m + ARC_RULES * NODES * ROW),
+        sizeof *arc->block);
     if (arc->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    arc->q = arc->block;
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
+                           frame->storeys);
+    arc->q = frame_lanes_start(arc->block);
     arc->work = arc->q + (ROW + 1) * n; // an order more is written than is kept
     arc->r = arc->work + (NODES + 2) * n;
     arc->force = arc->r + ROW * m;
     arc->slopes = arc->force + ROW * m + m;
     for (size_t kind = 0; kind < ARC_RULES; kind++) {
         const Quadrature *rule = &arc_rules[kind];
-        for (size_t j = 0; j < rule->count; j++) {
+        for (size_t node = 0; node < rule->count; node++) {
             double power[ROW];
-            powers(ROOT_DEGREE, rule->node[j], power, arc->slopes + (kind * NODES + j) * ROW);
+            powers(ROOT_DEGREE, rule->node[node], power, arc->slopes + (kind * NODES + node) * ROW);
         }
     }
     return STATUS_OK;
@@ -46,44 +48,39 @@ void frame_arc_clear(FrameArc *arc) {
     free(arc->block);
 }
 
-// The elastic forces e_k of modes that damping does not couple, and -scale (e_k + share a_k).
-static void diagonal_order(size_t n, const double *restrict viscous, const double *restrict omega2,
-                           const double *restrict share, const double *restrict q, double per_time,
-                           double base, double scale, double *restrict elastic,
-                           double *restrict after) {
-    for (size_t i = 0; i < n; i++) {
-        elastic[i] = viscous[i] * (per_time * q[n + i]) + omega2[i] * q[i];
-        after[i] = -scale * (elastic[i] + share[i] * base);
-    }
-}
-
-// The elastic forces e_k of all modes, and what q_{k+2} is without the dampers.
+// The elastic forces e_k of all modes, what q_{k+2} is without the dampers, and what pushes these.
 static void elastic_order(FrameArc *arc, const Frame *frame, size_t k, double scale, double *speed,
-                          double *elastic) {
-    const size_t n = frame->storeys;
-    const double *q = arc->q + k * n, *share = frame->modes->participation;
-    const double per_time = (double)(k + 1) / arc->length, base = arc->base[k];
-    double *after = arc->q + (k + 2) * n;
-    if (frame->diagonal != NULL) {
-        diagonal_order(n, frame->diagonal, frame->omega2, share, q, per_time, base, scale, elastic,
-                       after);
-        return;
+                          double *elastic, double *push) {
+    const size_t n = frame->padded;
+    const double *q = arc->q + k * n;
+    const FrameOrder order = {.padded = n,
+                              .dampers = frame->dampers,
+                              .viscous = frame->diagonal,
+                              .omega2 = frame->omega2,
+                              .share = frame->share,
+                              .shapes = frame->shapes,
+                              .q = q,
+                              .per_time = (double)(k + 1) / arc->length,
+                              .base = arc->base[k],
+                              .scale = scale,
+                              .elastic = elastic,
+                              .after = arc->q + (k + 2) * n,
+                              .push = push};
+    if (frame->diagonal == NULL) {
+        for (size_t i = 0; i < n; i++)
+            speed[i] = order.per_time * q[n + i];
+        frame_elastic(frame, q, speed, elastic);
     }
-    for (size_t i = 0; i < n; i++)
-        speed[i] = per_time * q[n + i];
-    frame_elastic(frame, q, speed, elastic);
-    for (size_t i = 0; i < n; i++)
-        after[i] = -scale * (elastic[i] + share[i] * base);
+    frame->lanes->order(&order);
 }
 
-// N of order k of all dampers, from the orders of r up to k + 1 and from e_k.
-static void forces(FrameArc *arc, const Frame *frame, size_t k, const double *elastic,
-                   double *push) {
+// N of order k of all dampers, from the orders of r up to k + 1 and from shape . e_k.
+static void forces(FrameArc *arc, const Frame *frame, size_t k, double *push) {
     const size_t m = frame->dampers;
     for (size_t d = 0; d < m; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double *r = arc->r + d * ROW;
-        push[d] = damper->lean * arc->base[k] + frame_dot(damper->shape, elastic, frame->storeys);
+        push[d] += damper->lean * arc->base[k];
         arc->force[d * ROW + k] =
             damper->phase == FRAME_CONTACT
                 ? damper->contact.stiffness * r[k] +
@@ -100,7 +97,7 @@ static void forces(FrameArc *arc, const Frame *frame, size_t k, const double *el
 
 // What the dampers do to order k + 2.
 static void answer(FrameArc *arc, const Frame *frame, size_t k, double scale, const double *push) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->padded, m = frame->dampers;
     double *restrict after = arc->q + (k + 2) * n;
     for (size_t d = 0; d < m; d++) {
         const double force = arc->force[d * ROW + k] * scale, *shape = frame->damper[d].shape;
@@ -115,7 +112,7 @@ static void answer(FrameArc *arc, const Frame *frame, size_t k, double scale, co
 }
 
 void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, double length) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->padded, m = frame->dampers;
     arc->length = length;
     arc->rho = length * fmax(frame_rate(frame), slice->omega);
     arc->degree = arc_degree(arc->rho);
@@ -133,8 +130,8 @@ void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, doubl
     }
     for (size_t k = 0; k < arc->degree; k++) {
         const double scale = length * length / (double)((k + 1) * (k + 2));
-        elastic_order(arc, frame, k, scale, speed, elastic);
-        forces(arc, frame, k, elastic, push);
+        elastic_order(arc, frame, k, scale, speed, elastic, push);
+        forces(arc, frame, k, push);
         if (k + 2 <= arc->degree)
             answer(arc, frame, k, scale, push);
     }
@@ -143,8 +140,8 @@ void frame_arc_make(FrameArc *arc, const Frame *frame, const Slice *slice, doubl
 void frame_arc_cut(FrameArc *arc, const Frame *frame, double s) {
     double power = 1;
     for (size_t k = 0; k <= arc->degree; k++, power *= s) {
-        for (size_t i = 0; i < frame->storeys; i++)
-            arc->q[k * frame->storeys + i] *= power;
+        for (size_t i = 0; i < frame->padded; i++)
+            arc->q[k * frame->padded + i] *= power;
         for (size_t d = 0; d < frame->dampers; d++) {
             arc->r[d * ROW + k] *= power;
             if (k < arc->degree)
@@ -156,34 +153,15 @@ void frame_arc_cut(FrameArc *arc, const Frame *frame, double s) {
     arc->rho *= s;
 }
 
-// Several modes at once, whose sums stay in registers; small terms first, and by powers rather than
-// Horner's scheme, where s is 1.
-static inline void state_of(const FrameArc *arc, Frame *frame, size_t i, size_t many,
-                            const double *power, const double *slope) {
-    const size_t n = frame->storeys;
-    double q[MODES] = {0}, p[MODES] = {0};
-    for (size_t k = arc->degree; k > 0; k--) {
-        const double *order = arc->q + k * n + i;
-        for (size_t j = 0; j < many; j++) {
-            q[j] += power[k] * order[j];
-            p[j] += slope[k] * order[j];
-        }
-    }
-    for (size_t j = 0; j < many; j++) {
-        frame->q[i + j] = q[j] + arc->q[i + j];
-        frame->p[i + j] = p[j] / arc->length;
-    }
-}
-
 void frame_arc_state(const FrameArc *arc, Frame *frame, double s) {
-    const size_t n = frame->storeys;
-    double power[ROW], slope[ROW];
+    const size_t n = frame->padded;
+    double factors[2 * ROW], *const power = factors, *const slope = factors + ROW;
+    // Small terms first, and by powers rather than Horner's scheme, where s is 1.
     powers(arc->degree, s, power, slope);
-    size_t i = 0;
-    for (; i + MODES <= n; i += MODES)
-        state_of(arc, frame, i, MODES, power, slope);
-    for (; i < n; i++)
-        state_of(arc, frame, i, 1, power, slope);
+    frame->lanes->series(n, arc->degree, arc->q, 2, factors, ROW, arc->work);
+    memcpy(frame->q, arc->work, n * sizeof *arc->work);
+    for (size_t i = 0; i < n; i++)
+        frame->p[i] = arc->work[n + i] / arc->length;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         if (damper->phase == FRAME_RESTING)
@@ -210,68 +188,41 @@ static double slope_of(const FrameArc *arc, const double *series, const double *
     return frame_dot(series + 1, slope + 1, arc->degree);
 }
 
-// Speeds of `many` modes at two nodes, times the arc's length.
-static inline void speeds_of(const FrameArc *arc, size_t n, size_t i, size_t many,
-                             const double *slope, double *out) {
-    double a[MODES] = {0}, b[MODES] = {0};
-    for (size_t k = 1; k <= arc->degree; k++) {
-        const double *order = arc->q + k * n + i;
-        for (size_t j = 0; j < many; j++) {
-            a[j] += slope[k] * order[j];
-            b[j] += slope[ROW + k] * order[j];
-        }
-    }
-    for (size_t j = 0; j < many; j++) {
-        out[i + j] = a[j];
-        out[n + i + j] = b[j];
-    }
-}
-
-// Those of all modes at the nodes of a rule, node after node.
-static void speeds(const FrameArc *arc, size_t n, const Quadrature *rule, double *out) {
-    const double *slope = node_slopes(arc, rule);
-    for (size_t node = 0; node < rule->count; node += 2, slope += 2 * ROW) {
-        size_t i = 0;
-        for (; i + MODES <= n; i += MODES)
-            speeds_of(arc, n, i, MODES, slope, out + node * n);
-        for (; i < n; i++)
-            speeds_of(arc, n, i, 1, slope, out + node * n);
-    }
-}
-
-// p . D p; `force` is scratch.
-static double damping_power(const Frame *frame, const double *p, double *restrict force) {
-    const size_t n = frame->storeys;
+// p . D p at all nodes.
+static void damping_power(const Frame *frame, const double *p, size_t count, double *scratch,
+                          double *power) {
+    const size_t n = frame->padded;
     if (frame->diagonal != NULL) {
-        for (size_t i = 0; i < n; i++)
-            force[i] = frame->diagonal[i] * p[i];
-        return frame_dot(force, p, n);
+        frame->lanes->weigh(n, count, frame->diagonal, p, power);
+        return;
     }
-    memset(force, 0, n * sizeof *force);
-    for (size_t k = 0; k < n; k++)
-        for (size_t i = 0; i < n; i++)
-            force[i] += frame->damping[k * n + i] * p[k];
-    return frame_dot(force, p, n);
+    for (size_t j = 0; j < count; j++, p += n) {
+        frame->lanes->multiply(frame->coupled, n, p, frame->storeys + frame->storeys % 2, scratch);
+        frame->lanes->dot(n, 1, scratch, p, &power[j]);
+    }
 }
 
 FrameWork frame_arc_work(const FrameArc *arc, const Frame *frame) {
     FrameWork work = {0, 0, arc->length * arc_integral(arc->base, arc->base_degree)};
     if (!(arc->length > 0))
         return work;
-    const size_t n = frame->storeys;
+    const size_t n = frame->padded;
     const Quadrature *rule = arc_quadrature(arc->rho);
-    double *p = arc->work, *force = arc->work + NODES * n;
-    speeds(arc, n, rule, p);
-    for (size_t j = 0; j < rule->count; j++, p += n) {
-        work.damping += rule->weight[j] * damping_power(frame, p, force) / arc->length;
-        const double a = root_value(arc->base, arc->base_degree, rule->node[j]);
-        if (a == 0)
-            continue;
-        double momentum = frame_dot(frame->carry, p, n);
+    const double *slopes = node_slopes(arc, rule);
+    double *p = arc->work, power[NODES], momentum[NODES]; // times the arc's length
+    frame->lanes->series(n, arc->degree, arc->q, rule->count, slopes, ROW, p);
+    damping_power(frame, p, rule->count, p + NODES * n, power);
+    for (size_t j = 0; j < rule->count; j++)
+        work.damping += rule->weight[j] * power[j] / arc->length;
+    if (arc->base[0] == 0 && arc->base[1] == 0)
+        return work;
+    frame->lanes->dot(n, rule->count, frame->carry, p, momentum);
+    for (size_t j = 0; j < rule->count; j++) {
         for (size_t d = 0; d < frame->dampers; d++)
-            momentum += frame->damper[d].plan->mass *
-                        slope_of(arc, frame_arc_r(arc, d), node_slopes(arc, rule) + j * ROW);
-        work.input -= rule->weight[j] * a * momentum;
+            momentum[j] +=
+                frame->damper[d].plan->mass * slope_of(arc, frame_arc_r(arc, d), slopes + j * ROW);
+        work.input -=
+            rule->weight[j] * root_value(arc->base, arc->base_degree, rule->node[j]) * momentum[j];
     }
     return work;
 }

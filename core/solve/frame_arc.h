@@ -13,7 +13,7 @@ typedef struct FrameArc {
     size_t degree;                // of q and r; forces have one less
     double base[ROOT_DEGREE + 1]; // a_g
     size_t base_degree;           // no coefficient of a_g beyond it
-    double *q;                    // order after order, each of all modes
+    double *q;                    // order after order, `padded` values each
     double *r, *force;            // damper after damper, ROOT_DEGREE + 1 each; force is N
     double *work;                 // modes x nodes of a quadrature
     double *slopes;               // of s^k at the nodes of all rules

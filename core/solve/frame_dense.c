@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TERMS = 22, NODES = 8 };
+enum { TERMS = 22, NODES = 8, WATCH_PRODUCTS = 1000000 };
 
 typedef long double Real;
 
@@ -26,6 +26,7 @@ typedef struct Work {
     Real *series; // of one column: TERMS x storeys
     Real *speeds; // node after node, column after column, of all modes
     Real *pulls;  // D times those of one column
+    size_t done;  // products since the watch was asked
 } Work;
 
 // Coefficients in t / h of a_g for a unit of value or of slope.
@@ -44,6 +45,38 @@ static void base_series(const Work *work, bool is_slope, Real *a) {
     }
 }
 
+// Before so many products.
+static bool goes_on(Work *work, size_t products) {
+    const Frame *frame = work->frame;
+    if ((work->done += products) < WATCH_PRODUCTS)
+        return true;
+    work->done = 0;
+    return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
+}
+
+// Four sums, so that none waits long for the one before.
+static Real dot(const double *row, const Real *values, size_t count) {
+    Real sum[4] = {0, 0, 0, 0};
+    size_t i = 0;
+    for (; i + 4 <= count; i += 4)
+        for (size_t j = 0; j < 4; j++)
+            sum[j] += row[i + j] * values[i + j];
+    for (; i < count; i++)
+        sum[0] += row[i] * values[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+static Real dot_long(const Real *row, const Real *values, size_t count) {
+    Real sum[4] = {0, 0, 0, 0};
+    size_t i = 0;
+    for (; i + 4 <= count; i += 4)
+        for (size_t j = 0; j < 4; j++)
+            sum[j] += row[i + j] * values[i + j];
+    for (; i < count; i++)
+        sum[0] += row[i] * values[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
 // Of all freedoms.
 static void accelerate(const Work *work, const Real *at, const Real *speed, Real base, Real *out) {
     const Frame *frame = work->frame;
@@ -54,10 +87,7 @@ static void accelerate(const Work *work, const Real *at, const Real *speed, Real
                         : contact->contact.stiffness * at[n] + contact->contact.damping * speed[n];
     Real push = 0;
     for (size_t i = 0; i < n; i++) {
-        const double *row = frame->damping + i * n;
-        Real elastic = frame->omega2[i] * at[i];
-        for (size_t l = 0; l < n; l++)
-            elastic += row[l] * speed[l];
+        const Real elastic = frame->omega2[i] * at[i] + dot(frame->damping + i * n, speed, n);
         out[i] = -elastic - frame->modes->participation[i] * base;
         if (contact == NULL)
             continue;
@@ -104,11 +134,13 @@ static Real slope_at(const Real *c, size_t stride, Real s) {
     return sum;
 }
 
-// T over h, and the speeds of all columns at the nodes.
-static void make_small(Work *work, const Quadrature *rule) {
+// T over h, and the speeds of all columns at the nodes. False: cancelled.
+static bool make_small(Work *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size;
     memset(work->T, 0, size * size * sizeof *work->T);
     for (size_t j = 0; j < size; j++) {
+        if (!goes_on(work, TERMS * n * n))
+            return false;
         column_series(work, j);
         for (size_t i = 0; i < n; i++) {
             const Real *c = work->series + i;
@@ -131,10 +163,11 @@ static void make_small(Work *work, const Quadrature *rule) {
         work->T[B * size + A] = -work->T[A * size + B];
         work->T[B * size + B] = work->T[A * size + A];
     }
+    return true;
 }
 
-// F, C and G over h.
-static void make_forms(Work *work, const Quadrature *rule) {
+// F, C and G over h. False: cancelled.
+static bool make_forms(Work *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size, modes = work->modes;
     const Real viscous = work->contact == NULL ? 0 : work->contact->contact.damping;
     const double *damping = work->frame->damping;
@@ -150,24 +183,16 @@ static void make_forms(Work *work, const Quadrature *rule) {
             base[row] = value_at(a, 1, rule->node[node]);
         }
         for (size_t j = 0; j < size; j++) {
-            const Real *p = speeds + j * n;
-            Real share = 0;
-            for (size_t i = 0; i < n; i++)
-                share += work->share[i] * p[i];
-            for (size_t i = 0; i < modes; i++) {
-                Real sum = 0;
-                for (size_t l = 0; l < modes; l++)
-                    sum += damping[i * modes + l] * p[l];
-                work->pulls[i] = sum;
-            }
+            const Real *p = speeds + j * n, share = dot_long(work->share, p, n);
+            if (!goes_on(work, 2 * n * n))
+                return false;
+            for (size_t i = 0; i < modes; i++)
+                work->pulls[i] = dot(damping + i * modes, p, modes);
             work->G[j] += weight * base[0] * share;
             work->G[size + j] += weight * base[1] * share;
             for (size_t k = 0; k <= j; k++) {
                 const Real *other = speeds + k * n;
-                Real sum = 0;
-                for (size_t i = 0; i < modes; i++)
-                    sum += other[i] * work->pulls[i];
-                work->F[k * size + j] += weight * sum;
+                work->F[k * size + j] += weight * dot_long(other, work->pulls, modes);
                 work->C[k * size + j] += weight * viscous * other[n - 1] * p[n - 1];
             }
         }
@@ -177,17 +202,23 @@ static void make_forms(Work *work, const Quadrature *rule) {
             work->F[j * size + k] = work->F[k * size + j];
             work->C[j * size + k] = work->C[k * size + j];
         }
+    return true;
 }
 
-// out += a b.
-static void add_product(const Real *a, const Real *b, size_t rows, size_t size, Real *out) {
-    for (size_t i = 0; i < rows; i++)
+// out += a b. False: cancelled.
+static bool add_product(Work *work, const Real *a, const Real *b, size_t rows, Real *out) {
+    const size_t size = work->size;
+    for (size_t i = 0; i < rows; i++) {
+        if (!goes_on(work, size * size))
+            return false;
         for (size_t k = 0; k < size; k++) {
             const Real factor = a[i * size + k];
             if (factor != 0)
                 for (size_t j = 0; j < size; j++)
                     out[i * size + j] += factor * b[k * size + j];
         }
+    }
+    return true;
 }
 
 static void transpose(Real *matrix, size_t size) {
@@ -199,51 +230,55 @@ static void transpose(Real *matrix, size_t size) {
         }
 }
 
-// form += (I + T)' form (I + T).
-static void form_twice(Work *work, Real *form) {
+// form += (I + T)' form (I + T). False: cancelled.
+static bool form_twice(Work *work, Real *form) {
     const size_t size = work->size;
     Real *T = work->T, *product = work->product;
     memcpy(product, form, size * size * sizeof *product);
-    add_product(form, T, size, size, product); // form E
+    if (!add_product(work, form, T, size, product)) // form E
+        return false;
     transpose(T, size);
     for (size_t i = 0; i < size * size; i++)
         form[i] += product[i];
-    add_product(T, product, size, size, form);
+    const bool is_whole = add_product(work, T, product, size, form);
     transpose(T, size);
+    return is_whole;
 }
 
-// Everything over twice the time.
-static void twice(Work *work) {
+// Everything over twice the time. False: cancelled.
+static bool twice(Work *work) {
     const size_t size = work->size, A = 2 * work->n, bytes = size * size * sizeof(Real);
     Real *T = work->T, *product = work->product;
     memcpy(product, work->G, 2 * size * sizeof *product);
-    add_product(work->G, T, 2, size, product);
+    if (!add_product(work, work->G, T, 2, product))
+        return false;
     for (size_t row = 0; row < 2; row++)
         for (size_t s = 0; s < 2; s++) {
             const Real factor = T[(A + s) * size + A + row] + (s == row ? 1 : 0);
             for (size_t j = 0; j < size; j++)
                 work->G[row * size + j] += factor * product[s * size + j];
         }
-    form_twice(work, work->F);
-    if (work->contact != NULL)
-        form_twice(work, work->C);
+    if (!form_twice(work, work->F) || (work->contact != NULL && !form_twice(work, work->C)))
+        return false;
     memcpy(product, T, bytes);
     for (size_t i = 0; i < size * size; i++)
         product[i] *= 2;
-    add_product(T, T, size, size, product);
+    if (!add_product(work, T, T, size, product))
+        return false;
     memcpy(T, product, bytes);
     work->h *= 2;
+    return true;
 }
 
 static void fill(FrameDense *dense, const Work *work) {
-    const size_t size = work->size, rows = 2 * work->n;
+    const size_t size = work->size, gains = 2 * work->n;
     for (size_t j = 0; j < size; j++) {
-        for (size_t i = 0; i < rows; i++)
-            dense->gain[j * rows + i] = (double)work->T[i * size + j];
+        for (size_t i = 0; i < gains; i++)
+            dense->gain[j * dense->rows + i] = (double)work->T[i * size + j];
         for (size_t i = 0; i < size; i++)
-            dense->loss[j * size + i] = (double)work->F[i * size + j];
+            dense->loss[j * dense->rows + i] = (double)work->F[i * size + j];
         for (size_t i = 0; i < size && dense->contact != NULL; i++)
-            dense->contact[j * size + i] = (double)work->C[i * size + j];
+            dense->contact[j * dense->rows + i] = (double)work->C[i * size + j];
         for (size_t row = 0; row < 2; row++)
             dense->input[row][j] = (double)work->G[row * size + j];
     }
@@ -254,15 +289,16 @@ static double rate_of(const Frame *frame) {
 }
 
 static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
-    const size_t size = 2 * freedoms + 2, square = size * size;
-    dense->block = malloc((2 * freedoms * size + 2 * square + 2 * size) * sizeof *dense->block);
+    const size_t size = 2 * freedoms + 2, rows = frame_lanes_padded(size);
+    dense->block = calloc((is_contact ? 3 : 2) * rows * size + 2 * size, sizeof *dense->block);
     if (dense->block == NULL)
         return STATUS_NO_MEMORY;
     dense->freedoms = freedoms;
     dense->size = size;
+    dense->rows = rows;
     dense->gain = dense->block;
-    dense->loss = dense->gain + 2 * freedoms * size;
-    dense->input[0] = dense->loss + square;
+    dense->loss = dense->gain + rows * size;
+    dense->input[0] = dense->loss + rows * size;
     dense->input[1] = dense->input[0] + size;
     dense->contact = is_contact ? dense->input[1] + size : NULL;
     return STATUS_OK;
@@ -274,9 +310,8 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
     for (; work->h * rate_of(frame) > 0.5L; work->h /= 2)
         left++;
     const Quadrature *rule = arc_quadrature(0.5);
-    make_small(work, rule);
-    make_forms(work, rule);
-    for (;; left--) {
+    bool is_whole = make_small(work, rule) && make_forms(work, rule);
+    for (; is_whole; left--) {
         if (left < levels) {
             if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
                 return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
@@ -285,11 +320,9 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
         }
         if (left == 0)
             return STATUS_OK;
-        if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
-            return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                               frame_time(frame));
-        twice(work);
+        is_whole = twice(work);
     }
+    return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s", frame_time(frame));
 }
 
 Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
@@ -329,17 +362,10 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
     return status;
 }
 
-void frame_dense_add(const double *matrix, size_t rows, const double *y, size_t size, double *out) {
-    for (size_t j = 0; j < size; j++)
-        for (size_t i = 0; i < rows; i++)
-            out[i] += matrix[j * rows + i] * y[j];
-}
-
-double frame_dense_form(const double *form, const double *y, size_t size) {
-    double sum = 0;
-    for (size_t j = 0; j < size; j++)
-        sum += y[j] * frame_dot(form + j * size, y, size);
-    return sum;
+double frame_dense_form(const FrameDense *dense, const FrameLanes *lanes, const double *form,
+                        const double *y, double *scratch) {
+    lanes->multiply(form, dense->rows, y, dense->size, scratch);
+    return frame_dot(y, scratch, dense->size);
 }
 
 void frame_dense_clear(FrameDense *dense) {

@@ -4,6 +4,7 @@
 #ifndef CORE_SOLVE_FRAME_DENSE_H
 #define CORE_SOLVE_FRAME_DENSE_H
 
+#include "core/solve/frame_lanes.h"
 #include "core/solve/frame_state.h"
 
 // Over y = (q, r, p, w, value, slope), the last two being the base's at the start; r and w are
@@ -11,8 +12,9 @@
 typedef struct FrameDense {
     size_t freedoms;  // modes, and 1 in contact
     size_t size;      // 2 freedoms + 2
-    double *gain;     // what (q, r, p, w) gains: for each component of y a column of 2 freedoms
-    double *loss;     // size x size, symmetric: y' loss y is lost in the structure
+    size_t rows;      // of the matrices, filled up with zeros: each component of y has a column
+    double *gain;     // what (q, r, p, w) gains
+    double *loss;     // symmetric: y' loss y is lost in the structure
     double *contact;  // likewise: in the contact; NULL in flight
     double *input[2]; // -(value input[0] + slope input[1]) . y is the base's work on the structure,
                       // and on the damper in contact
@@ -26,9 +28,8 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
                         const FrameDamper *contact, Problem *problem);
 void frame_dense_clear(FrameDense *dense);
 
-// out += matrix y, column after column.
-void frame_dense_add(const double *matrix, size_t rows, const double *y, size_t size, double *out);
-// y' form y.
-double frame_dense_form(const double *form, const double *y, size_t size);
+// y' form y; `scratch` holds `rows` values.
+double frame_dense_form(const FrameDense *dense, const FrameLanes *lanes, const double *form,
+                        const double *y, double *scratch);
 
 #endif

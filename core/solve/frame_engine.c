@@ -8,7 +8,13 @@
 #include <float.h>
 #include <math.h>
 
-enum { STILL_EVENTS = 1000, FLIGHT_WORK = 8, PRESS_WORK = 64, PRESS_STEPS = 32 };
+enum {
+    STILL_EVENTS = 1000,
+    STORM_EVENTS = 100,
+    FLIGHT_WORK = 8,
+    PRESS_WORK = 64,
+    PRESS_STEPS = 32
+};
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
@@ -38,14 +44,14 @@ Status frame_engine_check(FrameEngine *engine) {
     return STATUS_OK;
 }
 
-// Counts a step of about `each` multiplications per mode. In steps of the single engine it is one
+// Counts steps of about `each` multiplications per mode. In steps of the single engine it is one
 // for each mode and damper, as simulation_cost foresees.
-static Status count_step(FrameEngine *engine, double each) {
+static Status count_steps(FrameEngine *engine, double count, double each) {
     const Frame *frame = &engine->frame;
     const double n = (double)frame->storeys, m = (double)frame->dampers;
     const double pairs = frame->diagonal != NULL ? 0 : n * n;
-    frame->run->steps += n * (1 + m) + pairs / 4;
-    engine->work += each * (n * (1 + m) + pairs);
+    frame->run->steps += count * (n * (1 + m) + pairs / 4);
+    engine->work += count * each * (n * (1 + m) + pairs);
     return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
 }
 
@@ -96,6 +102,11 @@ static void pass(FrameEngine *engine, const FrameEvent *hit) {
     frame_arc_state(arc, frame, 1);
     frame->offset += arc->length;
     frame->still_events = 0;
+    frame->storm_time += arc->length;
+    if (frame->storm_time > frame_clock(frame)) {
+        frame->storm_events = 0;
+        frame->storm_time = 0;
+    }
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->is_fresh = false;
@@ -107,6 +118,7 @@ static void pass(FrameEngine *engine, const FrameEvent *hit) {
 static Status happen(Frame *frame, const FrameEvent *event) {
     const size_t most = STILL_EVENTS * frame->dampers;
     frame->events++;
+    frame->storm_events++;
     if (++frame->still_events > most)
         return problem_set(frame->problem, STATUS_UNSTABLE,
                            "more than %zu contact events at one instant, t = %.17g s", most,
@@ -134,7 +146,7 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     if (step.is_event)
         TRY(happen(frame, &step.event));
     frame->run->steps += PRESS_STEPS; // it takes as long as so many arcs
-    return count_step(engine, PRESS_WORK);
+    return count_steps(engine, 1, PRESS_WORK);
 }
 
 // A long step of contact. False: it must go by arcs.
@@ -154,6 +166,20 @@ static bool hold(FrameEngine *engine, const Slice *slice, double length) {
     return true;
 }
 
+// Masses that touch and part at one instant again and again do so by rounding alone: between stops
+// without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
+// is longer each time, until the motion itself decides. (Impulses close such series themselves.)
+static bool is_stalled(Frame *frame) {
+    if (frame->storm_events < STORM_EVENTS * frame->dampers ||
+        frame->plan->form == CONTACT_IMPULSIVE)
+        return false;
+    const double now = frame_time(frame);
+    const bool goes_on = now - frame->stalled_at <= 4 * frame->stall;
+    frame->stall = fmax(goes_on ? 2 * frame->stall : 0, frame_clock(frame));
+    frame->stalled_at = now;
+    return true;
+}
+
 // One arc, at most `length` long, up to its end or the first event.
 static Status advance(FrameEngine *engine, double length) {
     Frame *frame = &engine->frame;
@@ -164,17 +190,20 @@ static Status advance(FrameEngine *engine, double length) {
     if (frame_ode_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
     if (hold(engine, &slice, fmin(length, knot)))
-        return count_step(engine, PRESS_WORK);
-    frame_arc_make(arc, frame, &slice, fmin(fmin(length, knot), arc_most(frame, &slice)));
+        return count_steps(engine, 1, PRESS_WORK);
+    const bool stays = is_stalled(frame);
+    const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
+    frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
     FrameEvent event;
-    const bool is_event = frame_find_event(frame, arc, &event);
+    const bool is_event = frame_find_event(frame, arc, &event) &&
+                          !(stays && event.s * arc->length <= frame_clock(frame));
     if (is_event)
         frame_arc_cut(arc, frame, event.s * arc->length < SHORTEST ? 0 : event.s);
     if (arc->length > 0)
         pass(engine, is_event ? &event : NULL);
     if (is_event)
         TRY(happen(frame, &event));
-    return count_step(engine, 2 * (double)arc->degree);
+    return count_steps(engine, 1, 2 * (double)arc->degree);
 }
 
 Status frame_engine_cross(FrameEngine *engine, double length) {
@@ -194,21 +223,54 @@ Status frame_engine_cross(FrameEngine *engine, double length) {
     return STATUS_OK;
 }
 
-// The whole interval in one step. False: it must go by arcs.
-static bool fly(FrameEngine *engine) {
+// a_g over whole intervals from the present sample on; returns over how many it has no kinks.
+static size_t find_slices(const Frame *frame, size_t count, Slice *slices) {
+    size_t found = 0;
+    for (; found < count; found++) {
+        if (found > 0 && frame->base.base->form == BASE_SINE) {
+            const Slice *last = &slices[found - 1];
+            slices[found] = (Slice){last->value * frame->turned[0] + last->slope * frame->turned[1],
+                                    last->slope * frame->turned[0] - last->value * frame->turned[1],
+                                    last->omega};
+        } else if (!base_cursor_interval(&frame->base, frame->sample + found, &slices[found]))
+            break;
+    }
+    return found;
+}
+
+// Whole intervals at once, up to sample `until`, and writes them down. Returns how many; 0: it must
+// go by arcs.
+static size_t fly(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
-    Slice slice;
+    FrameRecord *record = &engine->record;
+    Slice slices[TRAIL_MOST];
     FrameWork work;
-    if (engine->flight.length == 0 || !base_cursor_interval(&frame->base, frame->sample, &slice))
-        return false;
     for (size_t d = 0; d < frame->dampers; d++)
         if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
-            return false;
-    if (!frame_flight_step(&engine->flight, frame, &slice, frame->is_shadow ? NULL : &work))
-        return false;
-    if (!frame->is_shadow)
-        take_work(engine, &work);
-    return true;
+            return 0;
+    size_t count = until - frame->sample;
+    if (count > TRAIL_MOST)
+        count = TRAIL_MOST;
+    // Statistics begin with a stretch.
+    if (frame->sample + 1 < record->statistics_start &&
+        frame->sample + count >= record->statistics_start)
+        count = record->statistics_start - 1 - frame->sample;
+    count = engine->flight.length == 0 ? 0 : find_slices(frame, count, slices);
+    if (count > 0)
+        count = frame_flight_run(&engine->flight, &engine->trail, frame, slices, count,
+                                 frame->is_shadow ? NULL : &work);
+    frame->sample += count;
+    if (count == 0 || frame->is_shadow)
+        return count;
+    frame->ground = base_cursor_at(&frame->base, frame->sample);
+    ledger_work(&frame->ledger, work.input, work.damping);
+    FrameTrail *trail = &engine->trail;
+    frame_trail_feel(trail, frame, count);
+    if (frame->sample + 1 - count == record->statistics_start)
+        frame_record_forget(frame);
+    frame_record_take(record, frame, count);
+    frame_record_flight_peaks(record, frame, count);
+    return count;
 }
 
 Status frame_engine_settle(FrameEngine *engine) {
@@ -226,6 +288,13 @@ Status frame_engine_settle(FrameEngine *engine) {
     return STATUS_OK;
 }
 
+static void balance(Frame *frame) {
+    if (frame->is_shadow || frame->sample % 64 != 0)
+        return;
+    const EnergyState energy = frame_energy(frame);
+    ledger_balance(&frame->ledger, &energy);
+}
+
 void frame_engine_take_sample(FrameEngine *engine) {
     Frame *frame = &engine->frame;
     if (frame->is_shadow)
@@ -234,23 +303,23 @@ void frame_engine_take_sample(FrameEngine *engine) {
     frame_feel(frame);
     if (frame->sample == engine->record.statistics_start && frame->sample > 0)
         frame_record_forget(frame);
-    frame_record_take(&engine->record, frame);
+    frame_trail_take(&engine->trail, frame, engine->record.base_speed);
+    frame_record_take(&engine->record, frame, 1);
     frame_record_peaks(frame);
-    if (frame->sample % 64 == 0) {
-        const EnergyState energy = frame_energy(frame);
-        ledger_balance(&frame->ledger, &energy);
-    }
 }
 
-Status frame_engine_step(FrameEngine *engine) {
+Status frame_engine_step(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
-    if (fly(engine))
-        TRY(count_step(engine, FLIGHT_WORK));
-    else
+    const size_t flown = fly(engine, until);
+    if (flown > 0) {
+        TRY(count_steps(engine, (double)flown, FLIGHT_WORK));
+    } else {
         TRY(frame_engine_cross(engine, frame->interval));
-    frame->sample++;
-    frame->offset = 0;
-    frame_engine_take_sample(engine);
+        frame->sample++;
+        frame->offset = 0;
+        frame_engine_take_sample(engine);
+    }
+    balance(frame);
     return STATUS_OK;
 }
 
@@ -261,7 +330,8 @@ Status frame_engine_make(FrameEngine *engine, Run *run, Response *response, Prob
     TRY(frame_flight_make(&engine->flight, frame, problem));
     TRY(frame_press_make(&engine->pressing, frame, problem));
     TRY(frame_ode_make(&engine->ode, frame, problem));
-    TRY(frame_record_start(&engine->record, frame, response, problem));
+    TRY(frame_trail_make(&engine->trail, frame, problem));
+    TRY(frame_record_start(&engine->record, &engine->trail, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     frame->ledger.gain_most = LEDGER_GAIN_EXACT;
@@ -276,6 +346,7 @@ Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
+    engine->trail = of->trail;
     frame->is_shadow = true;
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
@@ -284,6 +355,7 @@ Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
 
 void frame_engine_clear(FrameEngine *engine) {
     frame_record_clear(&engine->record);
+    frame_trail_clear(&engine->trail);
     frame_flight_clear(&engine->flight);
     frame_press_clear(&engine->pressing);
     frame_ode_clear(&engine->ode);

@@ -19,6 +19,7 @@ typedef struct FrameEngine {
     FrameFlight flight;
     FramePress pressing;
     FrameOde ode;
+    FrameTrail trail;
     FrameRecord record;
     double work; // since the watch was asked
 } FrameEngine;
@@ -35,8 +36,9 @@ Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
 Status frame_engine_settle(FrameEngine *engine);
 
-// To the next sample, and takes it; a shadow takes none.
-Status frame_engine_step(FrameEngine *engine);
+// To the next sample or several, but not beyond sample `until`, and takes them; a shadow takes
+// none.
+Status frame_engine_step(FrameEngine *engine, size_t until);
 void frame_engine_take_sample(FrameEngine *engine);
 
 // From the present sample over `length` [s].

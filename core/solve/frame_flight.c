@@ -42,8 +42,8 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
     exponential_increment(system, SIZE, flight->length, gain);
     for (int column = 0; column < 4; column++) {
-        flight->q[column][i] = (double)gain[Q * SIZE + column];
-        flight->p[column][i] = (double)gain[P * SIZE + column];
+        flight->gains.q[column][i] = (double)gain[Q * SIZE + column];
+        flight->gains.p[column][i] = (double)gain[P * SIZE + column];
     }
     const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
     const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
@@ -53,7 +53,7 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     for (int k = 0; k < 7; k++)
         flight->loss[k][i] = (double)(damping * forms[0][places[k][0] * SIZE + places[k][1]] *
                                       (places[k][0] == places[k][1] ? 1 : 2));
-    static const int works[4][2] = {{A, Q}, {A, P}, {B, Q}, {B, P}};
+    static const int works[4][2] = {{A, Q}, {B, Q}, {A, P}, {B, P}};
     for (int k = 0; k < 4; k++)
         flight->input[k][i] = (double)(share * 2 * forms[1][works[k][0] * SIZE + works[k][1]]);
     static const int bases[3][2] = {{A, A}, {A, B}, {B, B}};
@@ -76,20 +76,27 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
             return STATUS_OK;
         TRY(frame_dense_make(&flight->dense, 1, frame, NULL, problem));
     }
-    double **const arrays[] = {
-        &flight->q[0],     &flight->q[1],     &flight->q[2],     &flight->q[3],    &flight->p[0],
-        &flight->p[1],     &flight->p[2],     &flight->p[3],     &flight->loss[0], &flight->loss[1],
-        &flight->loss[2],  &flight->loss[3],  &flight->loss[4],  &flight->loss[5], &flight->loss[6],
-        &flight->input[0], &flight->input[1], &flight->input[2], &flight->input[3]};
+    // Gains, loss and input; whole vectors, filled up with zeros.
+    double **arrays[8 + FRAME_SUMS + 4];
+    for (size_t i = 0; i < 4; i++) {
+        arrays[i] = &flight->gains.q[i];
+        arrays[4 + i] = &flight->gains.p[i];
+        arrays[8 + FRAME_SUMS + i] = &flight->input[i];
+    }
+    for (size_t i = 0; i < FRAME_SUMS; i++)
+        arrays[8 + i] = &flight->loss[i];
     const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
-    flight->block = calloc((count + 4) * n + 2, sizeof *flight->block);
+    const size_t padded = frame_lanes_padded(n);
+    const size_t starts = FRAME_FOUR * (2 * n + 2);
+    const size_t ends = FRAME_FOUR * frame_lanes_padded(2 * n + 2);
+    flight->block = calloc((count + FRAME_SUMS) * padded + starts + ends, sizeof *flight->block);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    flight->gain_q = flight->block;
-    flight->gain_p = flight->block + n;
-    flight->start = flight->block + 2 * n;
     for (size_t i = 0; i < count; i++)
-        *arrays[i] = flight->block + (i + 4) * n + 2;
+        *arrays[i] = flight->block + i * padded;
+    flight->sums = flight->block + count * padded;
+    flight->start = flight->sums + FRAME_SUMS * padded;
+    flight->gained = flight->start + starts;
     flight->length = frame->interval;
     frame_flight_ground(frame->turning, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
@@ -102,60 +109,94 @@ void frame_flight_clear(FrameFlight *flight) {
     free(flight->block);
 }
 
-static void gain(FrameFlight *flight, const Frame *frame, const Slice *slice) {
-    const double a = slice->value, b = slice->slope, *q = frame->q, *p = frame->p;
-    const size_t n = frame->storeys;
-    if (flight->dense.block != NULL) {
-        memcpy(flight->start, q, n * sizeof *q);
-        memcpy(flight->start + n, p, n * sizeof *p);
-        flight->start[2 * n] = a;
-        flight->start[2 * n + 1] = b;
-        memset(flight->gain_q, 0, 2 * n * sizeof *flight->gain_q); // and gain_p
-        frame_dense_add(flight->dense.gain, 2 * n, flight->start, 2 * n + 2, flight->gain_q);
-        return;
-    }
-    double *const *const row = flight->q, *const *const speed = flight->p;
-    for (size_t i = 0; i < n; i++) {
-        flight->gain_q[i] = row[0][i] * q[i] + row[1][i] * p[i] + (row[2][i] * a + row[3][i] * b);
-        flight->gain_p[i] =
-            speed[0][i] * q[i] + speed[1][i] * p[i] + (speed[2][i] * a + speed[3][i] * b);
+// Rows 1 to count of the trail.
+static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+                      size_t count) {
+    const size_t n = frame->storeys, padded = trail->padded;
+    double *start = flight->start, *gained = flight->gained;
+    for (size_t k = 0; k < count; k++) {
+        const size_t now = k * padded, next = now + padded;
+        memcpy(start, trail->q + now, n * sizeof *start);
+        memcpy(start + n, trail->p + now, n * sizeof *start);
+        start[2 * n] = trail->a[k];
+        start[2 * n + 1] = trail->b[k];
+        frame->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
+        for (size_t i = 0; i < n; i++) {
+            trail->q[next + i] = trail->q[now + i] + gained[i];
+            trail->p[next + i] = trail->p[now + i] + gained[n + i];
+            trail->moved[next + i] = trail->moved[now + i] + gained[i];
+            trail->sped[next + i] = trail->sped[now + i] + gained[n + i];
+        }
     }
 }
 
-bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length) {
+static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+                const Slice *slices, size_t count) {
+    const size_t n = frame->storeys;
+    memcpy(trail->q, frame->q, n * sizeof *trail->q);
+    memcpy(trail->p, frame->p, n * sizeof *trail->p);
+    for (size_t k = 0; k < count; k++) {
+        trail->a[k] = slices[k].value;
+        trail->b[k] = slices[k].slope;
+        trail->ground[k] =
+            flight->ground[0] * slices[k].value + flight->ground[1] * slices[k].slope;
+    }
+    if (flight->dense.block != NULL)
+        fly_dense(flight, trail, frame, count);
+    else
+        frame->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
+                          trail->p, trail->moved, trail->sped);
+}
+
+bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, double bend,
+                           double length) {
     const double sag = bend * length * length / 8;
     const double most = frame_room(damper, SIDE_RIGHT) - sag;
     const double least = sag - frame_room(damper, SIDE_LEFT);
-    const double end = damper->r + gained;
-    return damper->r < most && end < most && damper->r > least && end > least;
+    return from < most && to < most && from > least && to > least;
 }
 
-static void add_dense_work(const FrameFlight *flight, const Slice *slice, FrameWork *work) {
+static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                           size_t count, FrameWork *work) {
     const FrameDense *dense = &flight->dense;
-    work->damping = frame_dense_form(dense->loss, flight->start, dense->size);
-    work->input = -(slice->value * frame_dot(dense->input[0], flight->start, dense->size) +
-                    slice->slope * frame_dot(dense->input[1], flight->start, dense->size));
+    const size_t n = frame->storeys, size = dense->size;
+    for (size_t from = 0; from < count; from += FRAME_FOUR) {
+        const size_t many = count - from < FRAME_FOUR ? count - from : FRAME_FOUR;
+        for (size_t k = from; k < from + many; k++) {
+            double *start = flight->start + (k - from) * size;
+            memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
+            memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
+            start[2 * n] = trail->a[k];
+            start[2 * n + 1] = trail->b[k];
+            work->input -= trail->a[k] * frame_dot(dense->input[0], start, size) +
+                           trail->b[k] * frame_dot(dense->input[1], start, size);
+        }
+        frame->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
+                                    flight->gained);
+        for (size_t k = 0; k < many; k++)
+            work->damping +=
+                frame_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
+    }
 }
 
-static void add_work(const FrameFlight *flight, const Frame *frame, const Slice *slice,
-                     FrameWork *work) {
-    const double a = slice->value, b = slice->slope, *q = frame->q, *p = frame->p;
-    double *const *const l = flight->loss, *const *const w = flight->input;
-    double lost[2] = {0, 0}, put[2] = {0, 0};
-    const bool is_driven = a != 0 || b != 0;
-    for (size_t i = 0; i < frame->storeys; i++) {
-        lost[0] += q[i] * (l[0][i] * q[i] + l[1][i] * p[i]);
-        lost[1] += p[i] * l[2][i] * p[i];
-    }
-    for (size_t i = 0; i < frame->storeys && is_driven; i++) {
-        lost[0] += q[i] * (l[3][i] * a + l[4][i] * b);
-        lost[1] += p[i] * (l[5][i] * a + l[6][i] * b);
-        put[0] += a * (w[0][i] * q[i] + w[1][i] * p[i]);
-        put[1] += b * (w[2][i] * q[i] + w[3][i] * p[i]);
-    }
+static void add_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                     size_t count, FrameWork *work) {
+    const size_t n = frame->storeys;
+    const size_t padded = trail->padded;
+    double *sums = flight->sums;
+    memset(sums, 0, FRAME_SUMS * padded * sizeof *sums);
+    frame->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
+    for (size_t j = 0; j < FRAME_SUMS; j++)
+        work->damping += frame_dot(flight->loss[j], sums + j * padded, n);
+    // The sums' last four are over (q value, q slope, p value, p slope).
+    for (size_t j = 0; j < 4; j++)
+        work->input -= frame_dot(flight->input[j], sums + (3 + j) * padded, n);
     const double *lb = flight->loss_base, *ib = flight->input_base;
-    work->damping = lost[0] + lost[1] + (a * (lb[0] * a + lb[1] * b) + lb[2] * b * b);
-    work->input = -(put[0] + put[1] + (a * (ib[0] * a + ib[1] * b) + ib[2] * b * b));
+    for (size_t k = 0; k < count; k++) {
+        const double a = trail->a[k], b = trail->b[k];
+        work->damping += a * (lb[0] * a + lb[1] * b) + lb[2] * b * b;
+        work->input -= a * (ib[0] * a + ib[1] * b) + ib[2] * b * b;
+    }
 }
 
 double frame_flight_shaken(const Slice *slice, double length) {
@@ -163,46 +204,111 @@ double frame_flight_shaken(const Slice *slice, double length) {
     return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
 }
 
-bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work) {
+// Of one damper along the trail: rows 1 to count of r and z. Its absolute velocity stays.
+static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *frame, size_t d,
+                   size_t count, const Slice *slices) {
+    const FrameDamper *damper = &frame->damper[d];
+    double *r = trail->r + d * TRAIL_ROWS, *z = trail->z + d * TRAIL_ROWS, far = damper->r;
+    double moved[TRAIL_ROWS];
+    frame->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
+    r[0] = damper->r;
+    z[0] = frame_dot(damper->shape, trail->p, frame->storeys) + damper->w;
+    for (size_t k = 0; k < count; k++) {
+        far += flight->length * z[k] -
+               (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
+        r[k + 1] = far - moved[k];
+        z[k + 1] = z[k] - trail->ground[k];
+    }
+}
+
+// sqrt(p'p + q'W^2 q) over an interval that begins with such a size, or over `many`.
+static double grown(const FrameFlight *flight, const Frame *frame, double size, double shaken,
+                    size_t many) {
+    const double length = (double)many * flight->length;
+    const double left = 1 - frame->growth * length; // exp(growth length) < 1 / left
+    return left > 0.5 ? (size + length * frame->drive * shaken) / left : INFINITY;
+}
+
+// Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
+// than `bend`.
+static size_t count_clear(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                          size_t d, double bend, const Slice *slices, size_t count) {
+    const FrameDamper *damper = &frame->damper[d];
+    const double *r = trail->r + d * TRAIL_ROWS, length = flight->length;
+    double least = r[0], most = r[0];
+    for (size_t k = 1; k <= count; k++) {
+        least = r[k] < least ? r[k] : least;
+        most = r[k] > most ? r[k] : most;
+    }
+    if (frame_flight_is_clear(damper, least, most, bend, length))
+        return count;
+    for (size_t k = 0; k < count; k++) {
+        if (frame_flight_is_clear(damper, r[k], r[k + 1], bend, length))
+            continue;
+        // The bound of this interval alone is closer.
+        const double shaken = frame_flight_shaken(&slices[k], length);
+        const double size =
+            frame_size_of(frame, trail->q + k * trail->padded, trail->p + k * trail->padded);
+        const double own =
+            damper->reach * grown(flight, frame, size, shaken, 1) + fabs(damper->lean) * shaken;
+        if (!frame_flight_is_clear(damper, r[k], r[k + 1], own, length))
+            return k;
+    }
+    return count;
+}
+
+// A guess of how many intervals it takes to the next stop: to fly further would be in vain.
+static size_t guess(const FrameFlight *flight, const Frame *frame, size_t count) {
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double step = fabs(damper->w) * flight->length;
+        const double room = damper->w > 0 ? frame_room(damper, SIDE_RIGHT) - damper->r
+                                          : frame_room(damper, SIDE_LEFT) + damper->r;
+        if (room < (double)(count - 1) * step)
+            count = 1 + (size_t)fmax(room / step, 0);
+    }
+    return count;
+}
+
+size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
+                        size_t count, FrameWork *work) {
     const size_t n = frame->storeys;
-    const double length = flight->length;
-    gain(flight, frame, slice);
-    const double speed = flight->ground[0] * slice->value + flight->ground[1] * slice->slope;
-    const double fallen = flight->fall[0] * slice->value + flight->fall[1] * slice->slope;
-    const double shaken = frame_flight_shaken(slice, length);
-    const double grown = frame->growth * length; // exp(grown) < 1 / (1 - grown)
-    if (!(grown < 0.5))
-        return false;
+    double shaken = 0;
+    count = guess(flight, frame, count);
+    fly(flight, trail, frame, slices, count);
+    for (size_t k = 0; k < count; k++)
+        shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
     const double most =
-        frame->dampers > 0 ? (frame_size(frame) + length * frame->drive * shaken) / (1 - grown) : 0;
+        frame->dampers > 0 ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
     for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
-        damper->storey_speed = frame_dot(damper->shape, frame->p, n);
-        damper->gained = length * (damper->storey_speed + damper->w) - fallen -
-                         frame_dot(damper->shape, flight->gain_q, n);
-        if (!frame_flight_is_clear(damper, damper->gained,
-                                   damper->reach * most + fabs(damper->lean) * shaken, length))
-            return false;
+        const FrameDamper *damper = &frame->damper[d];
+        const double bend = damper->reach * most + fabs(damper->lean) * shaken;
+        follow(flight, trail, frame, d, count, slices);
+        count = count_clear(flight, trail, frame, d, bend, slices, count);
     }
+    if (count == 0)
+        return 0;
     if (work != NULL) {
+        *work = (FrameWork){0};
         if (flight->dense.block != NULL)
-            add_dense_work(flight, slice, work);
+            add_dense_work(flight, trail, frame, count, work);
         else
-            add_work(flight, frame, slice, work);
-        work->ground = speed;
+            add_work(flight, trail, frame, count, work);
     }
+    const size_t end = count * trail->padded;
+    double speed = 0;
+    for (size_t k = 0; k < count; k++)
+        speed += trail->ground[k];
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
-        // Its absolute velocity stays.
-        if (work != NULL)
-            work->input -=
-                damper->plan->mass * speed * (damper->storey_speed + damper->w - speed / 2);
-        damper->r += damper->gained;
-        damper->w -= speed + frame_dot(damper->shape, flight->gain_p, n);
+        const double *z = trail->z + d * TRAIL_ROWS;
+        for (size_t k = 0; k < count && work != NULL; k++)
+            work->input -= damper->plan->mass * trail->ground[k] * (z[k] - trail->ground[k] / 2);
+        damper->r = trail->r[d * TRAIL_ROWS + count];
+        damper->w -= speed + frame_dot(damper->shape, trail->sped + end, n);
+        damper->force = 0;
     }
-    for (size_t i = 0; i < n; i++) {
-        frame->q[i] += flight->gain_q[i];
-        frame->p[i] += flight->gain_p[i];
-    }
-    return true;
+    memcpy(frame->q, trail->q + end, n * sizeof *frame->q);
+    memcpy(frame->p, trail->p + end, n * sizeof *frame->p);
+    return count;
 }

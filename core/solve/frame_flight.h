@@ -7,19 +7,18 @@
 #include "core/solve/frame_arc.h"
 #include "core/solve/frame_dense.h"
 #include "core/solve/frame_state.h"
+#include "core/solve/frame_trail.h"
 
 typedef struct FrameFlight {
     double length;    // of the interval [s]; 0: there are no such steps
-    FrameDense dense; // in place of q, p, loss and input where damping couples the modes
-    // What each mode gains: rows over (q, p, value, slope), mode after mode within each entry.
-    double *q[4], *p[4];
-    // Work: loss[0..2] over (q q, q p, p p), loss[3..6] over (q value, q slope, p value, p slope),
-    // input[0..3] over (value q, value p, slope q, slope p).
-    double *loss[7], *input[4];
+    FrameDense dense; // in place of gains, loss and input where damping couples the modes
+    FrameGains gains;
+    // Work, mode after mode: loss over FRAME_SUMS, input over the last four of these.
+    double *loss[FRAME_SUMS], *input[4];
     double loss_base[3], input_base[3]; // over (value^2, value slope, slope^2), all modes
     double ground[2], fall[2];          // integral of a_g over (value, slope), and its integral
-    double *gain_q, *gain_p;            // of the present step
-    double *start;                      // (q, p, value, slope) of the present step
+    double *sums;                       // scratch, as are the next
+    double *start, *gained;             // FRAME_FOUR times (q, p, value, slope), and their gains
     double *block;
 } FrameFlight;
 
@@ -27,12 +26,15 @@ typedef struct FrameFlight {
 Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem);
 void frame_flight_clear(FrameFlight *flight);
 
-// Moves the state over the interval, if surely no stop is reached meanwhile, and says what it adds
-// up to, if `work` is not NULL. False: it must go by arcs, and nothing has changed.
-bool frame_flight_step(FrameFlight *flight, Frame *frame, const Slice *slice, FrameWork *work);
+// Moves the state over so many of `count` intervals, at most TRAIL_MOST, as no stop can be reached
+// in, returns how many, leaves their samples in the trail, and says what they add up to, if `work`
+// is not NULL. 0: it must go by arcs, and nothing has changed.
+size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
+                        size_t count, FrameWork *work);
 
-// Whether r stays between the stops on its way to r + gained, bent by no more than `bend` [m/s^2].
-bool frame_flight_is_clear(const FrameDamper *damper, double gained, double bend, double length);
+// Whether r stays between the stops on its way, bent by no more than `bend` [m/s^2].
+bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, double bend,
+                           double length);
 // Over (value, slope): the integral of a_g over `length`, and its integral; `omega` is the base's
 // (0: linear).
 void frame_flight_ground(double omega, double length, double ground[2], double fall[2]);

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NUDGE_SAMPLES = 16 };
 static const double NUDGE = 4 * DBL_EPSILON, POWER_NUDGE = 1e-12; // an integrated contact's error
 static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
 
@@ -17,13 +16,13 @@ static double nudge_of(const Frame *frame) {
 static void nudge(Frame *frame) {
     const double by = nudge_of(frame);
     for (size_t i = 0; i < frame->storeys; i++) {
-        const double sign = (frame->sample / NUDGE_SAMPLES + i) % 2 == 0 ? 1 : -1;
+        const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
         frame->q[i] *= 1 + sign * by;
         frame->p[i] *= 1 - sign * by;
     }
 }
 
-static void compare(FrameNeighbour *neighbour, const Frame *frame) {
+static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
     const size_t n = frame->storeys;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
@@ -33,23 +32,27 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame) {
     neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
     if (bound <= neighbour->worst)
         return;
+    const double *values = frame_spread(frame, apart);
     for (size_t j = 0; j < n; j++)
-        difference = fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, apart, n)));
+        difference = fmax(difference, fabs(values[j]));
     neighbour->worst = fmax(neighbour->worst, difference);
     if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
-        neighbour->horizon = (double)(frame->sample - 1) / frame->plan->sample_rate;
+        neighbour->horizon = (double)before / frame->plan->sample_rate;
     neighbour->is_spent = difference > PARTED * neighbour->largest;
 }
 
 void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     if (neighbour->is_spent)
         return;
-    if (frame->sample % NUDGE_SAMPLES == 0)
-        nudge(&neighbour->engine.frame);
-    if (frame_engine_step(&neighbour->engine) == STATUS_OK)
-        compare(neighbour, frame);
+    Frame *own = &neighbour->engine.frame;
+    const size_t from = own->sample;
+    nudge(own);
+    while (own->sample < frame->sample && neighbour->is_known)
+        neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
+    if (neighbour->is_known)
+        compare(neighbour, frame, from);
     else
-        neighbour->is_spent = true, neighbour->is_known = false;
+        neighbour->is_spent = true;
 }
 
 void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine) {
@@ -64,7 +67,7 @@ void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine)
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     Frame *own = &neighbour->engine.frame;
-    neighbour->apart = malloc(frame->storeys * sizeof *neighbour->apart);
+    neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
     neighbour->is_known =
         neighbour->apart != NULL && frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
                                                         &neighbour->response) == STATUS_OK;

@@ -1,10 +1,12 @@
-// How far a run of the general engine can be trusted: the same run a few roundings away, sample by
-// sample beside it until the two have parted. Not the single engine's way, which is trust.h. Used
-// by frame.c.
+// How far a run of the general engine can be trusted: the same run a few roundings away,
+// NEIGHBOUR_SAMPLES behind it until the two have parted. Not the single engine's way, which is
+// trust.h. Used by frame.c.
 #ifndef CORE_SOLVE_FRAME_NEIGHBOUR_H
 #define CORE_SOLVE_FRAME_NEIGHBOUR_H
 
 #include "core/solve/frame_engine.h"
+
+enum { NEIGHBOUR_SAMPLES = 16 };
 
 // All zero is empty.
 typedef struct FrameNeighbour {
@@ -23,7 +25,7 @@ typedef struct FrameNeighbour {
 void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine);
 void frame_neighbour_clear(FrameNeighbour *neighbour);
 
-// Follows the run to the sample it has just reached.
+// Follows the run to the sample it has just reached, NEIGHBOUR_SAMPLES on or fewer.
 void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame);
 
 // Error estimate and horizon, into the response.

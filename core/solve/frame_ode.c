@@ -43,7 +43,10 @@ static void rate(const void *context, double t, const double *y, double *out) {
     double *acceleration = out + n, *relative = out + at_r(frame) + m;
     double *impulse = out + at_impulse(frame), *total = out + at_totals(frame);
     const double ground = slice_at(&ode->slice, t - ode->at);
-    frame_elastic(frame, q, p, ode->elastic);
+    double *modes = ode->elastic + frame->padded; // whole vectors
+    memcpy(modes, q, n * sizeof *q);
+    memcpy(modes + frame->padded, p, n * sizeof *p);
+    frame_elastic(frame, modes, modes + frame->padded, ode->elastic);
     memcpy(out, p, n * sizeof *p);
     memcpy(out + at_r(frame), w, m * sizeof *w);
     for (size_t i = 0; i < n; i++)
@@ -108,7 +111,7 @@ Status frame_ode_make(FrameOde *ode, Frame *frame, Problem *problem) {
     if (frame->plan->form != CONTACT_POWER || frame->dampers == 0)
         return STATUS_OK;
     const size_t size = size_of(frame), m = frame->dampers;
-    ode->block = calloc(4 * size + 2 * m + frame->storeys, sizeof *ode->block);
+    ode->block = calloc(4 * size + 2 * m + 3 * frame->padded, sizeof *ode->block);
     const OdeSystem system = {
         .context = ode, .size = size, .roots = WATCHED * m, .rate = rate, .watch = watch};
     if (ode->block != NULL)

@@ -8,14 +8,16 @@
 #include "core/solve/frame_flight.h"
 #include "core/solve/frame_state.h"
 
-enum { PRESS_LEVELS = 3 };
+enum { PRESS_LEVELS = 8 };
 
 // Of one stop, made once contacts with it have lasted for long enough.
 typedef struct FramePressStop {
-    double spent;     // on arcs, in products
+    double spent;     // on arcs
     bool is_given_up; // no memory for it
     FrameDense levels[PRESS_LEVELS];
-    double *damped, *bent; // D shape, W^2 shape
+    double *damped, *bent;               // D shape, W^2 shape
+    double wide, most_damped, most_bent; // |shape|, |D shape|, |W^2 shape|
+    double coupling, bending;            // shape . D shape, shape . W^2 shape
 } FramePressStop;
 
 typedef struct FramePress {
@@ -23,7 +25,7 @@ typedef struct FramePress {
     size_t count;
     double length[PRESS_LEVELS];                           // the interval, its half, ...
     double ground[PRESS_LEVELS][2], fall[PRESS_LEVELS][2]; // as FrameFlight's
-    double *start, *gained, *elastic;                      // scratch
+    double *start, *gained, *pulled, *elastic;             // scratch
     double *block;
 } FramePress;
 

@@ -8,18 +8,40 @@
 #include <stdlib.h>
 #include <string.h>
 
-Status frame_record_start(FrameRecord *record, const Frame *frame, Response *response,
-                          Problem *problem) {
-    const size_t n = frame->storeys, columns = frame->run->column_count;
+// Of the storey that a column is of, or its damper's.
+static const double *shape_of(const Frame *frame, const RunColumn *column) {
+    switch (column->channel) {
+    case CHANNEL_DISPLACEMENT:
+    case CHANNEL_VELOCITY:
+    case CHANNEL_ACCELERATION:
+    case CHANNEL_MEAN_ACCELERATION:
+        return frame->modes->shapes + column->number * frame->storeys;
+    case CHANNEL_BASE_ACCELERATION:
+        return frame->modes->shapes; // of no use
+    default:
+        return frame->damper[column->number].shape;
+    }
+}
+
+Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Frame *frame,
+                          Response *response, Problem *problem) {
+    const size_t n = frame->storeys, columns = frame->run->column_count, padded = trail->padded;
+    const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
-    record->block = calloc(2 * n * (n + RECORD_BATCH) + columns, sizeof *record->block);
+    record->block =
+        calloc(2 * (square + TRAIL_MOST * padded) + columns * (1 + padded), sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+    record->trail = trail;
     for (size_t k = 0; k < 2; k++) {
-        record->squares[k] = record->block + k * n * n;
-        record->batch[k] = record->block + 2 * n * n + k * RECORD_BATCH * n;
+        record->squares[k] = record->block + k * square;
+        record->batch[k] = record->block + 2 * square + k * TRAIL_MOST * padded;
     }
-    record->last_velocity = record->block + 2 * n * (n + RECORD_BATCH);
+    record->shapes = record->batch[1] + TRAIL_MOST * padded;
+    record->last_velocity = record->shapes + columns * padded;
+    for (size_t i = 0; i < columns; i++)
+        memcpy(record->shapes + i * padded, shape_of(frame, &frame->run->columns[i]),
+               n * sizeof *record->shapes);
     record->statistics_start =
         (size_t)ceil(frame->run->statistics_from * frame->plan->sample_rate * (1 - 1e-12));
     response->sample_rate = frame->plan->sample_rate;
@@ -31,160 +53,233 @@ void frame_record_clear(FrameRecord *record) {
     free(record->block);
 }
 
-static double mean_acceleration(FrameRecord *record, const Frame *frame, size_t column) {
-    const size_t storey = frame->run->columns[column].number;
-    const double velocity = frame_velocity(frame, storey), last = record->last_velocity[column];
-    record->last_velocity[column] = velocity;
-    if (frame->sample == 0)
-        return frame_storey_acceleration(frame, storey);
-    return (velocity - last + frame->plan->influence[storey] * record->base_speed) *
-           frame->plan->sample_rate;
+// Speeds to means over the intervals before.
+static void take_means(FrameRecord *record, const Frame *frame, size_t column, double *values,
+                       size_t count) {
+    const double share = frame->plan->influence[frame->run->columns[column].number];
+    for (size_t k = 0; k < count; k++) {
+        const double velocity = values[k];
+        values[k] = (velocity - record->last_velocity[column] + share * record->trail->ground[k]) *
+                    frame->plan->sample_rate;
+        record->last_velocity[column] = velocity;
+    }
 }
 
-static double value(FrameRecord *record, const Frame *frame, size_t column) {
+static void take_storey(FrameRecord *record, const Frame *frame, size_t column, double *values,
+                        size_t count) {
+    const FrameTrail *trail = record->trail;
     const ChannelId channel = frame->run->columns[column].channel;
-    const size_t i = frame->run->columns[column].number;
-    switch (channel) {
-    case CHANNEL_DISPLACEMENT:
-        return frame_displacement(frame, i);
-    case CHANNEL_VELOCITY:
-        return frame_velocity(frame, i);
-    case CHANNEL_ACCELERATION:
-        return frame_storey_acceleration(frame, i);
-    case CHANNEL_MEAN_ACCELERATION:
-        return mean_acceleration(record, frame, column);
-    case CHANNEL_BASE_ACCELERATION:
-        return frame->ground;
-    default:
-        break;
+    const size_t padded = trail->padded, storey = frame->run->columns[column].number;
+    const double *rows = channel == CHANNEL_ACCELERATION   ? trail->elastic
+                         : channel == CHANNEL_DISPLACEMENT ? trail->q
+                                                           : trail->p;
+    const double *shape = record->shapes + column * padded;
+    frame->lanes->dot(padded, count, shape, rows + padded, values);
+    if (channel == CHANNEL_MEAN_ACCELERATION) {
+        take_means(record, frame, column, values, count);
+        if (frame->sample == 0)
+            values[0] = frame_storey_acceleration(frame, storey);
     }
-    const FrameDamper *damper = &frame->damper[i];
-    const size_t storey = damper->plan->storey;
+    if (channel != CHANNEL_ACCELERATION)
+        return;
+    double push = 0;
+    for (size_t d = 0; d < frame->dampers; d++)
+        push += frame->mobility[d * frame->storeys + storey] * frame->damper[d].force;
+    for (size_t k = 0; k < count; k++)
+        values[k] = push - values[k];
+}
+
+static void take_damper(FrameRecord *record, const Frame *frame, size_t column, double *values,
+                        size_t count) {
+    const FrameTrail *trail = record->trail;
+    const RunColumn *wanted = &frame->run->columns[column];
+    const FrameDamper *damper = &frame->damper[wanted->number];
+    const double *r = trail->r + wanted->number * TRAIL_ROWS + 1;
+    const double *z = trail->z + wanted->number * TRAIL_ROWS + 1;
+    if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
+        const double middle = frame_middle(damper);
+        frame->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
+                          trail->q + trail->padded, values);
+        for (size_t k = 0; k < count; k++)
+            values[k] += middle + r[k];
+        return;
+    }
     const bool is_inside = damper->phase == FRAME_CONTACT || damper->phase == FRAME_INSIDE;
-    switch (channel) {
-    case CHANNEL_DAMPER_DISPLACEMENT:
-        return frame_displacement(frame, storey) + frame_relative(damper);
-    case CHANNEL_DAMPER_VELOCITY:
-        return frame_velocity(frame, storey) + damper->w;
-    case CHANNEL_PENETRATION:
-        return is_inside ? fmax(frame_sign(damper->side) * damper->r, 0) : 0;
-    case CHANNEL_CONTACT_FORCE:
-        return damper->force;
+    for (size_t k = 0; k < count; k++)
+        values[k] = wanted->channel == CHANNEL_DAMPER_VELOCITY ? z[k]
+                    : wanted->channel == CHANNEL_CONTACT_FORCE ? damper->force
+                    : is_inside ? fmax(frame_sign(damper->side) * r[k], 0)
+                                : 0;
+}
+
+static void take_column(FrameRecord *record, const Frame *frame, size_t column, size_t count) {
+    const size_t first = frame->sample + 1 - count;
+    double *values = frame->run->columns[column].values + first;
+    switch (frame->run->columns[column].channel) {
+    case CHANNEL_DISPLACEMENT:
+    case CHANNEL_VELOCITY:
+    case CHANNEL_ACCELERATION:
+    case CHANNEL_MEAN_ACCELERATION:
+        take_storey(record, frame, column, values, count);
+        return;
+    case CHANNEL_BASE_ACCELERATION:
+        for (size_t k = 0; k < count; k++)
+            values[k] = base_cursor_at(&frame->base, first + k);
+        return;
     default:
-        return 0;
+        take_damper(record, frame, column, values, count);
     }
 }
 
-// squares += the batch's products; rows left over are 0. Eight samples at once spare the sums'
-// ways to memory and back.
-static void add_batch(double *restrict squares, double *restrict batch, size_t n) {
-    for (size_t i = 0; i < n; i++) {
-        double *restrict row = squares + i * n, own[RECORD_BATCH];
-        for (size_t k = 0; k < RECORD_BATCH; k++)
-            own[k] = batch[k * n + i];
-        for (size_t j = 0; j <= i; j++) {
-            double sum = 0;
-            for (size_t k = 0; k < RECORD_BATCH; k++)
-                sum += own[k] * batch[k * n + j];
-            row[j] += sum;
-        }
-    }
-    memset(batch, 0, RECORD_BATCH * n * sizeof *batch);
+static void add_batch(FrameRecord *record, const Frame *frame, size_t count) {
+    const FrameTrail *trail = record->trail;
+    for (size_t k = 0; k < 2; k++)
+        frame->lanes->square(frame->storeys, trail->padded, count, record->batch[k],
+                             record->squares[k]);
 }
 
-static void add_squares(FrameRecord *record, const Frame *frame) {
-    const size_t n = frame->storeys, at = record->count++ % RECORD_BATCH;
-    double *restrict pull = record->batch[1] + at * n;
-    memcpy(record->batch[0] + at * n, frame->q, n * sizeof *frame->q);
-    for (size_t i = 0; i < n; i++)
-        pull[i] = -frame->elastic[i];
+// Of accelerations the sign does not matter.
+static void add_squares(FrameRecord *record, const Frame *frame, size_t row) {
+    const size_t padded = record->trail->padded, at = record->count++ % TRAIL_MOST;
+    double *restrict pull = record->batch[1] + at * padded;
+    memcpy(record->batch[0] + at * padded, record->trail->q + row * padded, padded * sizeof *pull);
+    memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
     for (size_t d = 0; d < frame->dampers; d++) {
         const double force = frame->damper[d].force, *shape = frame->damper[d].shape;
-        for (size_t i = 0; i < n && force != 0; i++)
-            pull[i] += shape[i] * force;
+        for (size_t i = 0; i < frame->storeys && force != 0; i++)
+            pull[i] -= shape[i] * force;
     }
-    if (at + 1 == RECORD_BATCH)
-        for (size_t k = 0; k < 2; k++)
-            add_batch(record->squares[k], record->batch[k], n);
+    if (at + 1 == TRAIL_MOST)
+        add_batch(record, frame, TRAIL_MOST);
 }
 
-void frame_record_take(FrameRecord *record, Frame *frame) {
+void frame_record_take(FrameRecord *record, Frame *frame, size_t count) {
     for (size_t i = 0; i < frame->run->column_count; i++)
-        frame->run->columns[i].values[frame->sample] = value(record, frame, i);
-    record->base_speed = 0;
+        take_column(record, frame, i, count);
     if (frame->sample >= record->statistics_start)
-        add_squares(record, frame);
+        for (size_t k = 1; k <= count; k++)
+            add_squares(record, frame, k);
+    record->base_speed = 0;
 }
 
 // The largest shape' squares shape of any storey.
-static double largest_sum(const double *squares, const Frame *frame) {
-    const size_t n = frame->storeys;
+static double largest_sum(const FrameRecord *record, const double *squares, const Frame *frame) {
+    const size_t n = frame->storeys, padded = record->trail->padded;
     double most = 0;
     for (size_t j = 0; j < n; j++) {
         const double *shape = frame->modes->shapes + j * n;
         double sum = 0;
-        for (size_t i = 0; i < n; i++)
-            sum += shape[i] *
-                   (2 * frame_dot(squares + i * n, shape, i) + squares[i * n + i] * shape[i]);
+        for (size_t i = 0; i < n; i++) {
+            const double *row = squares + i * padded;
+            sum += shape[i] * (2 * frame_dot(row, shape, i) + row[i] * shape[i]);
+        }
         most = fmax(most, sum);
     }
     return most;
 }
 
 void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response) {
-    for (size_t k = 0; k < 2; k++)
-        add_batch(record->squares[k], record->batch[k], frame->storeys);
-    response->sum_squares_displacement = largest_sum(record->squares[0], frame);
-    response->sum_squares_acceleration = largest_sum(record->squares[1], frame);
+    add_batch(record, frame, record->count % TRAIL_MOST);
+    response->sum_squares_displacement = largest_sum(record, record->squares[0], frame);
+    response->sum_squares_acceleration = largest_sum(record, record->squares[1], frame);
     response->statistics_count = record->count;
-}
-
-typedef double Look(const Frame *frame, size_t storey);
-
-static double largest(const Frame *frame, Look *look) {
-    double most = 0;
-    for (size_t j = 0; j < frame->storeys; j++)
-        most = fmax(most, fabs(look(frame, j)));
-    return most;
 }
 
 // No storey's value can be larger where its modes' are these.
 static double bound(const Frame *frame, const double *modal) {
-    double sum[2] = {0, 0};
-    size_t i = 0;
-    for (; i + 2 <= frame->storeys; i += 2)
-        for (size_t k = 0; k < 2; k++)
-            sum[k] += frame->widest[i + k] * fabs(modal[i + k]);
-    if (i < frame->storeys)
-        sum[0] += frame->widest[i] * fabs(modal[i]);
-    return sum[0] + sum[1];
+    double most;
+    frame->lanes->reach(frame->padded, 1, frame->widest, modal, &most);
+    return most;
+}
+
+static double largest_of(const double *values, size_t count) {
+    double most[2] = {0, 0};
+    for (size_t j = 0; j < count; j++)
+        most[j % 2] = ledger_larger(most[j % 2], fabs(values[j]));
+    return ledger_larger(most[0], most[1]);
+}
+
+// The largest of all storeys.
+static double largest(const Frame *frame, const double *modal) {
+    return largest_of(frame_spread(frame, modal), frame->storeys);
 }
 
 void frame_record_acceleration(Frame *frame) {
-    double most = bound(frame, frame->elastic);
+    double most = bound(frame, frame->elastic), at = 0;
     for (size_t d = 0; d < frame->dampers; d++)
         most += frame->damper[d].thrust * fabs(frame->damper[d].force);
-    if (most > frame->ledger.response->peaks.acceleration)
-        ledger_acceleration(&frame->ledger, largest(frame, frame_storey_acceleration));
+    if (!(most > frame->ledger.response->peaks.acceleration))
+        return;
+    const double *pull = frame_spread(frame, frame->elastic);
+    for (size_t j = 0; j < frame->storeys; j++) {
+        double sum = -pull[j];
+        for (size_t d = 0; d < frame->dampers; d++)
+            sum += frame->mobility[d * frame->storeys + j] * frame->damper[d].force;
+        at = ledger_larger(at, fabs(sum));
+    }
+    ledger_acceleration(&frame->ledger, at);
 }
 
 void frame_record_peaks(Frame *frame) {
     const Peaks *peaks = &frame->ledger.response->peaks;
-    Moment at = {0};
     const double far = bound(frame, frame->q);
+    Moment at = {0};
     if (far > peaks->displacement)
-        at.x = largest(frame, frame_displacement);
+        at.x = largest(frame, frame->q);
     if (bound(frame, frame->p) > peaks->velocity)
-        at.v = largest(frame, frame_velocity);
+        at.v = largest(frame, frame->p);
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
-        const double relative = frame_relative(damper);
+        const double relative = frame_middle(damper) + damper->r;
         if (far + fabs(relative) > peaks->damper_displacement)
             at.damper_x =
                 fmax(at.damper_x, fabs(frame_displacement(frame, damper->plan->storey) + relative));
     }
     ledger_peaks(&frame->ledger, &at);
     frame_record_acceleration(frame);
+}
+
+// The largest of all storeys in rows 1 to `count`, where that is more than `least`; `most` gets
+// what no row can be beyond.
+static double rise(const Frame *frame, const double *rows, size_t count, double least,
+                   double *most) {
+    const size_t padded = frame->padded;
+    frame->lanes->reach(padded, count, frame->widest, rows + padded, most);
+    for (size_t k = 0; k < count; k += FRAME_FOUR) {
+        bool may_rise = false;
+        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
+            may_rise = may_rise || most[j] > least;
+        if (!may_rise)
+            continue;
+        // Of rows behind the last one no use is made.
+        const double *values = frame_spread_four(frame, rows + (k + 1) * padded);
+        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
+            least = ledger_larger(least, largest_of(values + (j - k) * padded, frame->storeys));
+    }
+    return least;
+}
+
+void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count) {
+    const FrameTrail *trail = record->trail;
+    const Peaks *peaks = &frame->ledger.response->peaks;
+    double far[TRAIL_MOST], most[TRAIL_MOST];
+    Moment at = {
+        .v = rise(frame, trail->p, count, peaks->velocity, most),
+        .acceleration = rise(frame, trail->elastic, count, peaks->acceleration, most),
+        .x = rise(frame, trail->q, count, peaks->displacement, far),
+        .damper_x = peaks->damper_displacement,
+    };
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = frame_middle(damper);
+        for (size_t k = 0; k < count; k++)
+            if (far[k] + fabs(middle + r[k]) > at.damper_x)
+                at.damper_x = fmax(at.damper_x,
+                                   fabs(frame_dot(damper->shape, trail->q + (k + 1) * trail->padded,
+                                                  frame->storeys) +
+                                        (middle + r[k])));
+    }
+    ledger_peaks(&frame->ledger, &at);
 }
 
 void frame_record_forget(Frame *frame) {

@@ -3,14 +3,14 @@
 #ifndef CORE_SOLVE_FRAME_RECORD_H
 #define CORE_SOLVE_FRAME_RECORD_H
 
-#include "core/solve/frame_state.h"
-
-enum { RECORD_BATCH = 8 };
+#include "core/solve/frame_trail.h"
 
 typedef struct FrameRecord {
+    const FrameTrail *trail;
     size_t statistics_start; // the first sample that counts
-    double base_speed;       // integral of a_g since the last sample [m/s]
+    double base_speed;       // integral of a_g since the last sample, where that is no flight [m/s]
     double *last_velocity;   // of each column's storey, at the last sample
+    double *shapes;          // of each column's storey
     // Sums of q_i q_k and of the modal accelerations' products, for k <= i, and the samples that
     // are not in them yet.
     double *squares[2], *batch[2];
@@ -19,12 +19,15 @@ typedef struct FrameRecord {
 } FrameRecord;
 
 // Freed by frame_record_clear, also after a failure.
-Status frame_record_start(FrameRecord *record, const Frame *frame, Response *response,
-                          Problem *problem);
+Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Frame *frame,
+                          Response *response, Problem *problem);
 void frame_record_clear(FrameRecord *record);
 
-// What can be seen now, after frame_feel; base_speed goes back to 0.
-void frame_record_take(FrameRecord *record, Frame *frame);
+// Writes down rows 1 to `count` of the trail, the last of them being the present sample, with the
+// present forces; base_speed goes back to 0.
+void frame_record_take(FrameRecord *record, Frame *frame, size_t count);
+// Takes their peaks, all of them being samples of flight.
+void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count);
 void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response);
 
 // Takes peaks at this instant, after frame_feel; of accelerations alone.

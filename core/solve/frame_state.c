@@ -9,6 +9,11 @@
 
 static const double NEARLY = 1e-9;
 
+// Columns of a matrix go in pairs.
+static size_t even(size_t count) {
+    return count + count % 2;
+}
+
 double frame_time(const Frame *frame) {
     return (double)frame->sample / frame->plan->sample_rate + frame->offset;
 }
@@ -23,27 +28,22 @@ double frame_room(const FrameDamper *damper, Side side) {
     return damper->origin == (FrameOrigin)side ? 0 : damper->plan->clearance;
 }
 
-double frame_relative(const FrameDamper *damper) {
+double frame_middle(const FrameDamper *damper) {
     const double stop = damper->plan->clearance / 2;
     const double origin =
         damper->origin == FRAME_FROM_MIDDLE ? 0 : frame_sign((Side)damper->origin) * stop;
-    return damper->plan->offset + origin + damper->r;
+    return damper->plan->offset + origin;
 }
 
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
-    const size_t n = frame->storeys;
+    const size_t padded = frame->padded;
     if (frame->diagonal != NULL) {
-        for (size_t i = 0; i < n; i++)
-            out[i] = frame->diagonal[i] * p[i] + frame->omega2[i] * q[i];
+        frame->lanes->mix(padded, 1, frame->diagonal, p, frame->omega2, q, out);
         return;
     }
-    for (size_t i = 0; i < n; i++)
-        out[i] = frame->omega2[i] * q[i];
-    for (size_t j = 0; j < n; j++) {
-        const double *row = frame->damping + j * n; // D is symmetric
-        for (size_t i = 0; i < n; i++)
-            out[i] += row[i] * p[j];
-    }
+    frame->lanes->multiply(frame->coupled, padded, p, even(frame->storeys), out);
+    for (size_t i = 0; i < padded; i++)
+        out[i] += frame->omega2[i] * q[i];
 }
 
 // What a power law says of the present contact.
@@ -71,6 +71,17 @@ void frame_feel(Frame *frame) {
                     (frame_dot(frame->damper[e].shape, frame->elastic, frame->storeys) +
                      frame->damper[e].lean * frame->ground);
     }
+}
+
+const double *frame_spread_four(const Frame *frame, const double *modal) {
+    frame->lanes->multiply_four(frame->spread, frame->padded, modal, frame->padded,
+                                even(frame->storeys), frame->seen);
+    return frame->seen;
+}
+
+const double *frame_spread(const Frame *frame, const double *modal) {
+    frame->lanes->multiply(frame->spread, frame->padded, modal, even(frame->storeys), frame->seen);
+    return frame->seen;
 }
 
 double frame_displacement(const Frame *frame, size_t storey) {
@@ -114,13 +125,21 @@ EnergyState frame_energy(const Frame *frame) {
     return energy;
 }
 
+double frame_size_of(const Frame *frame, const double *q, const double *p) {
+    double squares[4] = {0, 0, 0, 0};
+    size_t i = 0;
+    for (; i + 2 <= frame->storeys; i += 2)
+        for (size_t j = 0; j < 2; j++) {
+            squares[j] += p[i + j] * p[i + j];
+            squares[2 + j] += frame->omega2[i + j] * q[i + j] * q[i + j];
+        }
+    if (i < frame->storeys)
+        squares[0] += p[i] * p[i] + frame->omega2[i] * q[i] * q[i];
+    return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
+}
+
 double frame_size(const Frame *frame) {
-    double squares[2] = {0, 0};
-    for (size_t i = 0; i < frame->storeys; i++) {
-        squares[0] += frame->p[i] * frame->p[i];
-        squares[1] += frame->omega2[i] * frame->q[i] * frame->q[i];
-    }
-    return sqrt(squares[0] + squares[1]);
+    return frame_size_of(frame, frame->q, frame->p);
 }
 
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
@@ -196,12 +215,14 @@ static void make_damper(Frame *frame, size_t d) {
     FrameDamper *damper = &frame->damper[d];
     const PlanDamper *planned = &plan->dampers[d];
     *damper = (FrameDamper){.plan = planned,
-                            .shape = frame->modes->shapes + planned->storey * n,
+                            .shape = frame->shapes + d * frame->padded,
                             .lean = plan->influence[planned->storey] - 1,
                             .phase = FRAME_FLIGHT,
                             .origin = FRAME_FROM_MIDDLE,
                             .r = planned->position,
                             .w = planned->velocity};
+    memcpy(frame->shapes + d * frame->padded, frame->modes->shapes + planned->storey * n,
+           n * sizeof *frame->shapes);
     for (size_t j = 0; j < n; j++) {
         frame->mobility[d * n + j] = mobility(frame->modes, planned->storey, j);
         damper->thrust = fmax(damper->thrust, fabs(frame->mobility[d * n + j]));
@@ -221,7 +242,7 @@ static void make_damper(Frame *frame, size_t d) {
 }
 
 // D, its norm and how far it is from only taking energy.
-static void make_damping(Frame *frame) {
+static Status make_damping(Frame *frame) {
     const size_t n = frame->storeys;
     frame->damping = frame->modes->damping;
     double rows = 0, squares = 0, lowest = 0, largest = 0;
@@ -241,8 +262,16 @@ static void make_damping(Frame *frame) {
     // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
     frame->growth =
         linear_find_indefinite(n, frame->damping, NEARLY) == 0 ? NEARLY * largest : -lowest;
-    if (!frame->modes->is_classical)
-        frame->diagonal = NULL;
+    if (frame->modes->is_classical)
+        return STATUS_OK;
+    frame->diagonal = NULL;
+    frame->coupled = calloc(even(n) * frame->padded, sizeof *frame->coupled);
+    if (frame->coupled == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++)
+            frame->coupled[j * frame->padded + i] = frame->damping[i * n + j];
+    return STATUS_OK;
 }
 
 // q = shapes' M x: the modes are normal. `carried` is scratch.
@@ -263,20 +292,23 @@ static void make_modal(const Frame *frame, const double *values, long double *ca
 }
 
 static Status make_room(Frame *frame) {
-    const size_t n = frame->storeys, m = frame->dampers;
-    double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,  &frame->q,
-                               &frame->p,      &frame->elastic,  &frame->widest, &frame->mobility,
+    const size_t n = frame->padded, m = frame->dampers;
+    double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,   &frame->share,
+                               &frame->q,      &frame->p,        &frame->elastic, &frame->widest,
+                               &frame->shapes, &frame->spread,   &frame->seen,    &frame->mobility,
                                &frame->yield,  &frame->hold,     &frame->scratch};
-    const size_t sizes[] = {n, n, n, n, n, n, n, m * n, m * m, m * m, m * m};
-    size_t total = 0;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+    const size_t all = even(frame->storeys) * n;
+    const size_t sizes[] = {n,     n,     n,     n,    n, n, n, n, m * n, all, FRAME_FOUR * n,
+                            m * n, m * m, m * m, m * m};
+    size_t total = frame_lanes_room(0);
+    for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];
     frame->block = calloc(total, sizeof *frame->block);
     frame->damper = calloc(m > 0 ? m : 1, sizeof *frame->damper);
     if (frame->block == NULL || frame->damper == NULL)
         return STATUS_NO_MEMORY;
-    double *at = frame->block;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    double *at = frame_lanes_start(frame->block);
+    for (size_t i = 0; i < COUNT(sizes); i++) {
         *arrays[i] = at;
         at += sizes[i];
     }
@@ -291,6 +323,8 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     frame->plan = plan;
     frame->problem = problem;
     frame->storeys = n;
+    frame->padded = frame_lanes_padded(n);
+    frame->lanes = &frame_lanes_kinds[frame_lanes_widest()];
     frame->dampers = plan->damper_count;
     frame->interval = 1 / plan->sample_rate;
     frame->modes = &plan->modes;
@@ -299,15 +333,17 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
                        plan->influence, problem));
         frame->modes = &frame->own_modes;
     }
-    if (make_room(frame) != STATUS_OK)
+    if (make_room(frame) != STATUS_OK || make_damping(frame) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    make_damping(frame);
     for (size_t i = 0; i < n; i++) {
         frame->omega2[i] = frame->modes->omega[i] * frame->modes->omega[i];
         frame->stiff = fmax(frame->stiff, frame->omega2[i]);
-        frame->carry[i] = frame->modes->participation[i];
-        for (size_t j = 0; j < n; j++)
-            frame->widest[i] = fmax(frame->widest[i], fabs(frame->modes->shapes[j * n + i]));
+        frame->share[i] = frame->carry[i] = frame->modes->participation[i];
+        for (size_t j = 0; j < n; j++) {
+            const double shape = frame->modes->shapes[j * n + i];
+            frame->widest[i] = fmax(frame->widest[i], fabs(shape));
+            frame->spread[i * frame->padded + j] = shape;
+        }
     }
     frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
     frame->rate = fmax(fmax(sqrt(frame->stiff), frame->viscous), 1e-300);
@@ -315,6 +351,9 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     frame->turning = run->base->omega * frame->interval <= 4 || run->base->form == BASE_SINE
                          ? run->base->omega
                          : 0;
+    const long double turn = (long double)frame->turning * frame->interval;
+    frame->turned[0] = (double)cosl(turn);
+    frame->turned[1] = (double)sinl(turn);
     bool is_sound = isfinite(frame->rate) && isfinite(run->base->omega);
     for (size_t d = 0; d < frame->dampers; d++) {
         make_damper(frame, d);
@@ -339,5 +378,6 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
 void frame_clear(Frame *frame) {
     modes_clear(&frame->own_modes);
     free(frame->damper);
+    free(frame->coupled);
     free(frame->block);
 }

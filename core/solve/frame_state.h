@@ -6,6 +6,7 @@
 
 #include "core/plan/modes.h"
 #include "core/solve/cursor.h"
+#include "core/solve/frame_lanes.h"
 #include "core/solve/ledger.h"
 #include "core/solve/solver.h"
 
@@ -36,7 +37,8 @@ typedef struct FrameDamper {
     ContactParameters contact; // frozen at the touch
     LedgerRow row;             // of the present contact or rest
 
-    // Of a step of flight (frame_flight.c): speed of the storey before it, and what r gains.
+    // Of a long step beside another's contact (frame_press.c): speed of the storey before it, and
+    // what r gains.
     double storey_speed, gained;
     // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
     // that presses it [m/s], [m/s], [N s]; the rest is frame_collide's own.
@@ -59,14 +61,22 @@ typedef struct Frame {
 
     bool is_shadow; // only the motion is wanted: no peaks, no energies
 
-    size_t storeys;        // and modes
-    double *omega2;        // [1/s^2]
-    const double *damping; // D: storeys values where it is diagonal, else storeys x storeys
-    double *diagonal;      // of D, where it is diagonal
-    double *widest;        // of each mode, the largest |shape| of any storey
+    size_t storeys;          // and modes
+    size_t padded;           // and values of each array over modes here, zeros behind them
+    const FrameLanes *lanes; // what this processor has
+    double *omega2;          // [1/s^2]
+    const double *damping;   // D, storeys x storeys
+    double *diagonal;        // of D, where it is diagonal; else NULL
+    double *coupled;         // D, where it is not: columns of `padded` values; else NULL
+    double *share;           // participation
+    double *shapes;          // of the dampers' storeys
+    double *spread;          // of all storeys: columns of `padded` values, one a mode
+    double *seen;            // scratch of frame_spread
+    double *widest;          // of each mode, the largest |shape| of any storey
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
     double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
+    double turned[2];      // cosine and sine of what it turns in one of them
     double stiff, viscous; // largest of W^2 and of D
     double drive;          // |participation|
     double growth;         // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
@@ -82,15 +92,18 @@ typedef struct Frame {
     double *elastic; // D p + W^2 q, as of the last frame_feel
     double ground;   // a_g now [m/s^2]
     double *scratch; // of frame_hold_make and frame_collide
-    double *block;   // all arrays above
+    double *block;   // all arrays above, but for coupled
 
     size_t sample; // the last one passed
     double offset; // time since then [s]
     double interval;
     BaseCursor base;
     Ledger ledger;
-    size_t events;       // all so far
-    size_t still_events; // in a row, without time passing
+    size_t events;            // all so far
+    size_t still_events;      // in a row, without time passing
+    size_t storm_events;      // without more time passing than the clock tells from none
+    double storm_time;        // what has passed nevertheless [s]
+    double stall, stalled_at; // how long events were last passed over, and when that was [s]
 } Frame;
 
 // +1 for the right stop, -1 for the left.
@@ -119,13 +132,17 @@ double frame_time(const Frame *frame); // [s]
 double frame_clock(const Frame *frame);
 // Between free mass and stop at r = 0 of the present origin [m].
 double frame_room(const FrameDamper *damper, Side side);
-// Displacement of the free mass relative to its storey [m].
-double frame_relative(const FrameDamper *damper);
+// Displacement of the free mass relative to its storey at r = 0 [m].
+double frame_middle(const FrameDamper *damper);
 
-// out = D p + W^2 q.
+// out = D p + W^2 q; arrays of `padded` values.
 void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
 void frame_feel(Frame *frame);
+// Values of all storeys from those of all modes, until the next call.
+const double *frame_spread(const Frame *frame, const double *modal);
+// Likewise of FRAME_FOUR rows of modes, one after the other.
+const double *frame_spread_four(const Frame *frame, const double *modal);
 // Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
 double frame_displacement(const Frame *frame, size_t storey);
 double frame_velocity(const Frame *frame, size_t storey);
@@ -134,6 +151,7 @@ double frame_storey_acceleration(const Frame *frame, size_t storey);
 double frame_acceleration(const Frame *frame, size_t damper);
 EnergyState frame_energy(const Frame *frame);
 double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
+double frame_size_of(const Frame *frame, const double *q, const double *p);
 
 // No eigenvalue of the present motion is larger [1/s].
 double frame_rate(const Frame *frame);

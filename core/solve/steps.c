@@ -242,7 +242,8 @@ void steps_take_sample(Steps *steps) {
     frame_feel(frame);
     if (frame->sample == steps->record.statistics_start && frame->sample > 0)
         frame_record_forget(frame);
-    frame_record_take(&steps->record, frame);
+    frame_trail_take(&steps->trail, frame, steps->record.base_speed);
+    frame_record_take(&steps->record, frame, 1);
     frame_record_peaks(frame);
 }
 
@@ -336,8 +337,10 @@ Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, 
     steps->length = frame->interval / (double)share;
     TRY(make_room(steps));
     TRY(check_reach(steps));
-    if (!is_shadow)
-        TRY(frame_record_start(&steps->record, frame, response, problem));
+    if (!is_shadow) {
+        TRY(frame_trail_make(&steps->trail, frame, problem));
+        TRY(frame_record_start(&steps->record, &steps->trail, frame, response, problem));
+    }
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     double making = 0;
@@ -350,6 +353,7 @@ void steps_clear(Steps *steps) {
     if (steps->stepper != NULL && steps->stepper->clear != NULL)
         steps->stepper->clear(steps);
     frame_record_clear(&steps->record);
+    frame_trail_clear(&steps->trail);
     frame_clear(&steps->frame);
     free(steps->block);
 }

@@ -39,6 +39,7 @@ typedef struct StepSums {
 
 struct Steps {
     Frame frame;
+    FrameTrail trail; // of one sample
     FrameRecord record;
     const Stepper *stepper;
     void *own;        // the stepper's

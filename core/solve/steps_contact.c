@@ -72,6 +72,7 @@ static void enter(Steps *steps, size_t d, Side side) {
     if (is_new && !steps->stepper->is_by_place)
         damper->contact = stops_freeze(&damper->plan->stops[side], fabs(damper->w));
     open_row(frame, d, 0);
+    damper->row.impact.is_resumed = !is_new;
 }
 
 // A stretch of contact lies behind.

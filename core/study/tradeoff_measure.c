@@ -63,7 +63,7 @@ static Status set_aside(TradeoffPoint *point, TradeoffStatus as, Status status,
                         const Problem *fault, Problem *problem) {
     if (ends_all(status))
         return problem_set(problem, status, "%s", fault->detail);
-    point->status = as;
+    point->status = (int)as;
     return copy_text(&point->why, fault->count > 0 ? fault->faults[0].detail : fault->detail,
                      problem);
 }

@@ -54,9 +54,33 @@ static void a_form_is_the_integral_of_the_product(void **state) {
     }
 }
 
+static void doublings_in_double_are_as_good_as_double(void **state) {
+    (void)state;
+    double out[9], scratch[18];
+    for (double h = 1e-6; h < 1e3; h *= 9) {
+        const double w = 7, A[4] = {0, 1, -w * w, 0}, most = 1e-14 * (10 + w * h);
+        exponential_doublings(A, 2, h, out, scratch);
+        assert_true(fabs(out[0] + 1 - cos(w * h)) < most);
+        assert_true(fabs(out[1] * w - sin(w * h)) < most);
+        assert_true(fabs(out[2] / w + sin(w * h)) < most);
+    }
+    // Nothing is lost to the identity.
+    const double slow[1] = {-1e-9};
+    exponential_doublings(slow, 1, 1e-6, out, scratch);
+    assert_true(fabs(out[0] + 1e-15) < 1e-28);
+    const double chain[9] = {0, 1, 0, 0, 0, 1, 0, 0, 0};
+    exponential_doublings(chain, 3, 100, out, scratch);
+    assert_true(out[1] == 100 && fabs(out[2] - 5000) < 1e-9 && out[0] == 0 && out[3] == 0);
+    const double stiff[4] = {-1e12, 1e12, 0, -1}; // y1 follows y2
+    exponential_doublings(stiff, 2, 1, out, scratch);
+    assert_true(fabs(out[0] + 1) < 1e-12);
+    assert_true(fabs(out[3] + 1 - exp(-1)) < 1e-12 && fabs(out[1] - exp(-1)) < 1e-11);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oscillator_turns),
+        cmocka_unit_test(doublings_in_double_are_as_good_as_double),
         cmocka_unit_test(a_singular_system_is_as_good_as_any),
         cmocka_unit_test(a_stiff_system_decays_and_keeps_its_slow_part),
         cmocka_unit_test(a_form_is_the_integral_of_the_product),

@@ -57,6 +57,34 @@ static void a_hundred_swings_stay_right(void **state) {
     ode_free(ode);
 }
 
+static void a_tolerance_trades_errors_for_steps(void **state) {
+    (void)state;
+    const Swing swing = {-2, 2};
+    double last_error = 0;
+    size_t last_count = (size_t)-1;
+    for (double tolerance = 1e-12; tolerance < 1e-2; tolerance *= 1e3) {
+        const OdeSystem system = {.context = &swing,
+                                  .size = 2,
+                                  .roots = 2,
+                                  .rate = rate,
+                                  .watch = watch,
+                                  .tolerance = tolerance};
+        Ode *ode = ode_new(&system);
+        assert_non_null(ode);
+        double t = 0, y[2] = {0, 1};
+        size_t count = 0;
+        int root;
+        assert_int_equal(ode_start(ode, y, scale, 0.01, &problem), STATUS_OK);
+        for (; t < 50; count++)
+            assert_int_equal(ode_step(ode, 50, &t, y, &root, &problem), STATUS_OK);
+        const double error = fabs(y[0] - sin(50));
+        assert_true(error < 1e3 * tolerance && error > 10 * last_error && count < last_count);
+        last_error = error;
+        last_count = count;
+        ode_free(ode);
+    }
+}
+
 // From 0 upwards: the start is no fall, the first one is at t = pi, or by the level below it later.
 static void a_fall_is_located_to_rounding(void **state) {
     (void)state;
@@ -138,6 +166,7 @@ static void the_same_motion_has_the_same_bits_whatever_went_before(void **state)
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_hundred_swings_stay_right),
+        cmocka_unit_test(a_tolerance_trades_errors_for_steps),
         cmocka_unit_test(a_fall_is_located_to_rounding),
         cmocka_unit_test(a_dip_within_a_step_is_seen),
         cmocka_unit_test(numbers_without_end_are_a_problem),

@@ -377,6 +377,72 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
     plan_free(plan);
 }
 
+static double drawn(uint64_t *state, double a, double b) {
+    *state = *state * 6364136223846793005U + 1442695040888963407U;
+    return a + (b - a) * (double)(*state >> 11) * 0x1p-53;
+}
+
+// Far from the base nothing moves at first but by rounding.
+static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
+    (void)state;
+    uint64_t at = 1;
+    for (int scene = 0; scene < 600; scene++) {
+        const size_t n = 2 + (size_t)scene % 9;
+        double mass[16], stiffness[16], damping[16];
+        double values[3] = {drawn(&at, -1, 1), drawn(&at, -1, 1), 0};
+        const Base base = {.form = BASE_SAMPLED, .interval = 0.01, .count = 3, .values = values};
+        Plan *plan = frames_new(n, 1, 0.005, 1000);
+        for (size_t i = 0; i < n; i++) {
+            mass[i] = drawn(&at, 5, 15);
+            stiffness[i] = drawn(&at, 5e3, 15e3);
+            damping[i] = 1e-3 * stiffness[i] * drawn(&at, 0.1, 3);
+        }
+        frames_shear(plan, mass, stiffness, damping);
+        frames_damper(plan, 0, n - 1, drawn(&at, 0.1, 10), 0, drawn(&at, 0.1, 0.9),
+                      pow(10, drawn(&at, -3.5, -1.5)));
+        plan->dampers[0].stops[1].stiffness *= drawn(&at, 0.5, 2);
+        plan->separation = scene % 2 == 0 ? SEPARATION_ZERO_PENETRATION : SEPARATION_ZERO_FORCE;
+        Response response = {0};
+        Problem problem;
+        Run with = {.plan = plan, .base = &base, .steps_most = 1e6};
+        problem_clear(&problem);
+        if (frame_run(&with, &response, &problem) != STATUS_OK)
+            fail_msg("scene %d: %s", scene, problem.detail);
+        assert_true(response.energy.residual < 1e-11);
+        response_clear(&response);
+        plan_free(plan);
+    }
+}
+
+typedef struct Asked {
+    size_t times, most;
+    double fraction;
+} Asked;
+
+static bool stop_after(void *context, double fraction) {
+    Asked *asked = context;
+    asked->fraction = fraction;
+    return ++asked->times < asked->most;
+}
+
+static void making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way(void **state) {
+    (void)state;
+    enum { MANY = 60 };
+    Plan *plan = frames_new(MANY, 0, 10, 1000);
+    Problem problem;
+    frames_uniform(plan, 1000, 1e6, 0.02);
+    plan->damping[0] *= 5;
+    plan->displacement[0] = 0.01;
+    for (size_t most = 1; most < 14; most += 6) {
+        Asked asked = {.most = most};
+        const Watch watch = {&asked, stop_after};
+        assert_int_equal(status_of(plan, (Run){.watch = &watch}, &problem), STATUS_CANCELLED);
+        assert_int_equal(asked.times, most);
+        assert_true(asked.fraction == 0);
+    }
+    plan_free(plan);
+}
+
 // A half-sine of the base that lasts `length` and leaves the same speed however short it is.
 static double knocked(const Plan *plan, double length, double *steps) {
     const double start = 0.0123, amplitude = 1 / length;
@@ -421,6 +487,8 @@ int main(void) {
         cmocka_unit_test(a_short_pulse_costs_what_a_long_one_does),
         cmocka_unit_test(many_held_masses_change_stops_together),
         cmocka_unit_test(limits_and_cancelling_end_a_run_with_their_reason),
+        cmocka_unit_test(masses_held_tight_wait_for_the_base_to_reach_them),
+        cmocka_unit_test(making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

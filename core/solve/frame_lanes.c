@@ -1,0 +1,49 @@
+// Products and sums are of one lane each and none are contracted, and what is summed over lanes is
+// summed in one order, so every width of vector gives the same bytes.
+#include "core/solve/frame_lanes.h"
+
+#include <stdint.h>
+
+enum { LANES = FRAME_LANES, LARGE = 4096 };
+
+static inline double total(const double s[LANES]) {
+    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
+// clang-format off
+#define KIND(name)                                                                                 \
+    {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
+     .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
+     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
+// clang-format on
+
+#define WIDTH 2
+#define NAME(name) name##_plain
+#define TARGET
+#include "core/solve/frame_lanes.inc"
+
+#ifdef __x86_64__
+#define WIDTH 4
+#define NAME(name) name##_avx2
+#define TARGET __attribute__((target("avx2")))
+#include "core/solve/frame_lanes.inc"
+
+#define WIDTH 8
+#define NAME(name) name##_avx512
+#define TARGET __attribute__((target("avx512f,avx512dq")))
+#include "core/solve/frame_lanes.inc"
+
+const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(avx2), KIND(avx512)};
+#else
+const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(plain), KIND(plain)};
+#endif
+
+size_t frame_lanes_widest(void) {
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        return 2;
+    if (__builtin_cpu_supports("avx2"))
+        return 1;
+#endif
+    return 0;
+}
