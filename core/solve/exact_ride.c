@@ -1,8 +1,8 @@
+// Eight samples of a contact side by side. Each is seen straight from the beginning of the ride;
+// what belongs to the interval before it takes the neighbour's values.
 #include "core/solve/exact_ride.h"
 
 #include <math.h>
-
-#define INLINE static inline __attribute__((always_inline))
 
 enum { RIDE = PULSE_RIDE };
 
@@ -14,280 +14,377 @@ typedef double Loose __attribute__((vector_size(8 * RIDE), aligned(8), may_alias
 // LOAD(ones + RIDE - count) is 1 for the first `count`, and 0.
 static const double ones[2 * RIDE] = {1, 1, 1, 1, 1, 1, 1, 1};
 
-// The samples of a ride, each with the amplitudes from there on.
+typedef enum BaseKind { STILL, LINEAR, SINE } BaseKind;
+
+// The samples of a ride: amplitudes and base from there on, and what is seen there.
 typedef struct Ride {
-    double d[4][RIDE + 1], a[RIDE + 1], s[RIDE + 1];
-    double x[RIDE], v[RIDE], r[RIDE], w[RIDE], n[RIDE], rate[RIDE];
-    double bend; // |r''| is not larger
+    Eight d[4], a, s, jump;
+    Eight x, v, r, w, n, rate;
+    double d0[4], a0, s0, rate0; // at the beginning, one by one: as vectors they would wait
 } Ride;
 
-INLINE double largest(const double *values, double least) {
-    double most[RIDE / 2];
-    for (size_t j = 0; j < RIDE / 2; j++) {
-        const double a = fabs(values[j]), b = fabs(values[j + RIDE / 2]);
-        most[j] = a > b ? a : b;
+// What rides add up to and the largest magnitudes seen, lane by lane.
+typedef struct Tally {
+    Eight swing, vv, ww, work, base, xx, aa;
+    double x[RIDE], v[RIDE], acceleration[RIDE], z[RIDE], force[RIDE];
+} Tally;
+
+INLINE void shift(const Eight *values, double first, Eight *shifted) {
+    *shifted = __builtin_shufflevector(*values, *values, 0, 0, 1, 2, 3, 4, 5, 6);
+    (*shifted)[0] = first;
+}
+
+// In loops: vectors of all widths compare lane by lane in plain C alone.
+INLINE void grow(double most[RIDE], const Eight *values) {
+    double size[RIDE];
+    STORE(size, *values);
+    for (int j = 0; j < RIDE; j++) {
+        size[j] = fabs(size[j]);
+        most[j] = size[j] > most[j] ? size[j] : most[j];
     }
-    const double a = most[0] > most[1] ? most[0] : most[1];
-    const double b = most[2] > most[3] ? most[2] : most[3], all = a > b ? a : b;
-    return all > least ? all : least;
+}
+
+INLINE void halve(const Eight *values, Four *sums) {
+    *sums = __builtin_shufflevector(*values, *values, 0, 1, 2, 3) +
+            __builtin_shufflevector(*values, *values, 4, 5, 6, 7);
+}
+
+INLINE double sum_of(const Eight *values) {
+    Four four;
+    halve(values, &four);
+    return (four[0] + four[2]) + (four[1] + four[3]);
+}
+
+INLINE double most_of(const double values[RIDE]) {
+    double most = 0;
+    for (size_t j = 0; j < RIDE; j++)
+        most = ledger_larger(most, values[j]);
+    return most;
 }
 
 // All eight straight from the beginning: what each jump of the base's slope leaves is the same, but
 // later.
-INLINE void turn(const Press *press, Ride *ride, const double *base) {
+INLINE void turn(const Press *press, Ride *ride, const double *base, BaseKind kind) {
     const Pulse *p = press->pulse;
-    const double *d = press->d;
-    Eight jump = {0};
-    if (base == NULL) {
-        STORE(ride->a + 1, jump);
-        STORE(ride->s + 1, jump);
-    } else {
+    const double *d = ride->d0;
+    if (kind == LINEAR) {
         const double rate = press->exact->plan->sample_rate;
-        const Eight slope = (LOAD(base + 2) - LOAD(base + 1)) * rate;
-        jump = slope - (LOAD(base + 1) - LOAD(base)) * rate;
-        jump[0] = slope[0] - press->slope;
-        STORE(ride->a + 1, LOAD(base + 1));
-        STORE(ride->s + 1, slope);
+        ride->a = LOAD(base + 1);
+        ride->s = (LOAD(base + 2) - ride->a) * rate;
+        ride->jump = ride->s - (ride->a - LOAD(base)) * rate;
+        ride->jump[0] = ride->s[0] - ride->s0;
     }
-    ride->a[0] = press->a;
-    ride->s[0] = press->slope;
-    double lane[4][RIDE];
+    if (kind == SINE) {
+        ride->a = LOAD(p->cosine) * ride->a0 + LOAD(p->sine) * ride->s0;
+        ride->s = LOAD(p->cosine) * ride->s0 - LOAD(p->sine) * ride->a0;
+    }
     for (int i = 0; i < 4; i += 2) {
         Eight re = LOAD(p->ride[i]) * d[i] - LOAD(p->ride[i + 1]) * d[i + 1];
         Eight im = LOAD(p->ride[i]) * d[i + 1] + LOAD(p->ride[i + 1]) * d[i];
-        for (int k = 0; k < RIDE && base != NULL; k++) {
-            re += LOAD(p->jumps[i] + RIDE - k) * jump[k];
-            im += LOAD(p->jumps[i + 1] + RIDE - k) * jump[k];
+        for (int k = 0; k < RIDE && kind == LINEAR; k++) {
+            re += LOAD(p->jumps[i] + RIDE - k) * ride->jump[k];
+            im += LOAD(p->jumps[i + 1] + RIDE - k) * ride->jump[k];
         }
-        ride->d[i][0] = d[i];
-        ride->d[i + 1][0] = d[i + 1];
-        STORE(ride->d[i] + 1, re);
-        STORE(ride->d[i + 1] + 1, im);
-        STORE(lane[i], re);
-        STORE(lane[i + 1], im);
+        ride->d[i] = re;
+        ride->d[i + 1] = im;
     }
-    // Taken from what is at hand: a load across the stores above would wait for them.
-    double bend[RIDE];
-    for (int j = 0; j < RIDE; j++)
-        bend[j] = p->size2[0] * (fabs(lane[0][j]) + fabs(lane[1][j])) +
-                  p->size2[1] * (fabs(lane[2][j]) + fabs(lane[3][j]));
-    ride->bend = largest(bend, p->size2[0] * (fabs(d[0]) + fabs(d[1])) +
-                                   p->size2[1] * (fabs(d[2]) + fabs(d[3])));
 }
 
-INLINE void see(const Ride *ride, const PulseRow *row, double out[RIDE]) {
-    for (int j = 0; j < RIDE; j++)
-        out[j] = ((row->d[0] * ride->d[0][j + 1] + row->d[1] * ride->d[1][j + 1]) +
-                  (row->d[2] * ride->d[2][j + 1] + row->d[3] * ride->d[3][j + 1])) +
-                 (row->a * ride->a[j + 1] + row->s * ride->s[j + 1]);
+INLINE void see(const Pulse *p, const Ride *ride, PulseRow row, BaseKind kind, Eight *out) {
+    const double(*c)[PULSE_ROWS] = p->see;
+    *out = (c[0][row] * ride->d[0] + c[1][row] * ride->d[1]) +
+           (c[2][row] * ride->d[2] + c[3][row] * ride->d[3]);
+    if (kind != STILL)
+        *out += c[PULSE_A][row] * ride->a + c[PULSE_S][row] * ride->s;
 }
 
-INLINE void set_start(Press *press, const Ride *ride, size_t j) {
+// Bit j: the interval up to sample j surely belongs to the contact. Bit RIDE + j: the force rises
+// there.
+INLINE unsigned mark(const Press *press, const Ride *ride) {
+    static const double bits[2][RIDE] = {
+        {1, 2, 4, 8, 16, 32, 64, 128},
+        {1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15}};
+    const Exact *exact = press->exact;
+    const Pulse *p = press->pulse;
+    const double h = exact->interval, sway = p->sway * exact->stretch.base_most;
+    double d[4][RIDE], bends[RIDE], bend[RIDE], r[RIDE], before[RIDE], w[RIDE], w_before[RIDE];
+    double rate[RIDE], marks[RIDE];
+    Eight shifted, here;
     for (int i = 0; i < 4; i++)
-        press->d[i] = ride->d[i][j];
-    press->a = ride->a[j];
-    press->slope = ride->s[j];
+        STORE(d[i], ride->d[i]);
+    for (int j = 0; j < RIDE; j++)
+        bends[j] = p->size2[0] * (fabs(d[0][j]) + fabs(d[1][j])) +
+                   p->size2[1] * (fabs(d[2][j]) + fabs(d[3][j]));
+    here = LOAD(bends);
+    const double *d0 = ride->d0;
+    const double bend0 =
+        p->size2[0] * (fabs(d0[0]) + fabs(d0[1])) + p->size2[1] * (fabs(d0[2]) + fabs(d0[3]));
+    shift(&here, bend0, &shifted);
+    STORE(bend, shifted + sway); // |r''| in the interval before is not larger
+    here = press->sign * ride->r;
+    shift(&here, press->sign * exact->state.r, &shifted);
+    STORE(r, here);
+    STORE(before, shifted);
+    shift(&ride->w, exact->state.w, &shifted);
+    STORE(w, ride->w);
+    STORE(w_before, shifted);
+    STORE(rate, press->sign * ride->rate);
+    for (int j = 0; j < RIDE; j++) {
+        const double sag = bend[j] * (h * h / 8), change = bend[j] * h;
+        const double least = r[j] < before[j] ? r[j] : before[j];
+        const double one = fabs(w[j]), other = fabs(w_before[j]);
+        const double fast = one > other ? one : other;
+        const double inside = least > sag ? bits[0][j] : 0;
+        const double crossing = fast > change ? bits[0][j] : 0;
+        marks[j] =
+            (least > 0 && crossing > inside ? crossing : inside) + (rate[j] > 0 ? bits[1][j] : 0);
+    }
+    here = LOAD(marks);
+    return (unsigned)sum_of(&here);
 }
 
-// How many intervals surely belong to the contact and show its peaks.
-INLINE size_t count_clear(Press *press, const Ride *ride) {
-    const Exact *exact = press->exact;
-    const double sag = ride->bend * exact->interval * exact->interval / 8;
-    const double speed = ride->bend * exact->interval;
-    double r = press->sign * exact->state.r, w = exact->state.w;
-    double rate = press->sign * pulse_see(&press->pulse->n_rate, press->d, 0, press->slope);
-    size_t clear = 0;
-    int near = 0, rising = 0, falling = 0;
-    for (int j = 0; j < RIDE; j++) {
-        near += !(press->sign * ride->r[j] > sag);
-        rising += press->sign * ride->rate[j] > 0;
-        falling += press->sign * ride->rate[j] < 0;
+// The start of interval j.
+INLINE void set_start(Press *press, const Ride *ride, double (*at)[RIDE], size_t j) {
+    if (j == 0) {
+        press->d = (Four){ride->d0[0], ride->d0[1], ride->d0[2], ride->d0[3]};
+        press->a = ride->a0;
+        press->slope = ride->s0;
+    } else {
+        press->d = (Four){at[0][j - 1], at[1][j - 1], at[2][j - 1], at[3][j - 1]};
+        press->a = at[4][j - 1];
+        press->slope = at[5][j - 1];
     }
-    if (near == 0 && r > sag && (rate > 0 ? rising == RIDE : falling == RIDE))
-        return RIDE;
-    for (; clear < RIDE; clear++) {
-        const double next = press->sign * ride->r[clear], next_w = ride->w[clear];
-        const double next_rate = press->sign * ride->rate[clear];
-        const bool is_inside = (next > sag && r > sag) ||
-                               (next > 0 && r > 0 && (fabs(w) > speed || fabs(next_w) > speed));
-        if (!is_inside || (rate <= 0 && next_rate >= 0))
-            break;
-        if (rate > 0 && next_rate < 0) {
-            set_start(press, ride, clear);
-            const bool is_found = press_find_peak(
-                press, exact->interval * rate / (rate - next_rate), exact->interval);
-            set_start(press, ride, 0);
+}
+
+// How many intervals surely belong to the contact and show its peaks. `at` are the starts' lanes.
+INLINE size_t count_clear(Press *press, const Ride *ride, double (*at)[RIDE]) {
+    const Exact *exact = press->exact;
+    const unsigned marks = mark(press, ride), inside = marks & 0xff, rising = marks >> RIDE;
+    size_t count = (size_t)__builtin_ctz(~inside);
+    const double first = press->sign * ride->rate0;
+    size_t falls = 0; // from there on the force must fall
+    if (first > 0) {
+        falls = (size_t)__builtin_ctz(~rising);
+        if (falls < count) {
+            const double from = falls == 0 ? first : press->sign * ride->rate[falls - 1];
+            const double to = press->sign * ride->rate[falls];
+            set_start(press, ride, at, falls);
+            const bool is_found =
+                press_find_peak(press, exact->interval * from / (from - to), exact->interval);
             if (!is_found)
-                break;
+                return falls;
         }
-        r = next;
-        w = next_w;
-        rate = next_rate;
     }
-    return clear;
+    const unsigned again = rising >> falls;
+    if (falls < count && again != 0) {
+        const size_t next = falls + (size_t)__builtin_ctz(again);
+        count = next < count ? next : count;
+    }
+    return count;
 }
 
-// What each interval adds.
-typedef struct Gains {
-    double swing[RIDE], v[RIDE], w[RIDE], base[RIDE], work[RIDE];
-} Gains;
-
-INLINE void see_gains(const Press *press, const Ride *ride, Gains *gains) {
+INLINE void take_sums(Press *press, const Ride *ride, const Eight *keep, size_t count,
+                      BaseKind kind, Tally *tally) {
     const Exact *exact = press->exact;
     const Pulse *p = press->pulse;
-    const double h = exact->interval, mass = exact->damper->mass;
-    const double total = exact->plan->mass[0] + mass;
-    double x0[RIDE] = {exact->state.x}, r0[RIDE] = {exact->state.r};
-    for (int j = 1; j < RIDE; j++) {
-        x0[j] = ride->x[j - 1];
-        r0[j] = ride->r[j - 1];
-    }
-    for (int j = 0; j < RIDE; j++) {
-        const double s = ride->s[j], a = ride->a[j], b = ride->a[j + 1];
-        const double jump = ride->s[j + 1] - s, own = (a + b) / 2 * h;
-        const double v = p->v.s * s, w = p->w.s * s;
-        double x = p->x.a * own + p->x.s * s * h, r = p->r.a * own + p->r.s * s * h;
-        double dv = -jump * p->vv.jump2, dw = -jump * p->ww.jump2;
-        for (int i = 0; i < 4; i++) {
-            const double end = ride->d[i][j + 1], change = end - jump * p->jump[i] - ride->d[i][j];
-            x += p->x_sum.d[i] * change;
-            r += p->r_sum.d[i] * change;
-            dv += p->vv.jump[i] * end;
-            dw += p->ww.jump[i] * end;
-        }
-        gains->swing[j] = ride->d[0][j] * ride->d[0][j] + ride->d[1][j] * ride->d[1][j];
-        gains->v[j] = v * (2 * (ride->x[j] - x0[j]) - v * h) - jump * dv;
-        gains->w[j] = w * (2 * (ride->r[j] - r0[j]) - w * h) - jump * dw;
-        gains->base[j] = own;
-        gains->work[j] = total * (b * ride->x[j] - a * x0[j] - s * x) +
-                         mass * (b * ride->r[j] - a * r0[j] - s * r);
-    }
-}
-
-INLINE void take_sums(Press *press, const Ride *ride, size_t count) {
-    const Pulse *p = press->pulse;
-    const double length = (double)count * press->exact->interval;
-    const double *keep = ones + RIDE - count;
-    Gains gains;
-    see_gains(press, ride, &gains);
-    double swing = 0, v = 0, w = 0, base = 0, work = 0;
-    for (size_t j = 0; j < RIDE; j++) {
-        swing += keep[j] * gains.swing[j];
-        v += keep[j] * gains.v[j];
-        w += keep[j] * gains.w[j];
-        base += keep[j] * gains.base[j];
-        work += keep[j] * gains.work[j];
-    }
-    const double unit[4] = {1, 0, 0, 0};
-    const double slow = swing * pulse_slow(p, unit, press->exact->interval);
-    press->vv += p->vv.slow * slow + v;
-    press->ww += p->ww.slow * slow + w;
-    press->work -= work;
-    press->gained += base;
+    const double h = exact->interval, length = (double)count * h;
+    const Eight swing = ride->d[0] * ride->d[0] + ride->d[1] * ride->d[1];
+    Eight before;
+    shift(&swing, ride->d0[0] * ride->d0[0] + ride->d0[1] * ride->d0[1], &before);
+    tally->swing += *keep * before;
     press->length += length;
     press->elapsed += length;
+    if (kind == LINEAR) {
+        const double share = exact->flying.share;
+        const double v1 = p->see[PULSE_S][PULSE_V], w1 = p->see[PULSE_S][PULSE_W];
+        const Eight jump = ride->jump, u = ride->x + share * ride->r;
+        Eight s, a, x, r, u_before, middle = {0}, middle_before, v = {0}, w = {0};
+        double middle_first = 0, middle_jump = 0;
+        for (int i = 0; i < 4; i++) {
+            v += p->vv.jump[i] * ride->d[i];
+            w += p->ww.jump[i] * ride->d[i];
+            middle += p->middle[i] * ride->d[i];
+            middle_first += p->middle[i] * ride->d0[i];
+            middle_jump += p->middle[i] * p->jump[i];
+        }
+        shift(&ride->s, ride->s0, &s);
+        shift(&ride->a, ride->a0, &a);
+        shift(&ride->x, exact->state.x, &x);
+        shift(&ride->r, exact->state.r, &r);
+        shift(&u, exact->state.x + share * exact->state.r, &u_before);
+        shift(&middle, middle_first, &middle_before);
+        const Eight own = (a + ride->a) * (h / 2), v0 = v1 * s, w0 = w1 * s;
+        const Eight whole = ((middle - middle_before) - middle_jump * jump) +
+                            (p->middle_a * own + (p->middle_s * h) * s);
+        tally->base += *keep * own;
+        tally->work += *keep * ((ride->a * u - a * u_before) - s * whole);
+        tally->vv += *keep * (v0 * (2 * (ride->x - x) - h * v0) - jump * (v - p->vv.jump2 * jump));
+        tally->ww += *keep * (w0 * (2 * (ride->r - r) - h * w0) - jump * (w - p->ww.jump2 * jump));
+    }
+    if (kind == SINE) {
+        const Slice ones_of[2] = {{1, 0, p->base_omega}, {0, 1, p->base_omega}};
+        const double value = exact_turned(&ones_of[0], h), slope = exact_turned(&ones_of[1], h);
+        Eight a, s;
+        shift(&ride->a, ride->a0, &a);
+        shift(&ride->s, ride->s0, &s);
+        tally->base += *keep * (value * a + slope * s);
+    }
 }
 
-INLINE void put(double *const *columns, ChannelId channel, size_t sample, const double *values) {
+INLINE void put(double *const *columns, ChannelId channel, size_t sample, const Eight *values) {
     if (columns[channel] != NULL)
-        for (size_t j = 0; j < RIDE; j++)
-            columns[channel][sample + j] = values[j];
+        STORE(columns[channel] + sample, *values);
 }
 
-// Those behind `count` are written as zeros, which is what the force is if the contact ends
+// Those behind the kept ones are written as zeros, which is what the force is if the contact ends
 // (0.0 makes -0 one).
-INLINE void take_samples(Press *press, const Ride *ride, size_t count) {
-    Exact *exact = press->exact;
+INLINE void take_samples(const Press *press, const Ride *ride, const Eight *keep, Tally *tally) {
+    const Exact *exact = press->exact;
     const Motion *m = &exact->flying;
-    const double *keep = ones + RIDE - count;
-    double x[RIDE], v[RIDE], acceleration[RIDE], z[RIDE], speed[RIDE], force[RIDE], depth[RIDE];
     const double mass = exact_effective_mass(exact);
     const double middle = exact_relative(exact) - exact->state.r;
-    for (size_t j = 0; j < RIDE; j++) {
-        x[j] = keep[j] * ride->x[j];
-        v[j] = keep[j] * ride->v[j];
-        const double own = m->damping * ride->v[j] + m->omega2 * ride->x[j];
-        acceleration[j] = keep[j] * (m->share * ride->n[j] - own);
-        z[j] = keep[j] * (ride->x[j] + (middle + ride->r[j]));
-        speed[j] = ride->v[j] + ride->w[j];
-        force[j] = keep[j] * (mass * ride->n[j]) + 0.0;
-        depth[j] = keep[j] * (press->sign * ride->r[j]) + 0.0;
-    }
+    const Eight own = m->damping * ride->v + m->omega2 * ride->x;
+    const Eight x = *keep * ride->x, v = *keep * ride->v;
+    const Eight acceleration = *keep * (m->share * ride->n - own);
+    const Eight z = *keep * (ride->x + (middle + ride->r)), speed = ride->v + ride->w;
+    const Eight force = *keep * (mass * ride->n) + 0.0;
+    const Eight depth = *keep * (press->sign * ride->r) + 0.0;
     double *const *columns = exact->recorder.columns;
     const size_t at = exact->sample + 1;
-    put(columns, CHANNEL_DISPLACEMENT, at, x);
-    put(columns, CHANNEL_VELOCITY, at, v);
-    put(columns, CHANNEL_ACCELERATION, at, acceleration);
-    put(columns, CHANNEL_DAMPER_DISPLACEMENT, at, z);
-    put(columns, CHANNEL_DAMPER_VELOCITY, at, speed);
-    put(columns, CHANNEL_PENETRATION, at, depth);
-    put(columns, CHANNEL_CONTACT_FORCE, at, force);
-    Peaks *peaks = &exact->ledger.response->peaks;
-    peaks->displacement = largest(x, peaks->displacement);
-    peaks->velocity = largest(v, peaks->velocity);
-    peaks->acceleration = largest(acceleration, peaks->acceleration);
-    peaks->damper_displacement = largest(z, peaks->damper_displacement);
-    ledger_force(&exact->ledger, &exact->row, largest(force, 0));
-    if (exact->sample < exact->recorder.statistics_start)
-        return;
-    double xx = 0, aa = 0;
-    for (size_t j = 0; j < RIDE; j++) {
-        xx += x[j] * x[j];
-        aa += acceleration[j] * acceleration[j];
-    }
-    recorder_sums(&exact->recorder, count, xx, aa);
+    put(columns, CHANNEL_DISPLACEMENT, at, &x);
+    put(columns, CHANNEL_VELOCITY, at, &v);
+    put(columns, CHANNEL_ACCELERATION, at, &acceleration);
+    put(columns, CHANNEL_DAMPER_DISPLACEMENT, at, &z);
+    put(columns, CHANNEL_DAMPER_VELOCITY, at, &speed);
+    put(columns, CHANNEL_PENETRATION, at, &depth);
+    put(columns, CHANNEL_CONTACT_FORCE, at, &force);
+    grow(tally->x, &x);
+    grow(tally->v, &v);
+    grow(tally->acceleration, &acceleration);
+    grow(tally->z, &z);
+    grow(tally->force, &force);
+    tally->xx += x * x;
+    tally->aa += acceleration * acceleration;
 }
 
-INLINE size_t run(Press *press, size_t most) {
+INLINE void enter(Press *press, const Tally *tally, size_t count, bool is_counted) {
     Exact *exact = press->exact;
     const Pulse *p = press->pulse;
-    const bool is_still = exact->stretch.base_most == 0;
-    size_t done = 0;
+    const Four unit = {1, 0, 0, 0};
+    const double slow = sum_of(&tally->swing) * pulse_slow(p, &unit, exact->interval);
+    Four vv, ww, work, base, sums;
+    halve(&tally->vv, &vv);
+    halve(&tally->ww, &ww);
+    halve(&tally->work, &work);
+    halve(&tally->base, &base);
+    wide_sum(&vv, &ww, &work, &base, &sums);
+    press->vv += p->vv.slow * slow + sums[0];
+    press->ww += p->ww.slow * slow + sums[1];
+    press->work -= (exact->plan->mass[0] + exact->damper->mass) * sums[2];
+    press->gained += sums[3];
+    Peaks *peaks = &exact->ledger.response->peaks;
+    peaks->displacement = ledger_larger(peaks->displacement, most_of(tally->x));
+    peaks->velocity = ledger_larger(peaks->velocity, most_of(tally->v));
+    peaks->acceleration = ledger_larger(peaks->acceleration, most_of(tally->acceleration));
+    peaks->damper_displacement = ledger_larger(peaks->damper_displacement, most_of(tally->z));
+    ledger_force(&exact->ledger, &exact->row, most_of(tally->force));
+    exact->run->steps += (double)count;
+    if (is_counted)
+        recorder_sums(&exact->recorder, count, sum_of(&tally->xx), sum_of(&tally->aa));
+}
+
+INLINE size_t run(Press *press, size_t most, BaseKind kind) {
+    Exact *exact = press->exact;
+    const Pulse *p = press->pulse;
+    const Base *base = exact->run->base;
+    const size_t counts_from = exact->recorder.statistics_start;
+    const bool is_counted = exact->sample >= counts_from;
     if (exact->recorder.columns[CHANNEL_MEAN_ACCELERATION] != NULL)
         return 0;
-    if (exact->sample < exact->recorder.statistics_start &&
-        most > exact->recorder.statistics_start - 1 - exact->sample)
-        most = exact->recorder.statistics_start - 1 - exact->sample;
+    if (!is_counted && most > counts_from - 1 - exact->sample)
+        most = counts_from - 1 - exact->sample;
+    size_t done = 0;
+    const Eight none = {0};
+    Tally tally; // member by member: as a whole it would be a call
+    tally.swing = tally.vv = tally.ww = tally.work = tally.base = tally.xx = tally.aa = none;
+    STORE(tally.x, none);
+    STORE(tally.v, none);
+    STORE(tally.acceleration, none);
+    STORE(tally.z, none);
+    STORE(tally.force, none);
+    Ride ride;
+    Four force;
+    pulse_see(p, PULSE_N, &press->d, press->a, press->slope, &force);
+    for (int i = 0; i < 4; i++)
+        ride.d0[i] = press->d[i];
+    ride.a0 = press->a;
+    ride.s0 = press->slope;
+    ride.rate0 = force[1];
+    double at[11][RIDE];
     while (done + RIDE <= most) {
-        Ride ride;
-        if (!is_still && exact->sample + RIDE + 1 >= exact->run->base->count)
+        if (kind == LINEAR && exact->sample + RIDE + 1 >= base->count)
             break;
-        turn(press, &ride, is_still ? NULL : exact->run->base->values + exact->sample);
-        see(&ride, &p->x, ride.x);
-        see(&ride, &p->v, ride.v);
-        see(&ride, &p->r, ride.r);
-        see(&ride, &p->w, ride.w);
-        see(&ride, &p->n, ride.n);
-        see(&ride, &p->n_rate, ride.rate);
-        const size_t count = count_clear(press, &ride);
+        if (kind == SINE && exact->sample % PRESS_FRESH < RIDE) {
+            Slice slice;
+            exact_slice(exact, &slice);
+            ride.a0 = slice.value;
+            ride.s0 = slice.slope;
+        }
+        turn(press, &ride, kind == LINEAR ? base->values + exact->sample : NULL, kind);
+        see(p, &ride, PULSE_X, kind, &ride.x);
+        see(p, &ride, PULSE_V, kind, &ride.v);
+        see(p, &ride, PULSE_R, kind, &ride.r);
+        see(p, &ride, PULSE_W, kind, &ride.w);
+        see(p, &ride, PULSE_N, kind, &ride.n);
+        see(p, &ride, PULSE_N1, kind, &ride.rate);
+        for (int i = 0; i < 4; i++)
+            STORE(at[i], ride.d[i]);
+        STORE(at[4], kind == STILL ? none : ride.a);
+        STORE(at[5], kind == STILL ? none : ride.s);
+        STORE(at[6], ride.x);
+        STORE(at[7], ride.v);
+        STORE(at[8], ride.r);
+        STORE(at[9], ride.w);
+        STORE(at[10], ride.rate);
+        const size_t count = count_clear(press, &ride, at);
         if (count == 0)
             break;
-        take_sums(press, &ride, count);
-        take_samples(press, &ride, count);
-        set_start(press, &ride, count);
-        exact->state =
-            (State){ride.x[count - 1], ride.v[count - 1], ride.r[count - 1], ride.w[count - 1]};
+        const Eight keep = LOAD(ones + RIDE - count);
+        take_sums(press, &ride, &keep, count, kind, &tally);
+        take_samples(press, &ride, &keep, &tally);
+        const size_t last = count - 1;
+        for (int i = 0; i < 4; i++)
+            ride.d0[i] = at[i][last];
+        ride.a0 = at[4][last];
+        ride.s0 = at[5][last];
+        ride.rate0 = at[10][last];
+        exact->state = (State){at[6][last], at[7][last], at[8][last], at[9][last]};
         exact->sample += count;
-        exact->run->steps += (double)count;
-        exact->recorder.last_velocity = exact->state.v;
         done += count;
         if (count < RIDE)
             break;
     }
+    set_start(press, &ride, at, 0);
+    if (done > 0) {
+        exact->recorder.last_velocity = exact->state.v;
+        enter(press, &tally, done, is_counted);
+    }
     return done;
 }
 
-static size_t run_plain(Press *press, size_t most) {
-    return run(press, most);
+INLINE size_t run_any(Press *press, size_t most) {
+    if (press->pulse->base_omega > 0)
+        return run(press, most, SINE);
+    return press->exact->stretch.base_most > 0 ? run(press, most, LINEAR) : run(press, most, STILL);
 }
 
 #ifdef __x86_64__
 __attribute__((target("avx2"))) static size_t run_avx2(Press *press, size_t most) {
-    return run(press, most);
+    return run_any(press, most);
 }
 
 __attribute__((target("avx512f,avx512dq"))) static size_t run_avx512(Press *press, size_t most) {
-    return run(press, most);
+    return run_any(press, most);
 }
 #endif
 
@@ -298,5 +395,5 @@ size_t press_ride(Press *press, size_t most) {
     if (press->exact->lanes.width == LANES_AVX2)
         return run_avx2(press, most);
 #endif
-    return run_plain(press, most);
+    return run_any(press, most);
 }

@@ -3,18 +3,7 @@
 #ifndef CORE_SOLVE_EXACT_RIDE_H
 #define CORE_SOLVE_EXACT_RIDE_H
 
-#include "core/solve/exact_state.h"
-
-typedef struct Press {
-    Exact *exact;
-    const Pulse *pulse;
-    double sign;
-    double d[4], a, slope;               // at the beginning of the present stretch
-    double elapsed;                      // since the touch [s]
-    double lasts;                        // surely until then [s]
-    double speed, absolute;              // at the touch: |w|, and the free mass's velocity
-    double vv, ww, work, gained, length; // since then
-} Press;
+#include "core/solve/press.h"
 
 // The largest force within a stretch in which its slope turns from rising to falling; false if it
 // cannot be told.

@@ -47,6 +47,8 @@ typedef struct Exact {
     double offset; // time since then [s]
     double interval;
     BaseCursor base;
+    Slice sine;         // at sample sine_sample - 1: looked up once for all that happens after it
+    size_t sine_sample; // 0: none yet
     Ledger ledger;
     LedgerRow row; // of the present contact or rest
     Recorder recorder;
@@ -136,6 +138,45 @@ static inline EnergyState exact_energy(const Exact *exact) {
     return (EnergyState){
         0.5 * plan->mass[0] * state->v * state->v + 0.5 * exact->damper->mass * z * z,
         0.5 * plan->stiffness[0] * state->x * state->x + 0.5 * k * state->r * state->r};
+}
+
+// A sine seen from t on; t is at most an interval that has_hops is for.
+static inline void exact_turn(const Slice *slice, double t, Slice *turned) {
+    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
+    const double sine = angle - angle * (square * (1.0 / 6 - square * (1.0 / 120)) +
+                                         fourth * square * (1.0 / 5040));
+    const double less = square * (1.0 / 2 - square * (1.0 / 24)) +
+                        fourth * square * (1.0 / 720 - square * (1.0 / 40320)); // 1 less the cosine
+    *turned = (Slice){slice->value - (slice->value * less - slice->slope * sine),
+                      slice->slope - (slice->slope * less + slice->value * sine), slice->omega};
+}
+
+// Its integral.
+static inline double exact_turned(const Slice *slice, double t) {
+    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
+    const double sine = 1 - square * (1.0 / 6 - square * (1.0 / 120)) -
+                        fourth * square * (1.0 / 5040); // over the angle
+    const double less = angle * (1.0 / 2 - square * (1.0 / 24) + fourth * (1.0 / 720));
+    return t * (slice->value * sine + slice->slope * less);
+}
+
+// The base from this instant on, to the next sample; for strides alone, where the grids coincide.
+static inline void exact_slice(Exact *exact, Slice *slice) {
+    const Base *base = exact->run->base;
+    if (exact->stretch.base_most == 0 ||
+        (base->form == BASE_SAMPLED && exact->sample + 1 >= base->count)) {
+        *slice = (Slice){0, 0, 0};
+    } else if (base->form == BASE_SAMPLED) {
+        const double *a = base->values + exact->sample;
+        const double slope = (a[1] - a[0]) * exact->plan->sample_rate;
+        *slice = (Slice){a[0] + slope * exact->offset, slope, 0};
+    } else {
+        if (exact->sine_sample != exact->sample + 1) {
+            (void)base_cursor_interval(&exact->base, exact->sample, &exact->sine);
+            exact->sine_sample = exact->sample + 1;
+        }
+        exact_turn(&exact->sine, exact->offset, slice);
+    }
 }
 
 static inline const Motion *exact_motion(const Exact *exact) {

@@ -39,10 +39,10 @@ void exact_stride_start(Exact *exact) {
     }
     if (!exact->has_lanes) {
         lanes_make(&exact->lanes, &exact->flying, base->omega, exact->interval, lanes_widest());
-        hop_table_make(&exact->hops, &exact->flying, exact->interval);
+        hop_table_make(&exact->hops, &exact->flying, base->omega, exact->interval);
     }
     exact->has_lanes = true;
-    exact->has_hops = !is_sine && exact->flying.rate * exact->interval <= HOP_REACH;
+    exact->has_hops = fmax(exact->flying.rate, base->omega) * exact->interval <= HOP_REACH;
     if (base->form == BASE_SAMPLED)
         stretch->base_most = largest(base->values, base->count);
     if (is_sine)
@@ -120,81 +120,132 @@ static size_t fly(Exact *exact, size_t most) {
     return count;
 }
 
-static void take_hop(Exact *exact, const Hop *hop, double s) {
-    const ArcIntegrals integrals = hop_integrals(hop, &exact->state, s);
+INLINE void take_hop(Exact *exact, const Hop *hop, double s) {
+    ArcIntegrals integrals;
+    hop_integrals(hop, s, &integrals);
     const Plan *plan = exact->plan;
     ledger_work(&exact->ledger,
                 -plan->mass[0] * integrals.av - exact->damper->mass * (integrals.av + integrals.aw),
                 plan->damping[0] * integrals.vv);
     recorder_base(&exact->recorder, integrals.a);
-    exact->state = hop_at(hop, s);
+    hop_at(hop, s, &exact->state);
     exact->run->steps++;
 }
 
-// |r''| in flight over the rest of an interval is not larger.
-static double push_most(const Exact *exact) {
-    return (exact->lanes.damping + exact->lanes.omega) *
-           (fabs(exact->state.v) + exact->lanes.omega * fabs(exact->state.x) +
-            exact->interval * exact->stretch.base_most);
+// What r'' can come to in flight over the rest of an interval.
+typedef struct Pull {
+    double most; // |r''| is not larger
+    double vary; // nor by how much it changes
+} Pull;
+
+INLINE void see_pull(const Exact *exact, double length, Pull *pull) {
+    const Lanes *lanes = &exact->lanes;
+    const double base = exact->stretch.base_most, speed = fabs(exact->state.v);
+    pull->most = (lanes->damping + lanes->omega) *
+                 (speed + lanes->omega * fabs(exact->state.x) + length * base);
+    const double drive = pull->most + base; // |x''| is not larger
+    pull->vary = length * (lanes->damping * drive + lanes->omega2 * (speed + length * drive));
 }
 
 typedef enum Way { FREE, BLOCKED, UNCLEAR } Way;
 
-// From a sample to the stop that is reached before the next, or to that one.
-static Way reach(Exact *exact) {
+// A whole interval in which r turns: free if the stop that it went to is surely not reached, though
+// it may come near.
+INLINE bool turns_free(const Exact *exact, const Hop *hop, double end, double slope, double vary) {
+    const double h = exact->interval, w = exact->state.w * h, push = exact_push(exact);
+    const Side side = w > 0 ? SIDE_RIGHT : SIDE_LEFT;
+    const double sign = exact_sign(side), room = exact_room(exact, side);
+    const double other = exact->damper->clearance - room, s = w / (w - slope);
+    // The gap is a convex function of time, above each of its tangents.
+    if (!(sign * push < -vary) || !(s > 0 && s < 1) || !(other > sign * -exact->state.r) ||
+        !(other > sign * -end))
+        return false;
+    double here, bend;
+    const double gap = room - sign * hop_gap(hop, s, &here, &bend);
+    return gap > fabs(here);
+}
+
+// From a sample to the stop that is reached before the next, or to that one; *side is the stop.
+INLINE Way reach(Exact *exact, Side *side) {
     enum { STEPS = 8 };
+    const double h = exact->interval;
     Slice slice;
     Hop hop;
-    if (!base_cursor_interval(&exact->base, exact->sample, &slice))
-        return UNCLEAR;
+    exact_slice(exact, &slice);
     hop_make(&hop, &exact->hops, &exact->state, &slice);
     double slope, bend;
-    const double end = hop_gap(&hop, 1, &slope, &bend);
-    const Side side = end > exact->state.r ? SIDE_RIGHT : SIDE_LEFT;
-    const double sign = exact_sign(side), room = exact_room(exact, side);
+    const double end = hop_gap(&hop, 1, &slope, &bend), w = exact->state.w * h;
+    *side = end > exact->state.r ? SIDE_RIGHT : SIDE_LEFT;
+    const double sign = exact_sign(*side), room = exact_room(exact, *side);
     const double from = room - sign * exact->state.r, to = room - sign * end;
-    const double most = push_most(exact) * exact->interval * exact->interval;
+    Pull pull;
+    see_pull(exact, h, &pull);
+    // Between two instants w is as linear as r'' is constant.
+    const double crooked = pull.vary * h * h;
     if (!(from > 0))
         return UNCLEAR;
     if (to > 0) {
         // Away from one stop all the way, or too far from both for the curve to reach one.
         const double least = from < to ? from : to, other = exact->damper->clearance;
-        if (!(sign * slope > most) && !(least > most / 8 && other - from > most / 8))
+        const double sag = pull.most * h * h / 8;
+        if (!(sign * slope > crooked && sign * w > crooked) &&
+            !(least > sag && other - from > sag) && !turns_free(exact, &hop, end, slope, pull.vary))
             return UNCLEAR;
         take_hop(exact, &hop, 1);
         return FREE;
     }
-    // On the parabola through both ends, nearly; then each step's error is about its cube.
-    double s = from / (from - to), step = 1;
-    s += sign * bend * s * (1 - s) / (from - to);
-    for (int i = 0; i < STEPS && fabs(step) > 3e-6; i++) {
+    double s, step = 1;
+    const double gone = from - to, first = sign * w;
+    if (first > crooked) { // on the cubic of s over the gap with the slopes of both ends
+        const double share = from / gone, left = 1 - share;
+        s = share +
+            share * left * ((gone / first - 1) * left - (gone / (sign * slope) - 1) * share);
+    } else { // on the parabola
+        const double half = (gone - first) * from * 4 + first * first;
+        s = 2 * from / (first + sqrt(half > 0 ? half : 0));
+    }
+    for (int i = 0; i < STEPS && fabs(step) > 3e-6; i++) { // each step's error is about its cube
         const double gap = room - sign * hop_gap(&hop, s, &slope, &bend);
         step = gap * slope / (sign * slope * slope + gap * bend);
         s += step;
     }
-    // All the way r goes towards this stop, so that it is met once and the other not at all.
-    if (!(fabs(step) <= 3e-6) || !(sign * slope > most) || !(s > 0) || !(s <= 1))
+    if (!(fabs(step) <= 3e-6) || !(s > 0) || !(s <= 1) || !(sign * slope > 0))
+        return UNCLEAR;
+    // Met once and not before, as r went towards this stop all the way, or as a function of time
+    // that is all convex or all concave; and the other not at all.
+    const bool is_straight = first > crooked && sign * slope > crooked;
+    if (!is_straight &&
+        !(fabs(exact_push(exact)) > pull.vary && exact->damper->clearance - from > fabs(w)))
         return UNCLEAR;
     take_hop(exact, &hop, s);
-    exact->offset = s * exact->interval;
-    exact->events++;
-    exact->still_events = 0;
-    exact_touch(exact, side);
+    exact->offset = s * h;
     return BLOCKED;
 }
 
 // In flight from a stop to the next sample.
-static bool depart(Exact *exact) {
+INLINE bool depart(Exact *exact) {
     const double length = exact->interval - exact->offset, sign = exact_sign((Side)exact->origin);
-    const double most = push_most(exact) * length, w = -sign * exact->state.w;
-    if (!(w > most) || !((w + most) * length < exact->damper->clearance) || length <= 0)
+    const double w = -sign * exact->state.w;
+    Pull pull;
+    see_pull(exact, length, &pull);
+    const double back = sign * exact_push(exact) + pull.vary; // r'' to the stop, at most
+    if (!(w > 0 && w > back * length / 2) ||
+        !((w + pull.most * length) * length < exact->damper->clearance) || length <= 0)
         return false;
     Slice slice;
     Hop hop;
-    (void)base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
+    exact_slice(exact, &slice);
     hop_make(&hop, &exact->hops, &exact->state, &slice);
-    take_hop(exact, &hop, length * hop.per_unit);
+    take_hop(exact, &hop, length * hop.table->per_unit);
     return true;
+}
+
+WIDE static Way reach_wide(Exact *exact, Side *side) {
+    return reach(exact, side);
+}
+
+WIDE static bool depart_wide(Exact *exact) {
+    return depart(exact);
 }
 
 static void make_pulse(Exact *exact, Side side) {
@@ -204,7 +255,7 @@ static void make_pulse(Exact *exact, Side side) {
         key->contact_damping[0] == key->contact_damping[1])
         exact->pulses[side] = exact->pulses[other];
     else
-        pulse_make(&exact->pulses[side], &exact->touching[side], exact->interval);
+        pulse_make(&exact->pulses[side], &exact->touching[side], key->base_omega, exact->interval);
     exact->has_pulse[side] = true;
 }
 
@@ -219,6 +270,7 @@ size_t exact_stride_press(Exact *exact, size_t most) {
 size_t exact_stride(Exact *exact, size_t most) {
     if (exact->lanes.run == NULL || exact->phase != FLIGHT || exact->is_leaving)
         return 0;
+    const bool is_wide = exact->lanes.width != LANES_PLAIN;
     size_t count = 0;
     while (count < most) {
         const size_t flown = fly(exact, most - count);
@@ -227,7 +279,8 @@ size_t exact_stride(Exact *exact, size_t most) {
             break;
         if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops)
             break;
-        const Way way = reach(exact);
+        Side side;
+        const Way way = is_wide ? reach_wide(exact, &side) : reach(exact, &side);
         if (way == UNCLEAR)
             break;
         if (way == FREE) {
@@ -235,10 +288,13 @@ size_t exact_stride(Exact *exact, size_t most) {
             count++;
             continue;
         }
+        exact->events++;
+        exact->still_events = 0;
+        exact_touch(exact, side);
         if (exact->phase == CONTACT)
             count += exact_stride_press(exact, most - count);
         if (exact->phase != FLIGHT || exact->is_leaving || exact->offset == 0 || count >= most ||
-            !depart(exact))
+            !(is_wide ? depart_wide(exact) : depart(exact)))
             break;
         exact_stride_pass(exact);
         count++;

@@ -186,8 +186,12 @@ static bool make_forms(Work *work, const Quadrature *rule) {
             const Real *p = speeds + j * n, share = dot_long(work->share, p, n);
             if (!goes_on(work, 2 * n * n))
                 return false;
+            // What is lost is p' D p: of D its symmetric part.
             for (size_t i = 0; i < modes; i++)
-                work->pulls[i] = dot(damping + i * modes, p, modes);
+                work->pulls[i] = dot(damping + i * modes, p, modes) / 2;
+            for (size_t l = 0; l < modes; l++)
+                for (size_t i = 0; i < modes; i++)
+                    work->pulls[i] += p[l] / 2 * damping[l * modes + i];
             work->G[j] += weight * base[0] * share;
             work->G[size + j] += weight * base[1] * share;
             for (size_t k = 0; k <= j; k++) {

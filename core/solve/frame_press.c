@@ -105,11 +105,11 @@ static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper 
         return false;
     }
     stop->bent = stop->damped + frame->storeys;
-    for (size_t i = 0; i < frame->storeys; i++) {
-        const double *row = frame->modes->damping + i * frame->storeys;
-        stop->damped[i] = frame_dot(row, damper->shape, frame->storeys);
+    for (size_t l = 0; l < frame->storeys; l++) // D' shape: D need not be symmetric
+        for (size_t i = 0; i < frame->storeys; i++)
+            stop->damped[i] += frame->modes->damping[l * frame->storeys + i] * damper->shape[l];
+    for (size_t i = 0; i < frame->storeys; i++)
         stop->bent[i] = frame->omega2[i] * damper->shape[i];
-    }
     stop->wide = size_of(damper->shape, frame->storeys);
     stop->most_damped = size_of(stop->damped, frame->storeys);
     stop->most_bent = size_of(stop->bent, frame->storeys);

@@ -241,27 +241,46 @@ static void make_damper(Frame *frame, size_t d) {
     damper->reach = sqrt(stiff) + sqrt(size) * frame->viscous;
 }
 
-// D, its norm and how far it is from only taking energy.
+// How fast energy may grow by what of D gives it, though D should only take: of D's symmetric part,
+// `even_part`.
+static double find_growth(const double *even_part, size_t n) {
+    double lowest = 0, largest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double own = even_part[i * n + i];
+        double others = 0;
+        for (size_t j = 0; j < n; j++)
+            others += j == i ? 0 : fabs(even_part[i * n + j]);
+        lowest = fmin(lowest, own - others); // Gershgorin
+        largest = fmax(largest, own);
+    }
+    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
+    return linear_find_indefinite(n, even_part, NEARLY) == 0 ? NEARLY * largest : -lowest;
+}
+
+// D, which need not be symmetric, its norm and how far it is from only taking energy.
 static Status make_damping(Frame *frame) {
     const size_t n = frame->storeys;
-    frame->damping = frame->modes->damping;
-    double rows = 0, squares = 0, lowest = 0, largest = 0;
+    const double *damping = frame->damping = frame->modes->damping;
+    double *even_part = calloc(n * n, sizeof *even_part);
+    if (even_part == NULL)
+        return STATUS_NO_MEMORY;
+    double rows = 0, columns = 0, squares = 0;
     for (size_t i = 0; i < n; i++) {
-        const double own = frame->damping[i * n + i];
-        double sum = 0;
+        double row = 0, column = 0;
         for (size_t j = 0; j < n; j++) {
-            sum += fabs(frame->damping[i * n + j]);
-            squares += frame->damping[i * n + j] * frame->damping[i * n + j];
+            const double here = damping[i * n + j], there = damping[j * n + i];
+            row += fabs(here);
+            column += fabs(there);
+            squares += here * here;
+            even_part[i * n + j] = (here + there) / 2;
         }
-        rows = fmax(rows, sum);
-        lowest = fmin(lowest, own - (sum - fabs(own))); // Gershgorin
-        largest = fmax(largest, own);
-        frame->diagonal[i] = own;
+        rows = fmax(rows, row);
+        columns = fmax(columns, column);
+        frame->diagonal[i] = damping[i * n + i];
     }
-    frame->viscous = fmin(rows, sqrt(squares));
-    // D takes energy, or nearly: scaled to a unit diagonal, D + NEARLY I is positive definite.
-    frame->growth =
-        linear_find_indefinite(n, frame->damping, NEARLY) == 0 ? NEARLY * largest : -lowest;
+    frame->viscous = fmin(sqrt(rows * columns), sqrt(squares));
+    frame->growth = find_growth(even_part, n);
+    free(even_part);
     if (frame->modes->is_classical)
         return STATUS_OK;
     frame->diagonal = NULL;
@@ -270,7 +289,7 @@ static Status make_damping(Frame *frame) {
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
-            frame->coupled[j * frame->padded + i] = frame->damping[i * n + j];
+            frame->coupled[j * frame->padded + i] = damping[i * n + j];
     return STATUS_OK;
 }
 

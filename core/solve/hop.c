@@ -1,15 +1,28 @@
 #include "core/solve/hop.h"
 
-void hop_table_make(HopTable *table, const Motion *flying, double unit) {
+#include <string.h>
+
+void hop_table_make(HopTable *table, const Motion *flying, double omega, double unit) {
     const double omega2 = flying->omega2 * unit * unit, damping = flying->damping * unit;
+    const double turn = omega * unit;
+    memset(table, 0, sizeof *table);
     table->unit = unit;
     table->per_unit = 1 / unit;
+    table->square = unit * unit;
+    table->slope = omega > 0 ? table->square : table->square * unit;
+    table->is_sine = omega > 0;
     for (int i = 0; i < 4; i++) {
-        double x[HOP_DEGREE + 1] = {i == 0, i == 1};
+        // a_g's own series under a unit of its value, or of its slope or other half.
+        double x[HOP_DEGREE + 1] = {i == 0, i == 1}, a[HOP_DEGREE + 1] = {i == 2, 0};
+        if (i == 3)
+            a[1] = omega > 0 ? turn : 1;
         for (int k = 2; k <= HOP_DEGREE; k++) {
-            const double base = k - i == 0 ? 1 : 0; // a unit of a_g is of degree 2, of its slope 3
-            x[k] = -(damping * (k - 1) * x[k - 1] + omega2 * x[k - 2] + base) / (k * (k - 1));
-            table->of[i][k - 2] = x[k];
+            if (omega > 0)
+                a[k] = -turn * turn * a[k - 2] / (k * (k - 1));
+            x[k] = -(damping * (k - 1) * x[k - 1] + omega2 * x[k - 2] + a[k - 2]) / (k * (k - 1));
+            table->x[i][k - 1] = x[k];
+            if (i >= 2)
+                table->z[i - 2][k - 1] = -a[k - 2] / (k * (k - 1));
         }
     }
 }

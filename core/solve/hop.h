@@ -1,99 +1,120 @@
-// Free flight over part of a sample interval under a base that is still or linear: a short Taylor
-// series. Not for intervals that are long for the structure, nor for a sine: those are arcs. Used
-// by the exact solver on its way to a stop and away from one.
+// Free flight over part of a sample interval under a base that is still, linear or a sine: a short
+// Taylor series. Not for intervals that are long for the structure or the sine: those are arcs.
+// Used by the exact solver on its way to a stop and away from one.
 #ifndef CORE_SOLVE_HOP_H
 #define CORE_SOLVE_HOP_H
 
 #include "core/solve/arc.h"
+#include "core/solve/wide.h"
 
 enum { HOP_DEGREE = 8 };
 
-// The longest interval, as a share of 1 / rate of the structure, that the series is right for.
+// The longest interval, as a share of 1 / rate of the structure and of the sine, that the series is
+// right for.
 #define HOP_REACH 0.04
 
-// What a unit of each start gives to the series' terms above the first: of x, v unit, a_g unit^2
-// and its slope unit^3.
+// What a unit of each start gives to the terms of s^2 and above, each row from s on: to the
+// structure's displacement of x, v unit, a_g unit^2 and its slope unit^3 (of a sine: its other half
+// unit^2), and to the free mass's of the last two.
 typedef struct HopTable {
     double unit, per_unit; // of s = t / unit [s], [1/s]
-    double of[4][HOP_DEGREE - 1];
+    double square, slope;  // what a_g and its slope are multiplied by
+    bool is_sine;
+    double x[4][HOP_DEGREE], z[2][HOP_DEGREE];
 } HopTable;
 
-void hop_table_make(HopTable *table, const Motion *flying, double unit);
+// `omega` is the base's (0: linear).
+void hop_table_make(HopTable *table, const Motion *flying, double omega, double unit);
 
 typedef struct Hop {
-    double unit, per_unit;
-    double x[HOP_DEGREE + 1]; // of the structure's displacement in s
-    double z1, z2, z3;        // of the free mass's
-    double r;                 // at the start
-    double value, slope;      // a_g = value + slope t
+    const HopTable *table;
+    State start;
+    Slice slice;
+    double x[HOP_DEGREE], r[HOP_DEGREE]; // from s on
+    double z[HOP_DEGREE];                // of the free mass, but for its speed
 } Hop;
 
-static inline void hop_make(Hop *hop, const HopTable *table, const State *start,
-                            const Slice *slice) {
-    const double unit = table->unit, square = unit * unit, speed = start->v * unit;
-    const double a = slice->value * square, s = slice->slope * (square * unit);
-    for (int k = 2; k <= HOP_DEGREE; k++)
-        hop->x[k] = (table->of[0][k - 2] * start->x + table->of[1][k - 2] * speed) +
-                    (table->of[2][k - 2] * a + table->of[3][k - 2] * s);
-    hop->x[0] = start->x;
-    hop->x[1] = speed;
-    hop->unit = unit;
-    hop->per_unit = table->per_unit;
-    hop->z1 = (start->v + start->w) * unit;
-    hop->z2 = -a / 2;
-    hop->z3 = -s / 6;
-    hop->r = start->r;
-    hop->value = slice->value;
-    hop->slope = slice->slope;
+INLINE void hop_make(Hop *hop, const HopTable *table, const State *start, const Slice *slice) {
+    const double speed = start->v * table->unit, gap = start->w * table->unit;
+    const double a = slice->value * table->square, s = slice->slope * table->slope;
+    for (int k = 0; k < HOP_DEGREE; k += 4) {
+        const Four z = FOUR(table->z[0] + k) * a + FOUR(table->z[1] + k) * s;
+        Four x = (FOUR(table->x[0] + k) * start->x + FOUR(table->x[1] + k) * speed) +
+                 (FOUR(table->x[2] + k) * a + FOUR(table->x[3] + k) * s);
+        Four r = z - x;
+        if (k == 0) {
+            x[0] = speed;
+            r[0] = gap;
+        }
+        PUT_FOUR(hop->x + k, x);
+        PUT_FOUR(hop->r + k, r);
+        PUT_FOUR(hop->z + k, z);
+    }
+    hop->table = table;
+    hop->start = *start;
+    hop->slice = *slice;
 }
 
-// x less its start, over s.
-static inline double hop_moved(const Hop *hop, double s) {
-    const double *x = hop->x, s2 = s * s;
-    return (x[1] + s * x[2]) +
-           s2 * ((x[3] + s * x[4]) + s2 * ((x[5] + s * x[6]) + s2 * (x[7] + s * x[8])));
-}
-
-// v unit.
-static inline double hop_speed(const Hop *hop, double s) {
-    const double *x = hop->x, s2 = s * s;
-    return (x[1] + s * (2 * x[2])) +
-           s2 * ((3 * x[3] + s * (4 * x[4])) +
-                 s2 * ((5 * x[5] + s * (6 * x[6])) + s2 * (7 * x[7] + s * (8 * x[8]))));
-}
-
-static inline State hop_at(const Hop *hop, double s) {
-    const double x = hop_moved(hop, s), v = hop_speed(hop, s);
-    const double z = hop->z1 + s * (2 * hop->z2 + s * (3 * hop->z3));
-    return (State){hop->x[0] + s * x, v * hop->per_unit,
-                   hop->r + s * (hop->z1 + s * (hop->z2 + s * hop->z3) - x),
-                   (z - v) * hop->per_unit};
+INLINE void hop_at(const Hop *hop, double s, State *end) {
+    static const double factors[HOP_DEGREE] = {1, 2, 3, 4, 5, 6, 7, 8};
+    const double s2 = s * s;
+    const Four low = {1, s, s2, s2 * s}, high = low * (s2 * s2);
+    const Four low_slope = low * FOUR(factors), high_slope = high * FOUR(factors + 4);
+    const Four x = FOUR(hop->x) * low + FOUR(hop->x + 4) * high;
+    const Four v = FOUR(hop->x) * low_slope + FOUR(hop->x + 4) * high_slope;
+    const Four r = FOUR(hop->r) * low + FOUR(hop->r + 4) * high;
+    const Four w = FOUR(hop->r) * low_slope + FOUR(hop->r + 4) * high_slope;
+    Four sum;
+    wide_sum(&x, &v, &r, &w, &sum);
+    const double per_unit = hop->table->per_unit;
+    end->x = hop->start.x + s * sum[0];
+    end->v = per_unit * sum[1];
+    end->r = hop->start.r + s * sum[2];
+    end->w = per_unit * sum[3];
 }
 
 // From the start to s: all but ww; aw is for the free mass, of a_g (v + w), minus av.
-static inline ArcIntegrals hop_integrals(const Hop *hop, const State *start, double s) {
+INLINE void hop_integrals(const Hop *hop, double s, ArcIntegrals *out) {
     // Gauss-Legendre: over so short a way three points are right to rounding.
-    static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
-    static const double weight[3] = {0.2777777777777778, 0.4444444444444444, 0.2777777777777778};
-    ArcIntegrals out = {0, 0, 0, 0, 0};
-    const double length = s * hop->unit;
-    for (int i = 0; i < 3; i++) {
-        const double v = hop_speed(hop, s * node[i]);
-        out.vv += weight[i] * v * v;
-        out.av += weight[i] * v * (hop->value + hop->slope * length * node[i]);
+    static const double nodes[4] = {0.1127016653792583, 0.5, 0.8872983346207417, 0};
+    static const double weights[4] = {0.2777777777777778, 0.4444444444444444, 0.2777777777777778,
+                                      0};
+    const HopTable *table = hop->table;
+    const double length = s * table->unit, *x = hop->x, *z = hop->z;
+    const Four t = s * FOUR(nodes), t2 = t * t;
+    const Four v = (x[0] + t * (2 * x[1])) +
+                   t2 * ((3 * x[2] + t * (4 * x[3])) +
+                         t2 * ((5 * x[4] + t * (6 * x[5])) + t2 * (7 * x[6] + t * (8 * x[7]))));
+    Four a = hop->slice.value + hop->slice.slope * (length * FOUR(nodes));
+    out->a = length * (hop->slice.value + hop->slice.slope * length / 2);
+    if (table->is_sine) {
+        const double per_square = -table->per_unit * table->per_unit, s2 = s * s;
+        a = (2 * z[1] + t * (6 * z[2])) +
+            t2 * ((12 * z[3] + t * (20 * z[4])) +
+                  t2 * ((30 * z[5] + t * (42 * z[6])) + t2 * (56 * z[7])));
+        a *= per_square;
+        out->a = -table->per_unit * s *
+                 ((2 * z[1] + s * (3 * z[2])) +
+                  s2 * ((4 * z[3] + s * (5 * z[4])) +
+                        s2 * ((6 * z[5] + s * (7 * z[6])) + s2 * (8 * z[7]))));
     }
-    out.vv *= length * (hop->per_unit * hop->per_unit);
-    out.av *= s;
-    out.a = length * (hop->value + hop->slope * length / 2);
-    out.aw = out.a * (start->v + start->w - out.a / 2) - out.av;
-    return out;
+    const Four vv = FOUR(weights) * v * v, av = FOUR(weights) * v * a;
+    out->vv = ((vv[0] + vv[2]) + vv[1]) * (length * (table->per_unit * table->per_unit));
+    out->av = ((av[0] + av[2]) + av[1]) * s;
+    out->ww = 0;
+    out->aw = out->a * (hop->start.v + hop->start.w - out->a / 2) - out->av;
 }
 
 // r at s; w unit and half of its derivative by s there.
-static inline double hop_gap(const Hop *hop, double s, double *slope, double *bend) {
-    *slope = hop->z1 + s * (2 * hop->z2 + s * (3 * hop->z3)) - hop_speed(hop, s);
-    *bend = (hop->z2 - hop->x[2]) + s * (3 * (hop->z3 - hop->x[3]) - s * (6 * hop->x[4]));
-    return hop->r + s * (hop->z1 + s * (hop->z2 + s * hop->z3) - hop_moved(hop, s));
+INLINE double hop_gap(const Hop *hop, double s, double *slope, double *bend) {
+    const double *r = hop->r, s2 = s * s;
+    *slope = (r[0] + s * (2 * r[1])) +
+             s2 * ((3 * r[2] + s * (4 * r[3])) +
+                   s2 * ((5 * r[4] + s * (6 * r[5])) + s2 * (7 * r[6] + s * (8 * r[7]))));
+    *bend = r[1] + s * (3 * r[2] + s * (6 * r[3]));
+    return hop->start.r +
+           s * ((r[0] + s * r[1]) +
+                s2 * ((r[2] + s * r[3]) + s2 * ((r[4] + s * r[5]) + s2 * (r[6] + s * r[7]))));
 }
 
 #endif

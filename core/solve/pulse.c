@@ -50,9 +50,14 @@ static bool find_root(const Pencil *p, Complex *l) {
 }
 
 // Re(factor d) as two reals.
-static void put(PulseRow *row, int mode, Complex factor) {
-    row->d[2 * mode] = (double)creall(factor);
-    row->d[2 * mode + 1] = (double)-cimagl(factor);
+static void put(double row[4], int mode, Complex factor) {
+    row[2 * mode] = (double)creall(factor);
+    row[2 * mode + 1] = (double)-cimagl(factor);
+}
+
+static void put_seen(Pulse *pulse, PulseRow row, int mode, Complex factor) {
+    pulse->see[2 * mode][row] = (double)creall(factor);
+    pulse->see[2 * mode + 1][row] = (double)-cimagl(factor);
 }
 
 static long double square(Complex z) {
@@ -62,26 +67,47 @@ static long double square(Complex z) {
 // The integral of (Re(g1 d1) + Re(g2 d2))^2.
 static void make_form(PulseForm *form, const Complex g[2], const Complex l[2],
                       const double jump[4]) {
-    double *of = form->of;
-    static const int own[2][3] = {{0, 1, 4}, {7, 8, 9}};
+    double(*of)[4] = form->of;
     for (int i = 0; i < 2; i++) {
         const long double mean = i == 0 ? 0 : square(g[i]) / (4 * creall(l[i]));
         const Complex turning = g[i] * g[i] / (4 * l[i]);
-        of[own[i][0]] = (double)(mean + creall(turning));
-        of[own[i][1]] = (double)(-2 * cimagl(turning));
-        of[own[i][2]] = (double)(mean - creall(turning));
+        of[2 * i][2 * i] = (double)(mean + creall(turning));
+        of[2 * i][2 * i + 1] = (double)-cimagl(turning);
+        of[2 * i + 1][2 * i + 1] = (double)(mean - creall(turning));
     }
     form->slow = (double)square(g[0]);
     const Complex e = g[0] * g[1] / (l[0] + l[1]), f = g[0] * conjl(g[1]) / (l[0] + conjl(l[1]));
-    of[2] = (double)(creall(e) + creall(f));
-    of[3] = (double)(cimagl(f) - cimagl(e));
-    of[5] = (double)(-cimagl(e) - cimagl(f));
-    of[6] = (double)(creall(f) - creall(e));
-    form->jump2 = pulse_form(form, jump);
-    form->jump[0] = 2 * of[0] * jump[0] + of[1] * jump[1] + of[2] * jump[2] + of[3] * jump[3];
-    form->jump[1] = of[1] * jump[0] + 2 * of[4] * jump[1] + of[5] * jump[2] + of[6] * jump[3];
-    form->jump[2] = of[2] * jump[0] + of[5] * jump[1] + 2 * of[7] * jump[2] + of[8] * jump[3];
-    form->jump[3] = of[3] * jump[0] + of[6] * jump[1] + of[8] * jump[2] + 2 * of[9] * jump[3];
+    of[0][2] = (double)(creall(e) + creall(f)) / 2;
+    of[0][3] = (double)(cimagl(f) - cimagl(e)) / 2;
+    of[1][2] = (double)(-cimagl(e) - cimagl(f)) / 2;
+    of[1][3] = (double)(creall(f) - creall(e)) / 2;
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < i; j++)
+            of[i][j] = of[j][i];
+    form->jump2 = 0;
+    for (int i = 0; i < 4; i++) {
+        form->jump[i] = 0;
+        for (int j = 0; j < 4; j++)
+            form->jump[i] += 2 * of[i][j] * jump[j];
+        form->jump2 += form->jump[i] * jump[i] / 2;
+    }
+}
+
+// The integral of (Re(g1 d1) + Re(g2 d2)) (f0 a + f1 s) under a sine, twice that if `is_square`,
+// and then with that of (f0 a + f1 s)^2; else with that of (own[0] a + own[1] s) a.
+static void make_sine(PulseSine *sine, const Complex g[2], const Complex l[2], double omega,
+                      const double f[2], const double *own) {
+    const bool is_square = own == NULL;
+    for (int i = 0; i < 2; i++) {
+        const Complex size =
+            (is_square ? 2 : 1) * g[i] / (l[i] * l[i] + (long double)omega * omega);
+        put(sine->by[0], i, size * (f[0] * l[i] + f[1] * (long double)omega));
+        put(sine->by[1], i, size * (f[1] * l[i] - f[0] * (long double)omega));
+    }
+    const double a = is_square ? f[0] : own[0], s = is_square ? f[1] : own[1];
+    sine->both = is_square ? (s * s - a * a) / (2 * omega) : -a / (2 * omega);
+    sine->one = is_square ? a * s / omega : s / (2 * omega);
+    sine->steady = is_square ? (a * a + s * s) / 2 : a / 2;
 }
 
 // e^z by its series near 0, and squared. The C library's would give other last bits on other
@@ -101,6 +127,11 @@ static Complex power_of_e(Complex z) {
 }
 
 static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
+    for (int i = 0; i < PULSE_RIDE; i++) {
+        const Complex turn = power_of_e(complex_of(0, (i + 1) * pulse->base_omega * interval));
+        pulse->cosine[i] = (double)creall(turn);
+        pulse->sine[i] = (double)cimagl(turn);
+    }
     pulse->unit = pulse->time / PULSE_TABLE_UNIT;
     pulse->per_unit = PULSE_TABLE_UNIT / pulse->time;
     for (int mode = 0; mode < 2; mode++) {
@@ -142,19 +173,30 @@ static bool find_oscillations(const Pencil *p, Complex l[2]) {
     l[1] = complex_of(-fast_damping, sqrtl(fast2));
     if (!find_root(p, &l[0]) || !find_root(p, &l[1]))
         return false;
+    // Faster decays of the buffer's would want more terms of pulse_nudge than there are.
     for (int i = 0; i < 2; i++)
-        if (!(creall(l[i]) < 0) || !(cimagl(l[i]) > 0.05L * -creall(l[i])))
+        if (!(creall(l[i]) < 0) || !(cimagl(l[i]) > (i == 0 ? 0.05L : 0.25L) * -creall(l[i])))
             return false;
     return square(l[1]) > 4 * square(l[0]);
 }
 
-void pulse_make(Pulse *pulse, const Motion *m, double interval) {
+// What the particular motion shows a derivative later.
+static void put_derivative(Pulse *pulse, PulseRow row, PulseRow of) {
+    double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
+    const double omega = pulse->base_omega;
+    a[row] = omega > 0 ? -omega * s[of] : 0;
+    s[row] = omega > 0 ? omega * a[of] : a[of];
+}
+
+void pulse_make(Pulse *pulse, const Motion *m, double base_omega, double interval) {
     memset(pulse, 0, sizeof *pulse);
     const Pencil p = {m->damping, m->omega2, m->contact_damping, m->contact_omega2, m->share};
     const double half = m->contact_damping / 2, contact2 = m->contact_omega2 - half * half;
-    Complex l[2], g[2];
+    const long double omega = base_omega;
+    Complex l[2], g[2], centre[2];
     if (!(contact2 > 0) || !find_oscillations(&p, l))
         return;
+    pulse->base_omega = base_omega;
     pulse->contact_omega = sqrt(contact2);
     pulse->time = PI / pulse->contact_omega;
     pulse->damping = m->contact_damping;
@@ -164,9 +206,11 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
     const double Z = half / sqrt(m->contact_omega2),
                  b = Z * (1 + Z * Z * (1.0 / 6 + Z * Z * 0.075));
     pulse->peak_time = larger(PI / 2 - 3 * b, 0) / pulse->contact_omega;
-    PulseRow *const rows[] = {&pulse->r, &pulse->w, &pulse->r_bend};
+    static const PulseRow r_rows[] = {PULSE_R, PULSE_W, PULSE_R2, PULSE_R3, PULSE_R4};
+    static const PulseRow n_rows[] = {PULSE_N, PULSE_N1, PULSE_N2, PULSE_N3, PULSE_N4};
     Complex fixed[2] = {0, 0}; // what x and r are under a_g = 1, and what its slope adds
     Complex fixed_slope[2] = {0, 0};
+    bool is_apart = true; // from the sine
     for (int i = 0; i < 2; i++) {
         const Complex own2 = (l[i] + p.D) * l[i] + p.W, push = p.D * l[i] + p.W;
         const Complex force = p.c * l[i] + p.k, contact = (l[i] + p.c) * l[i] + p.k;
@@ -179,80 +223,68 @@ void pulse_make(Pulse *pulse, const Motion *m, double interval) {
         const Complex into[4] = {scale * (left[0] * (l[i] + p.D) - left[1] * p.D), scale * left[0],
                                  scale * (left[1] * (l[i] + p.c) - left[0] * p.share * p.c),
                                  scale * left[1]};
-        const Complex base = -into[1], value = base / l[i], slope = value / l[i];
-        const Complex columns[6] = {into[0], into[1], into[2], into[3], value, slope};
-        for (int j = 0; j < 6; j++) {
-            pulse->into[2 * i][j] = (double)creall(columns[j]);
-            pulse->into[2 * i + 1][j] = (double)cimagl(columns[j]);
+        const Complex apart = l[i] * l[i] + omega * omega, base = -into[1];
+        const Complex value = base * l[i] / apart;
+        const Complex slope = omega > 0 ? base * omega / apart : value / l[i];
+        const Complex columns[PULSE_COLUMNS] = {into[0], into[1], into[2], into[3], value, slope};
+        is_apart = is_apart && square(apart) > 1e-8L * square(l[i]) * square(l[i]);
+        for (int j = 0; j < PULSE_COLUMNS; j++) {
+            pulse->into[j][2 * i] = (double)creall(columns[j]);
+            pulse->into[j][2 * i + 1] = (double)cimagl(columns[j]);
         }
         pulse->jump[2 * i] = (double)creall(slope);
         pulse->jump[2 * i + 1] = (double)cimagl(slope);
         Complex power = 1;
-        for (int j = 0; j < 3; j++, power *= l[i])
-            put(rows[j], i, power);
-        put(&pulse->x, i, X);
-        put(&pulse->v, i, X * l[i]);
-        put(&pulse->n, i, force);
-        put(&pulse->n_rate, i, force * l[i]);
-        put(&pulse->n_bend, i, force * l[i] * l[i]);
-        put(&pulse->x_sum, i, X / l[i]);
-        put(&pulse->r_sum, i, 1 / l[i]);
+        for (int j = 0; j < 5; j++, power *= l[i]) {
+            put_seen(pulse, r_rows[j], i, power);
+            put_seen(pulse, n_rows[j], i, force * power);
+        }
+        put_seen(pulse, PULSE_X, i, X);
+        put_seen(pulse, PULSE_V, i, X * l[i]);
+        put(pulse->middle, i, (X + p.share) / l[i]);
         fixed[0] -= X * value;
         fixed[1] -= value;
         fixed_slope[0] -= X * slope;
         fixed_slope[1] -= slope;
         g[i] = X * l[i];
-        pulse->sigma[i] = (double)creall(l[i]);
-        pulse->omega[i] = (double)cimagl(l[i]);
+        centre[i] = (X + p.share) * l[i];
+        for (int j = 0; j < 2; j++) {
+            pulse->sigma[2 * i + j] = (double)creall(l[i]);
+            pulse->omega[2 * i + j] = (double)cimagl(l[i]);
+        }
         pulse->size2[i] = (double)square(l[i]);
-        pulse->rate = sqrt(pulse->size2[i]); // the fast one comes last
     }
-    pulse->x.a = (double)creall(fixed[0]);
-    pulse->x.s = (double)creall(fixed_slope[0]);
-    pulse->r.a = (double)creall(fixed[1]);
-    pulse->r.s = (double)creall(fixed_slope[1]);
-    pulse->v.s = pulse->x.a;
-    pulse->w.s = pulse->r.a;
-    pulse->n.a = m->contact_omega2 * pulse->r.a;
-    pulse->n.s = m->contact_omega2 * pulse->r.s + m->contact_damping * pulse->r.a;
-    pulse->n_rate.s = m->contact_omega2 * pulse->r.a;
+    pulse->slow_sigma = pulse->sigma[0];
+    pulse->fast = pulse->omega[2];
+    const double turn = 0.05 / pulse->fast, decay = -0.1 / pulse->sigma[2];
+    pulse->near = turn < decay ? turn : decay;
+    double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
+    a[PULSE_X] = (double)creall(fixed[0]);
+    s[PULSE_X] = (double)creall(fixed_slope[0]);
+    a[PULSE_R] = (double)creall(fixed[1]);
+    s[PULSE_R] = (double)creall(fixed_slope[1]);
+    put_derivative(pulse, PULSE_V, PULSE_X);
+    for (int j = 1; j < 5; j++)
+        put_derivative(pulse, r_rows[j], r_rows[j - 1]);
+    a[PULSE_N] = m->contact_omega2 * a[PULSE_R] + m->contact_damping * a[PULSE_W];
+    s[PULSE_N] = m->contact_omega2 * s[PULSE_R] + m->contact_damping * s[PULSE_W];
+    for (int j = 1; j < 5; j++)
+        put_derivative(pulse, n_rows[j], n_rows[j - 1]);
+    pulse->middle_a = a[PULSE_X] + m->share * a[PULSE_R];
+    pulse->middle_s = s[PULSE_X] + m->share * s[PULSE_R];
     make_form(&pulse->vv, g, l, pulse->jump);
     make_form(&pulse->ww, l, l, pulse->jump);
+    if (omega > 0) {
+        const double v[2] = {a[PULSE_V], s[PULSE_V]}, w[2] = {a[PULSE_W], s[PULSE_W]};
+        const double both[2] = {v[0] + m->share * w[0], v[1] + m->share * w[1]};
+        static const double one[2] = {1, 0};
+        make_sine(&pulse->sine_vv, g, l, base_omega, v, NULL);
+        make_sine(&pulse->sine_ww, l, l, base_omega, w, NULL);
+        make_sine(&pulse->sine_work, centre, l, base_omega, one, both);
+        pulse->sway = fabs(a[PULSE_R2]) + fabs(s[PULSE_R2]);
+        pulse->n_sway = fabs(a[PULSE_N2]) + fabs(s[PULSE_N2]);
+    }
     make_tables(pulse, l, interval);
     const double longest = 2 * pulse->time < interval ? 2 * pulse->time : interval;
-    pulse->is_usable = -pulse->sigma[0] * longest < 0.01;
-}
-
-void pulse_turn(const Pulse *pulse, double time, double turn[4]) {
-    const double unit = pulse->unit, span = PULSE_TABLE * unit;
-    if (time > span) { // seldom: a long way at once
-        pulse_turn(pulse, time - span, turn);
-        pulse_multiply(pulse->table[PULSE_TABLE], turn, turn);
-        return;
-    }
-    const int place = (int)(time * pulse->per_unit + 0.5);
-    const double rest = time - place * unit;
-    if (rest == 0 || time == pulse->peak_time) { // where a search begins: T_c is a place too
-        memcpy(turn, rest == 0 ? pulse->table[place] : pulse->peak, 4 * sizeof *turn);
-        return;
-    }
-    double small[4];
-    for (int i = 0; i < 2; i++) {
-        // |lambda rest| is at most 0.2: these are right to rounding. In pairs, not by Horner: here
-        // one waits for the last term.
-        const double s = pulse->sigma[i] * rest, w = pulse->omega[i] * rest;
-        const double s2 = s * s, s4 = s2 * s2, w2 = w * w, w4 = w2 * w2;
-        const double size =
-            1 + (s + s2 * (((1.0 / 2 + s * (1.0 / 6)) + s2 * (1.0 / 24 + s * (1.0 / 120))) +
-                           s4 * ((1.0 / 720 + s * (1.0 / 5040)) +
-                                 s2 * (1.0 / 40320 + s * (1.0 / 362880)))));
-        const double sine =
-            w - w * (w2 * ((1.0 / 6 - w2 * (1.0 / 120)) + w4 * (1.0 / 5040 - w2 * (1.0 / 362880))));
-        const double cosine =
-            1 - w2 * ((1.0 / 2 - w2 * (1.0 / 24)) +
-                      w4 * ((1.0 / 720 - w2 * (1.0 / 40320)) + w4 * (1.0 / 3628800)));
-        small[2 * i] = size * cosine;
-        small[2 * i + 1] = size * sine;
-    }
-    pulse_multiply(small, pulse->table[place], turn);
+    pulse->is_usable = is_apart && -pulse->slow_sigma * longest < 0.01;
 }

@@ -9,24 +9,26 @@
 //   x' = v, V' = -s + share k r, r' = W - c r, W' = s - k r,  v = V + share c r.
 // So a contact's map is exp(A T) in these, and the state does not enter.
 //
-// exp(A T) y: powers of two of exp(A D) by binary digits of T / D, and for the rest, at most D / 2,
-// a short series. In contact it must be a good one: r hardly matters to the speed that is left, and
-// what the series misses of it is multiplied by the contact's rate.
+// exp(A T) y: exp(A D) to the power of the whole number next to T / D, looked up, and for the rest,
+// at most D / 2, a short series. In contact it must be a good one: r hardly matters to the speed
+// that is left, and what the series misses of it is multiplied by the contact's rate.
 #include "core/solve/trust.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
+#include "core/solve/wide.h"
+
 enum { X, V, R, W, SIZE };
 
 // D times the system's rate.
-static const double SWING_STEP = 0.2, CONTACT_STEP = 0.05;
+static const double SWING_STEP = 0.2, CONTACT_STEP = 0.1;
 static const double ROUNDING = DBL_EPSILON;
 
-// n steps of D, of which there are `frequency` in a second, and what is left.
-static inline uint64_t divide(double length, double frequency, double step, double *rest) {
-    const double most = 4294967295; // 2^TRUST_LEVELS - 1
+// n steps of D and what is left.
+INLINE uint64_t divide(double length, double frequency, double step, double *rest) {
+    const double most = 4294967295; // TRUST_NEAR << TRUST_LEVELS, less 1
     const double count = length * frequency + 0.5;
     if (!(count < most)) {
         *rest = 0;
@@ -37,12 +39,22 @@ static inline uint64_t divide(double length, double frequency, double step, doub
     return (uint64_t)n;
 }
 
-static void swing_levels(TrustSwing *swing, int levels) {
-    if (swing->levels == 0) {
+static void swing_multiply(double p[2][2], double q[2][2], double out[2][2]) {
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            out[i][j] = p[i][0] * q[0][j] + p[i][1] * q[1][j];
+}
+
+// All powers up to n.
+static __attribute__((noinline)) void swing_make(TrustSwing *swing, uint64_t n) {
+    double(*const near)[2][2] = swing->near;
+    if (swing->known == 0) {
         // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
         const double h = swing->step;
         for (int column = 0; column < 2; column++) {
             double x = column == 0, v = column == 1, term_x = x, term_v = v;
+            near[0][0][column] = x;
+            near[0][1][column] = v;
             for (int i = 1; i < 12; i++) {
                 const double next = -swing->omega2 * term_x - swing->damping * term_v;
                 term_x = h / i * term_v;
@@ -50,155 +62,144 @@ static void swing_levels(TrustSwing *swing, int levels) {
                 x += term_x;
                 v += term_v;
             }
-            swing->power[0][0][column] = x;
-            swing->power[0][1][column] = v;
+            near[1][0][column] = x;
+            near[1][1][column] = v;
         }
-        swing->levels = 1;
+        swing->known = 2;
     }
-    for (; swing->levels < levels; swing->levels++) {
-        double(*const p)[2] = swing->power[swing->levels - 1];
-        double(*const q)[2] = swing->power[swing->levels];
-        for (int i = 0; i < 2; i++)
-            for (int j = 0; j < 2; j++)
-                q[i][j] = p[i][0] * p[0][j] + p[i][1] * p[1][j];
+    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    for (; swing->known < wanted; swing->known++)
+        swing_multiply(near[swing->known - 1], near[1], near[swing->known]);
+    for (; n >> swing->levels >= TRUST_NEAR; swing->levels++) {
+        const bool is_first = swing->levels == 0;
+        double(*const last)[2] = is_first ? near[TRUST_NEAR / 2] : swing->power[swing->levels - 1];
+        swing_multiply(last, last, swing->power[swing->levels]);
     }
 }
 
-static void swing_go(TrustSwing *swing, double (*y)[TRUST_LANES], double length) {
+// The structure's errors; the free mass's are the caller's.
+INLINE void swing_go(TrustSwing *swing, Four *at_x, Four *at_v, double length) {
     double h;
-    uint64_t n = divide(length, swing->rate * (1 / SWING_STEP), swing->step, &h);
+    const uint64_t n = divide(length, swing->frequency, swing->step, &h);
+    if ((int)(n % TRUST_NEAR) >= swing->known || n >> swing->levels >= TRUST_NEAR)
+        swing_make(swing, n);
     const double half = h * h / 2;
-    for (int i = 0; i < TRUST_LANES; i++) {
-        const double x = y[X][i], v = y[V][i], a = -swing->omega2 * x - swing->damping * v;
-        const double b = -swing->omega2 * v - swing->damping * a;
-        y[X][i] = x + h * v + half * a;
-        y[V][i] = v + h * a + half * b;
-    }
-    for (int level = 0; n > 0; level++, n >>= 1) {
-        if (level >= swing->levels)
-            swing_levels(swing, level + 1);
-        if ((n & 1) == 0)
+    Four x = *at_x, v = *at_v;
+    const Four a = -swing->omega2 * x - swing->damping * v;
+    const Four b = -swing->omega2 * v - swing->damping * a;
+    x += h * v + half * a;
+    v += h * a + half * b;
+    double(*p)[2] = swing->near[n % TRUST_NEAR];
+    *at_x = p[0][0] * x + p[0][1] * v;
+    *at_v = p[1][0] * x + p[1][1] * v;
+    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1) {
+        if ((left & 1) == 0)
             continue;
-        const double(*const p)[2] = (const double(*)[2])swing->power[level];
-        for (int i = 0; i < TRUST_LANES; i++) {
-            const double x = y[X][i], v = y[V][i];
-            y[X][i] = p[0][0] * x + p[0][1] * v;
-            y[V][i] = p[1][0] * x + p[1][1] * v;
-        }
+        p = swing->power[level];
+        x = *at_x;
+        v = *at_v;
+        *at_x = p[0][0] * x + p[0][1] * v;
+        *at_v = p[1][0] * x + p[1][1] * v;
     }
 }
 
-// A y in the coordinates (x, V, r, W), all lanes.
-static inline void contact_slope(const TrustContact *contact,
-                                 const double (*restrict y)[TRUST_LANES],
-                                 double (*restrict slope)[TRUST_LANES]) {
-    const Motion *m = &contact->motion;
-    const double fling = m->share * m->contact_damping;
-    for (int i = 0; i < TRUST_LANES; i++) {
-        const double v = y[V][i] + fling * y[R][i];
-        const double push = m->omega2 * y[X][i] + m->damping * v;
-        const double spring = m->contact_omega2 * y[R][i];
-        slope[X][i] = v;
-        slope[V][i] = m->share * spring - push;
-        slope[R][i] = y[W][i] - m->contact_damping * y[R][i];
-        slope[W][i] = push - spring;
-    }
+typedef struct Errors {
+    Four x, v, r, w;
+} Errors;
+
+// A y in the coordinates (x, V, r, W).
+INLINE void contact_slope(const Motion *m, const Errors *y, Errors *slope) {
+    const Four v = y->v + m->share * m->contact_damping * y->r;
+    const Four push = m->omega2 * y->x + m->damping * v, spring = m->contact_omega2 * y->r;
+    slope->x = v;
+    slope->v = m->share * spring - push;
+    slope->r = y->w - m->contact_damping * y->r;
+    slope->w = push - spring;
 }
 
-static void contact_levels(TrustContact *contact, int levels) {
-    if (contact->levels == 0) {
-        const double h = contact->step;
+static void contact_multiply(double p[4][4], double q[4][4], double out[4][4]) {
+    for (int i = 0; i < SIZE; i++)
+        for (int j = 0; j < SIZE; j++)
+            out[i][j] =
+                p[i][0] * q[0][j] + p[i][1] * q[1][j] + p[i][2] * q[2][j] + p[i][3] * q[3][j];
+}
+
+// All powers up to n.
+static __attribute__((noinline)) void contact_make(TrustContact *contact, uint64_t n) {
+    double(*const near)[4][4] = contact->near;
+    if (contact->known == 0) {
         // A Taylor series, each lane a column.
         _Static_assert((int)TRUST_LANES == (int)SIZE, "a lane for each column");
-        double term[SIZE][TRUST_LANES] = {{0}}, slope[SIZE][TRUST_LANES];
-        for (int i = 0; i < SIZE; i++)
-            term[i][i] = 1;
-        memcpy(contact->power[0], term, sizeof term);
+        Errors term = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, slope;
+        memcpy(near[0], &term, sizeof near[0]);
+        Errors sum = term;
         for (int i = 1; i < 12; i++) {
-            const double share = h / i;
-            contact_slope(contact, (const double(*)[TRUST_LANES])term, slope);
-            for (int row = 0; row < SIZE; row++)
-                for (int column = 0; column < SIZE; column++) {
-                    term[row][column] = share * slope[row][column];
-                    contact->power[0][row][column] += term[row][column];
-                }
+            const double share = contact->step / i;
+            contact_slope(&contact->motion, &term, &slope);
+            term = (Errors){share * slope.x, share * slope.v, share * slope.r, share * slope.w};
+            sum = (Errors){sum.x + term.x, sum.v + term.v, sum.r + term.r, sum.w + term.w};
         }
-        contact->levels = 1;
+        memcpy(near[1], &sum, sizeof near[1]);
+        contact->known = 2;
     }
-    for (; contact->levels < levels; contact->levels++) {
-        double(*const p)[4] = contact->power[contact->levels - 1];
-        double(*const q)[4] = contact->power[contact->levels];
-        for (int i = 0; i < SIZE; i++)
-            for (int j = 0; j < SIZE; j++)
-                q[i][j] =
-                    p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j] + p[i][3] * p[3][j];
+    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    for (; contact->known < wanted; contact->known++)
+        contact_multiply(near[contact->known - 1], near[1], near[contact->known]);
+    for (; n >> contact->levels >= TRUST_NEAR; contact->levels++) {
+        const bool is_first = contact->levels == 0;
+        double(*const last)[4] =
+            (is_first ? near[TRUST_NEAR / 2] : contact->power[contact->levels - 1]);
+        contact_multiply(last, last, contact->power[contact->levels]);
     }
 }
 
-// Two lanes at once.
-typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
-
-typedef struct Pairs {
-    Pair x, v, r, w;
-} Pairs;
-
-static inline Pairs pairs_slope(const Motion *m, const Pairs *y) {
-    const Pair v = y->v + m->share * m->contact_damping * y->r;
-    const Pair push = m->omega2 * y->x + m->damping * v, spring = m->contact_omega2 * y->r;
-    return (Pairs){v, m->share * spring - push, y->w - m->contact_damping * y->r, push - spring};
+INLINE void contact_map(double p[4][4], Errors *y) {
+    const Errors from = *y;
+    y->x = (p[0][0] * from.x + p[0][1] * from.v) + (p[0][2] * from.r + p[0][3] * from.w);
+    y->v = (p[1][0] * from.x + p[1][1] * from.v) + (p[1][2] * from.r + p[1][3] * from.w);
+    y->r = (p[2][0] * from.x + p[2][1] * from.v) + (p[2][2] * from.r + p[2][3] * from.w);
+    y->w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
 }
 
-static void contact_go(TrustContact *contact, double (*y)[TRUST_LANES], double length) {
+INLINE void contact_go(TrustContact *contact, double (*at)[TRUST_LANES], double length) {
     double h;
-    const uint64_t n = divide(length, contact->motion.rate * (1 / CONTACT_STEP), contact->step, &h);
-    int levels = 0;
-    while (n >> levels > 0)
-        levels++;
-    if (levels > contact->levels)
-        contact_levels(contact, levels);
-    const double half = h * h / 2, sixth = half * h * (1.0 / 3);
-    for (int lane = 0; lane < TRUST_LANES; lane += 2) {
-        Pair *const at[SIZE] = {(Pair *)&y[X][lane], (Pair *)&y[V][lane], (Pair *)&y[R][lane],
-                                (Pair *)&y[W][lane]};
-        Pairs now = {*at[X], *at[V], *at[R], *at[W]};
-        const Pairs first = pairs_slope(&contact->motion, &now);
-        const Pairs second = pairs_slope(&contact->motion, &first);
-        const Pairs third = pairs_slope(&contact->motion, &second);
-        now.x += h * first.x + (half * second.x + sixth * third.x);
-        now.v += h * first.v + (half * second.v + sixth * third.v);
-        now.r += h * first.r + (half * second.r + sixth * third.r);
-        now.w += h * first.w + (half * second.w + sixth * third.w);
-        for (int level = 0; level < levels; level++) {
-            if ((n >> level & 1) == 0)
-                continue;
-            const double(*const p)[4] = (const double(*)[4])contact->power[level];
-            const Pairs from = now;
-            now.x = (p[0][0] * from.x + p[0][1] * from.v) + (p[0][2] * from.r + p[0][3] * from.w);
-            now.v = (p[1][0] * from.x + p[1][1] * from.v) + (p[1][2] * from.r + p[1][3] * from.w);
-            now.r = (p[2][0] * from.x + p[2][1] * from.v) + (p[2][2] * from.r + p[2][3] * from.w);
-            now.w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
-        }
-        *at[X] = now.x;
-        *at[V] = now.v;
-        *at[R] = now.r;
-        *at[W] = now.w;
-    }
+    const uint64_t n = divide(length, contact->frequency, contact->step, &h);
+    if ((int)(n % TRUST_NEAR) >= contact->known || n >> contact->levels >= TRUST_NEAR)
+        contact_make(contact, n);
+    const double half = h * h / 2, sixth = half * h * (1.0 / 3), last = half * half * (1.0 / 6);
+    const Motion *m = &contact->motion;
+    Errors y = {FOUR(at[X]), FOUR(at[V]), FOUR(at[R]), FOUR(at[W])}, a, b, c, d;
+    contact_slope(m, &y, &a);
+    contact_slope(m, &a, &b);
+    contact_slope(m, &b, &c);
+    contact_slope(m, &c, &d);
+    y.x += (h * a.x + half * b.x) + (sixth * c.x + last * d.x);
+    y.v += (h * a.v + half * b.v) + (sixth * c.v + last * d.v);
+    y.r += (h * a.r + half * b.r) + (sixth * c.r + last * d.r);
+    y.w += (h * a.w + half * b.w) + (sixth * c.w + last * d.w);
+    contact_map(contact->near[n % TRUST_NEAR], &y);
+    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1)
+        if ((left & 1) != 0)
+            contact_map(contact->power[level], &y);
+    PUT_FOUR(at[X], y.x);
+    PUT_FOUR(at[V], y.v);
+    PUT_FOUR(at[R], y.r);
+    PUT_FOUR(at[W], y.w);
 }
 
 // Adds `size` to each lane, with signs of its own.
-static inline void scatter(Trust *trust, int row, double size) {
+INLINE void scatter(Trust *trust, int row, double size) {
     static const double signs[16][TRUST_LANES] = {
         {-1, -1, -1, -1}, {-1, -1, -1, 1}, {-1, -1, 1, -1}, {-1, -1, 1, 1},
         {-1, 1, -1, -1},  {-1, 1, -1, 1},  {-1, 1, 1, -1},  {-1, 1, 1, 1},
         {1, -1, -1, -1},  {1, -1, -1, 1},  {1, -1, 1, -1},  {1, -1, 1, 1},
         {1, 1, -1, -1},   {1, 1, -1, 1},   {1, 1, 1, -1},   {1, 1, 1, 1}};
     const double *sign = signs[trust->signs >> (60 - row * TRUST_LANES) & 15];
-    for (int i = 0; i < TRUST_LANES; i++)
-        trust->y[row][i] += sign[i] * size;
+    PUT_FOUR(trust->y[row], FOUR(trust->y[row]) + FOUR(sign) * size);
 }
 
 // One rounding of what a stretch of this length held, `speed` being the relative one.
-static void round_off(Trust *trust, double length, const State *state) {
+INLINE void round_off(Trust *trust, double length, const State *state) {
     const double reach = trust->reach;
     const double speed = fabs(state->w), own_speed = fabs(state->v);
     const double size = fabs(state->x) + reach * own_speed;
@@ -215,18 +216,19 @@ static void round_off(Trust *trust, double length, const State *state) {
 }
 
 // The end of a stretch: what it adds, and how far the estimate is now.
-static void judge(Trust *trust, double time, const State *state, double largest) {
+INLINE void judge(Trust *trust, double time, const State *state, double largest) {
     const double length = time - trust->time;
     round_off(trust, length, state);
     const double here = fabs(state->x), known = here > largest ? here : largest;
     if (known > trust->largest)
         trust->largest = known;
-    for (int i = 0; i < TRUST_LANES; i++) {
-        const double x = trust->y[X][i], v = trust->reach * trust->y[V][i];
-        const double square = x * x + v * v;
-        if (!(square <= trust->worst))
-            trust->worst = square;
-    }
+    const Four x = FOUR(trust->y[X]), v = trust->reach * FOUR(trust->y[V]);
+    const Four square = x * x + v * v;
+    // What is not a number counts as the most.
+    const double one = square[0] <= square[1] ? square[1] : square[0];
+    const double other = square[2] <= square[3] ? square[3] : square[2];
+    const double most = one <= other ? other : one;
+    trust->worst = most <= trust->worst ? trust->worst : most;
     const double parting = RESPONSE_PARTING * trust->largest;
     if (isnan(trust->horizon) && !(trust->worst <= parting * parting))
         trust->horizon = trust->time;
@@ -249,7 +251,8 @@ void trust_start(Trust *trust, const Motion *flying, const Motion *touching, con
         swing->damping = damping;
         swing->rate = rate;
         swing->step = SWING_STEP / rate;
-        swing->levels = 0;
+        swing->frequency = rate / SWING_STEP;
+        swing->known = swing->levels = 0;
     }
     for (int side = 0; side < 2; side++) {
         const Motion *now = &touching[side], *then = &trust->touching[side].motion;
@@ -261,8 +264,10 @@ void trust_start(Trust *trust, const Motion *flying, const Motion *touching, con
         trust->touching[side].motion = *now;
         trust->touching[side].motion.rate = most;
         trust->touching[side].step = CONTACT_STEP / most;
-        trust->touching[side].levels = 0;
+        trust->touching[side].frequency = most / CONTACT_STEP;
+        trust->touching[side].known = trust->touching[side].levels = 0;
     }
+    trust->is_wide = wide_is_at_hand();
     trust->is_spent = false;
     trust->time = 0;
     trust->share = flying->share;
@@ -280,34 +285,58 @@ void trust_start(Trust *trust, const Motion *flying, const Motion *touching, con
     round_off(trust, 0, state);
 }
 
+INLINE void fly(Trust *trust, double time, const State *state, double largest) {
+    const double length = time - trust->time;
+    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
+    // The free mass goes straight on.
+    const Four speed = v + FOUR(trust->y[W]), z = x + FOUR(trust->y[R]) + length * speed;
+    swing_go(&trust->flying, &x, &v, length);
+    PUT_FOUR(trust->y[X], x);
+    PUT_FOUR(trust->y[V], v);
+    PUT_FOUR(trust->y[R], z - x);
+    PUT_FOUR(trust->y[W], speed - v);
+    judge(trust, time, state, largest);
+}
+
+INLINE void press(Trust *trust, Side side, double time, const State *state, double largest) {
+    contact_go(&trust->touching[side], trust->y, time - trust->time);
+    judge(trust, time, state, largest);
+}
+
+WIDE static void fly_wide(Trust *trust, double time, const State *state, double largest) {
+    fly(trust, time, state, largest);
+}
+
+WIDE static void press_wide(Trust *trust, Side side, double time, const State *state,
+                            double largest) {
+    press(trust, side, time, state, largest);
+}
+
 void trust_fly(Trust *trust, double time, const State *state, double largest) {
     if (trust->is_spent)
         return;
-    const double length = time - trust->time;
-    double z[TRUST_LANES], speed[TRUST_LANES];
-    for (int i = 0; i < TRUST_LANES; i++) { // the free mass goes straight on
-        speed[i] = trust->y[V][i] + trust->y[W][i];
-        z[i] = trust->y[X][i] + trust->y[R][i] + length * speed[i];
-    }
-    swing_go(&trust->flying, trust->y, length);
-    for (int i = 0; i < TRUST_LANES; i++) {
-        trust->y[R][i] = z[i] - trust->y[X][i];
-        trust->y[W][i] = speed[i] - trust->y[V][i];
-    }
-    judge(trust, time, state, largest);
+    if (trust->is_wide)
+        fly_wide(trust, time, state, largest);
+    else
+        fly(trust, time, state, largest);
 }
 
 void trust_press(Trust *trust, Side side, double time, const State *state, double largest) {
     if (trust->is_spent)
         return;
-    contact_go(&trust->touching[side], trust->y, time - trust->time);
-    judge(trust, time, state, largest);
+    if (trust->is_wide)
+        press_wide(trust, side, time, state, largest);
+    else
+        press(trust, side, time, state, largest);
 }
 
 void trust_rest(Trust *trust, double time, const State *state, double largest) {
     if (trust->is_spent)
         return;
-    swing_go(&trust->resting, trust->y, time - trust->time);
+    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
+    swing_go(&trust->resting, &x, &v, time - trust->time);
+    PUT_FOUR(trust->y[X], x);
+    PUT_FOUR(trust->y[V], v);
     judge(trust, time, state, largest);
     for (int i = 0; i < TRUST_LANES; i++)
         trust->y[R][i] = trust->y[W][i] = 0;

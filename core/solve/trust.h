@@ -12,24 +12,28 @@
 #include "core/solve/arc.h"
 
 // So many roundings are followed at once, each with signs of its own; the first to part counts.
-enum { TRUST_LANES = 4, TRUST_LEVELS = 32 };
+enum { TRUST_LANES = 4, TRUST_NEAR = 64, TRUST_LEVELS = 26 };
 
-// exp(A D) to the powers 1, 2, 4 ...; made as they are needed.
+// exp(A D) to the powers 0, 1, 2 ... and from TRUST_NEAR on to 1, 2, 4 ... times that; made as they
+// are needed.
 typedef struct TrustSwing { // of the structure alone
     double omega2, damping, rate;
-    double step; // D [s]
-    int levels;
+    double step, frequency; // D [s], 1 / D
+    int known, levels;
+    double near[TRUST_NEAR][2][2];
     double power[TRUST_LEVELS][2][2];
 } TrustSwing;
 
 typedef struct TrustContact { // of both bodies
     Motion motion;
-    double step; // D [s]
-    int levels;
+    double step, frequency; // D [s], 1 / D
+    int known, levels;
+    double near[TRUST_NEAR][4][4];
     double power[TRUST_LEVELS][4][4];
 } TrustContact;
 
 typedef struct Trust {
+    bool is_wide;   // the processor has wide.h's registers
     bool is_spent;  // the estimate has reached the motion's own size: nothing is left to carry
     double time;    // of the last event [s]
     double share;   // m / (M + m) [-]

@@ -5,7 +5,9 @@ import concurrent.futures
 import hashlib
 import json
 import os
+import platform
 import shutil
+import subprocess
 import sys
 import tempfile
 
@@ -97,6 +99,19 @@ def test_any_number_of_workers_gives_the_same_bytes():
                 for job in jobs]
     assert digests[1] == digests[2], "2 workers differ from 1"
     assert digests[1] == digests[8], "8 workers differ from 1"
+
+
+def test_the_core_fuses_no_operation():
+    """The core's library has no fused multiplication and addition, which not every processor has.
+
+    gcc 12 fuses complex products in vectors where the target has such instructions, whatever -ffp-contract says."""
+    if platform.machine() != "x86_64":
+        return
+    listing = subprocess.run(["objdump", "-d", "--no-show-raw-insn", os.path.join(program.build, "libimpactd_core.a")],
+                             stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert "vmulpd" in listing, "vectors are not compiled as they were"
+    fused = [line for line in listing.splitlines() if "\tvfm" in line or "\tvfnm" in line]
+    assert not fused, fused[:5]
 
 
 if __name__ == "__main__":

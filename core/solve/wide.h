@@ -1,0 +1,38 @@
+// Four numbers side by side, and functions compiled for processors that hold them in one register.
+// Not wider ones (lanes.h) and no fused operations: the bytes are the same everywhere. Used by
+// trust.c, hop.h, exact_press.c and exact_stride.c.
+#ifndef CORE_SOLVE_WIDE_H
+#define CORE_SOLVE_WIDE_H
+
+#include <stdbool.h>
+
+#define INLINE static inline __attribute__((always_inline))
+
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias)); // anywhere
+#define FOUR(values) (*(const Four *)(values))
+#define PUT_FOUR(values, four) (*(Four *)(values) = (four))
+
+// The sums of four of them, side by side.
+INLINE void wide_sum(const Four *a, const Four *b, const Four *c, const Four *d, Four *sum) {
+    const Four first =
+        __builtin_shufflevector(*a, *b, 0, 4, 2, 6) + __builtin_shufflevector(*a, *b, 1, 5, 3, 7);
+    const Four last =
+        __builtin_shufflevector(*c, *d, 0, 4, 2, 6) + __builtin_shufflevector(*c, *d, 1, 5, 3, 7);
+    *sum = __builtin_shufflevector(first, last, 0, 1, 4, 5) +
+           __builtin_shufflevector(first, last, 2, 3, 6, 7);
+}
+
+// A function of its own for such processors; what it calls must be INLINE to profit.
+#ifdef __x86_64__
+#define WIDE __attribute__((target("avx2")))
+static inline bool wide_is_at_hand(void) {
+    return __builtin_cpu_supports("avx2");
+}
+#else
+#define WIDE
+static inline bool wide_is_at_hand(void) {
+    return false;
+}
+#endif
+
+#endif
