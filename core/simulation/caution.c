@@ -8,25 +8,7 @@
 
 #include "core/base/side.h"
 
-// What steps are wrong by is not rounding's.
-static Status warn_of_steps(Outcome *outcome) {
-    const Summary *summary = &outcome->summary;
-    if (isnan(summary->error_estimate))
-        return warnings_add(&outcome->warnings, "/accuracy",
-                            "the error of these steps is not known: the run beside this one that "
-                            "would tell it came to no end");
-    if (summary->error_estimate <= RESPONSE_PARTING)
-        return STATUS_OK;
-    return warnings_add(&outcome->warnings, "/accuracy",
-                        "with these steps the displacement is wrong by about %.2g of its largest "
-                        "value%s: shorter steps, or the solver exact, are closer",
-                        summary->error_estimate,
-                        summary->error_estimate > 0.1 ? ", and only statistics hold" : "");
-}
-
 static Status warn_of_horizon(Outcome *outcome) {
-    if (outcome->response.is_stepped)
-        return warn_of_steps(outcome);
     if (isnan(outcome->summary.trust_horizon))
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/duration",
