@@ -266,5 +266,23 @@ def test_faults_of_a_study_are_told_with_the_scenes():
         assert daemon.submit(no_psd).json()["errors"][0]["pointer"] == "/study/metric"
 
 
+def test_wrong_types_in_a_study():
+    """Every member of a study gets a value of every other type: 422 at its place, or a plan."""
+    with program.daemon() as daemon:
+        refused = 0
+        for name in ("kind", "error", "metric", "repeats", "solvers", "point_steps", "trial"):
+            for wrong in (None, True, -1, 1e308, 0.5, "x", [], {}, [[]], ["x", "x"], {"x": 1}):
+                reply = daemon.request("POST", "/v1/jobs?dry_run=1", json=study(**{name: wrong}))
+                assert reply.status in (200, 422), (name, wrong, reply)
+                if reply.status == 422:
+                    refused += 1
+                    pointers = [fault["pointer"] for fault in reply.json()["errors"]]
+                    assert all(p == "/study" or p.startswith("/study/" + name) for p in pointers), (name, wrong, pointers)
+        assert refused > 50, refused
+        for wrong in (None, True, 1, "tradeoff", [], [{}]):
+            reply = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": wrong})
+            assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == "/study", (wrong, reply)
+
+
 if __name__ == "__main__":
     program.main(globals())

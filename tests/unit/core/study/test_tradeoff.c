@@ -12,7 +12,6 @@
 #include "core/math/fourier.h"
 #include "core/study/inquiry.h"
 #include "core/study/tradeoff.h"
-#include "core/study/tradeoff_ladder.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
@@ -290,26 +289,6 @@ static void every_storey_of_a_frame_is_compared(void **state) {
     inquiry_clear(&inquiry);
 }
 
-static void a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse(void **state) {
-    (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 1, 1);
-    Buffer *buffer = &inquiry.simulation.scene.dampers.at[0].buffer;
-    buffer->restitution = buffer->contact_time = (double)NAN;
-    buffer->stiffness = 1655.6190925128012;
-    buffer->damping = 4.04573773197014;
-    complete(&inquiry);
-    TradeoffPoint point;
-    assert_int_equal(fields_default(tradeoff_point_fields, &point), STATUS_OK);
-    point.solver = "exact";
-    point.contact_model = "impulse";
-    Simulation target;
-    assert_int_equal(ladder_apply(&inquiry.simulation, &point, NULL, &target, &problem), STATUS_OK);
-    const Buffer *made = &target.scene.dampers.at[0].buffer;
-    assert_true(fabs(made->restitution - 0.61) < 1e-9 && isnan(made->stiffness));
-    simulation_clear(&target);
-    inquiry_clear(&inquiry);
-}
-
 int main(void) {
     fourier_start();
     const struct CMUnitTest tests[] = {
@@ -321,7 +300,6 @@ int main(void) {
         cmocka_unit_test(what_cannot_be_answered_is_refused),
         cmocka_unit_test(the_usual_error_is_the_metrics),
         cmocka_unit_test(every_storey_of_a_frame_is_compared),
-        cmocka_unit_test(a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
