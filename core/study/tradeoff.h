@@ -16,7 +16,7 @@ typedef enum TradeoffMetric {
     TRADEOFF_METRICS
 } TradeoffMetric;
 extern const char *const tradeoff_metric_names[]; // NULL-terminated
-extern const char *const tradeoff_metric_units[]; // "1", or "dB"; for people
+extern const char *const tradeoff_metric_units[]; // to stand behind a number: "", " dB"
 
 // What is asked.
 typedef struct TradeoffStudy {

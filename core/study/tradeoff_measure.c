@@ -147,16 +147,19 @@ static double cpu(const Session *session) {
 static Status time_point(Session *session, size_t index, size_t round, Problem *problem) {
     TradeoffPoint *point = &session->answer->points.at[index];
     Simulation simulation = {0};
-    Status status =
-        ladder_apply(session->simulation, point, &session->limits, &simulation, problem);
+    // It was judged under its limits before.
+    Status status = ladder_apply(session->simulation, point, NULL, &simulation, problem);
+    const double steps = session->steps[index];
+    const double end = session->done + fmax(steps, BUDGET_BATCH);
     size_t runs = 0;
     double took = 0;
     const double began = cpu(session);
     while (status == STATUS_OK && runs < BATCH && took < batch_seconds) {
         Outcome *outcome = NULL;
-        status =
-            run(session, &simulation, &session->limits, session->steps[index], &outcome, problem);
+        const double share = fmin(steps, end - session->done);
+        status = run(session, &simulation, &session->limits, share, &outcome, problem);
         outcome_drop(outcome);
+        session->done += share;
         runs++;
         took = cpu(session) - began;
     }
@@ -164,7 +167,7 @@ static Status time_point(Session *session, size_t index, size_t round, Problem *
     TRY(status);
     session->times[index * session->study->repeats + round] = took / (double)runs;
     point->runs += runs;
-    session->done += fmax(session->steps[index], BUDGET_BATCH);
+    session->done = end;
     return STATUS_OK;
 }
 
