@@ -147,8 +147,8 @@ static Status plan_modes(const Structure *structure, Plan *plan, Problem *proble
     return n > 1 ? decide_damping(plan, !isnan(ratio)) : STATUS_OK;
 }
 
-static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan,
-                        Problem *problem) {
+// All but the modes and the reasons.
+static Status plan_values(const Scene *scene, Plan *plan) {
     const Structure *structure = scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
     TRY(plan_room(plan, structure_storeys(structure), scene->dampers.count));
@@ -165,8 +165,14 @@ static Status plan_fill(const Scene *scene, const char *asked, const char *solve
                                                     : SEPARATION_ZERO_PENETRATION;
     for (size_t i = 0; i < scene->dampers.count; i++)
         TRY(plan_damper(scene, plan, i));
+    return STATUS_OK;
+}
+
+static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan,
+                        Problem *problem) {
+    TRY(plan_values(scene, plan));
     TRY(decide_contact(scene, plan));
-    TRY(plan_modes(structure, plan, problem));
+    TRY(plan_modes(scene_structure(scene), plan, problem));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
                       strcmp(asked, solver) == 0 ? "the scene asks for it"
                       : plan->form == CONTACT_POWER
@@ -190,6 +196,24 @@ Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan 
     *plan = NULL;
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for the plan")
                                       : status;
+}
+
+Status plan_sketch(const Scene *scene, Plan **plan) {
+    *plan = calloc(1, sizeof **plan);
+    if (*plan == NULL)
+        return STATUS_NO_MEMORY;
+    StructureRates rates;
+    Status status = plan_values(scene, *plan);
+    if (status == STATUS_OK)
+        status = structure_rates(scene_structure(scene), &rates);
+    if (status == STATUS_OK) {
+        (*plan)->fastest = rates.fastest;
+        (*plan)->modes.is_classical = !isnan(scene_structure(scene)->damping_ratio);
+        return STATUS_OK;
+    }
+    plan_free(*plan);
+    *plan = NULL;
+    return status;
 }
 
 void plan_free(Plan *plan) {

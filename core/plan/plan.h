@@ -93,7 +93,8 @@ typedef struct Plan {
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
-    Modes modes;                        // empty where plan_is_single
+    Modes modes;                        // empty where plan_is_single, and in a sketch
+    double fastest; // of a sketch: no mode is faster, or dies away faster [rad/s]
     PlanDamper *dampers;
     size_t damper_count;
     const ContactLaw *law;
@@ -108,6 +109,9 @@ typedef struct Plan {
 // what the accuracy object said. Freed by plan_free.
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
+// A plan without modes and reasons, in a small part of the time, to tell what a run may cost. Freed
+// by plan_free.
+Status plan_sketch(const Scene *scene, Plan **plan);
 void plan_free(Plan *plan);
 
 // Whether the engine for one mass serves: one storey that moves with the base, at most one damper,

@@ -143,6 +143,12 @@ static Status check_cost(const Simulation *simulation, const SimulationLimits *l
     const double steps = simulation_cost(simulation).steps;
     if (steps <= limits->steps)
         return STATUS_OK;
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    if (solver->cost != NULL)
+        return problem_add(problem, STATUS_INVALID, "/accuracy",
+                           "would take about %.2g solver steps by %s, must be at most %.2g: take "
+                           "fewer of them, or the solver exact",
+                           steps, solver->kind.name, limits->steps);
     return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
                             "would take about %.2g solver steps, must be at most %.2g: the "
                             "structure or the base moves that fast",

@@ -332,28 +332,23 @@ static double exact_steps(const Simulation *simulation) {
            power_steps(&simulation->scene);
 }
 
-// Steps of a solver that knows its own cost, once the scene is made ready.
-static double own_steps(const Simulation *simulation, const Plan *plan) {
+// Steps of a solver that knows its own cost.
+static double own_steps(const Simulation *simulation) {
     const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
-    Plan *own = NULL;
-    if (plan == NULL && plan_new(&simulation->scene, "", "", &own, NULL) != STATUS_OK)
+    Plan *plan;
+    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
-        chosen_solver(simulation)
-            ->cost(settings(simulation), base_interval(simulation), plan != NULL ? plan : own);
-    plan_free(own);
+        chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);
+    plan_free(plan);
     return steps + (storeys > 1 ? 2 * storeys * storeys * storeys : 0);
 }
 
 Cost simulation_cost(const Simulation *simulation) {
-    return simulation_cost_planned(simulation, NULL);
-}
-
-Cost simulation_cost_planned(const Simulation *simulation, const Plan *plan) {
     const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
-    double steps = chosen_solver(simulation)->cost != NULL ? own_steps(simulation, plan)
-                                                           : exact_steps(simulation);
+    double steps =
+        chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
     // A transformed sample costs about a third of a step, and overlap transforms it several times.
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /

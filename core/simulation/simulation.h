@@ -96,8 +96,5 @@ typedef struct Cost {
     double bytes; // of the outcome in memory
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
-// The same where a plan of its scene is at hand, whatever solver it names. For a large structure
-// making one takes as long as a short run.
-Cost simulation_cost_planned(const Simulation *simulation, const Plan *plan);
 
 #endif

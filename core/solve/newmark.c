@@ -15,7 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/linear.h"
 #include "core/solve/steps_run.h"
 
 enum { NEWTON_MOST = 60 };
@@ -29,6 +28,12 @@ typedef struct Newmark {
     double *rates, *from, *end, *force, *left, *right, *bare;
     double *block;
 } Newmark;
+
+static void swap(double *a, double *b) {
+    const double kept = *a;
+    *a = *b;
+    *b = kept;
+}
 
 static Status no_memory(const Steps *steps) {
     return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
@@ -72,6 +77,39 @@ static void newmark_clear(Steps *steps) {
     steps->own = NULL;
 }
 
+// left x = right by Gauss with pivots, for `columns` right sides, which stand in rows of so many
+// values; the answers take their place.
+static bool eliminate(double *left, double *right, size_t n, size_t columns) {
+    for (size_t k = 0; k < n; k++) {
+        size_t pivot = k;
+        for (size_t i = k + 1; i < n; i++)
+            if (fabs(left[i * n + k]) > fabs(left[pivot * n + k]))
+                pivot = i;
+        if (!(fabs(left[pivot * n + k]) > 0) || !isfinite(left[pivot * n + k]))
+            return false;
+        for (size_t j = k; j < n && pivot != k; j++)
+            swap(&left[k * n + j], &left[pivot * n + j]);
+        for (size_t j = 0; j < columns && pivot != k; j++)
+            swap(&right[k * columns + j], &right[pivot * columns + j]);
+        for (size_t i = k + 1; i < n; i++) {
+            const double factor = left[i * n + k] / left[k * n + k];
+            for (size_t j = k; j < n && factor != 0; j++)
+                left[i * n + j] -= factor * left[k * n + j];
+            for (size_t j = 0; j < columns && factor != 0; j++)
+                right[i * columns + j] -= factor * right[k * columns + j];
+        }
+    }
+    for (size_t i = n; i-- > 0;) {
+        double *row = right + i * columns;
+        for (size_t k = i + 1; k < n; k++)
+            for (size_t j = 0; j < columns; j++)
+                row[j] -= left[i * n + k] * right[k * columns + j];
+        for (size_t j = 0; j < columns; j++)
+            row[j] /= left[i * n + i];
+    }
+    return true;
+}
+
 static Status invert(const Steps *steps, double length) {
     const Newmark *own = steps->own;
     const Frame *frame = &steps->frame;
@@ -82,28 +120,22 @@ static Status invert(const Steps *steps, double length) {
             own->inverse[i] = 1 / (1 + half * frame->diagonal[i] + quarter * frame->omega2[i]);
         return STATUS_OK;
     }
-    double *G = malloc(n * (n + 1) * sizeof *G), *unit = G + n * n;
+    double *G = malloc(n * n * sizeof *G);
     if (G == NULL)
         return no_memory(steps);
-    Status status = STATUS_OK;
     for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < n; j++)
+        for (size_t j = 0; j < n; j++) {
             G[i * n + j] =
                 half * frame->damping[i * n + j] + (i == j ? 1 + quarter * frame->omega2[i] : 0);
-    for (size_t i = 0; i < n && status == STATUS_OK; i++) {
-        memset(unit, 0, n * sizeof *unit);
-        unit[i] = 1;
-        status = linear_solve(n, G, unit, own->inverse + i * n);
-    }
+            own->inverse[i * n + j] = i == j;
+        }
+    const bool is_found = eliminate(G, own->inverse, n, n);
     free(G);
-    if (status == STATUS_OK)
-        return STATUS_OK;
-    return status == STATUS_NO_MEMORY
-               ? no_memory(steps)
-               : problem_set(frame->problem, STATUS_UNSTABLE,
-                             "newmark's matrices leave what double precision can hold with a step "
-                             "of %.4g s",
-                             length);
+    return is_found ? STATUS_OK
+                    : problem_set(frame->problem, STATUS_UNSTABLE,
+                                  "newmark's matrices leave what double precision can hold with a "
+                                  "step of %.4g s",
+                                  length);
 }
 
 // out = G^-1 in.
@@ -128,38 +160,6 @@ static Status make_tables(Steps *steps, double length) {
                                      (d == e ? 1 / frame->damper[d].plan->mass : 0);
     }
     return STATUS_OK;
-}
-
-// left x = right by Gauss with pivots; the answer is in `right`.
-static bool eliminate(double *left, double *right, size_t n) {
-    for (size_t k = 0; k < n; k++) {
-        size_t pivot = k;
-        for (size_t i = k + 1; i < n; i++)
-            if (fabs(left[i * n + k]) > fabs(left[pivot * n + k]))
-                pivot = i;
-        if (!(fabs(left[pivot * n + k]) > 0))
-            return false;
-        for (size_t j = k; j < n && pivot != k; j++) {
-            const double kept = left[k * n + j];
-            left[k * n + j] = left[pivot * n + j];
-            left[pivot * n + j] = kept;
-        }
-        const double kept = right[k];
-        right[k] = right[pivot];
-        right[pivot] = kept;
-        for (size_t i = k + 1; i < n; i++) {
-            const double factor = left[i * n + k] / left[k * n + k];
-            for (size_t j = k; j < n && factor != 0; j++)
-                left[i * n + j] -= factor * left[k * n + j];
-            right[i] -= factor * right[k];
-        }
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t j = i + 1; j < n; j++)
-            right[i] -= left[i * n + j] * right[j];
-        right[i] /= left[i * n + i];
-    }
-    return true;
 }
 
 // Contact forces at the step's end, from those at its start; `r` and `w` are as they would be there
@@ -190,7 +190,7 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
             for (size_t e = 0; e < m; e++)
                 own->left[d * m + e] += yielding * own->soften[d * m + e];
         }
-        if (!eliminate(own->left, own->right, m))
+        if (!eliminate(own->left, own->right, m, 1))
             break;
         bool is_done = true;
         for (size_t d = 0; d < m; d++) {
@@ -253,7 +253,7 @@ static Status newmark_step(Steps *steps, double length) {
 
 static double newmark_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
     const double n = (double)storeys, m = (double)dampers;
-    *making = is_coupled ? n * n * n * n / 1000 : 0;
+    *making = is_coupled ? n * n * n / 20 : 0;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }
 

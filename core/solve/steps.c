@@ -23,11 +23,8 @@ void steps_elastic(const Frame *frame, const double *q, const double *p, double 
             out[i] += frame->diagonal[i] * p[i];
         return;
     }
-    for (size_t j = 0; j < n; j++) {
-        const double *row = frame->damping + j * n; // D is symmetric
-        for (size_t i = 0; i < n; i++)
-            out[i] += row[i] * p[j];
-    }
+    for (size_t i = 0; i < n; i++)
+        out[i] += frame_dot(frame->damping + i * n, p, n);
 }
 
 void steps_rate(Steps *steps, const double *y, double ground, const double *force,
@@ -86,10 +83,13 @@ static End look(Steps *steps, const double *y, double ground, double slope, doub
         gained += frame->damper[d].plan->mass * rates[2 * n + m + d];
     }
     End end = {.input = -ground * momentum, .input_rate = -slope * momentum - ground * gained};
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++) { // D need not be symmetric
         const double drag = steps->elastic[i] - frame->omega2[i] * y[i];
+        const double dragged = frame->diagonal != NULL
+                                   ? frame->diagonal[i] * rates[n + i]
+                                   : frame_dot(frame->damping + i * n, rates + n, n);
         end.damping += drag * p[i];
-        end.damping_rate += 2 * drag * rates[n + i];
+        end.damping_rate += drag * rates[n + i] + dragged * p[i];
     }
     return end;
 }

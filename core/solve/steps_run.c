@@ -1,10 +1,11 @@
-// The neighbour's steps are about twice as long and end at samples too; where the run has one step
-// to a sample interval it has one to two of them. Where no contact has begun or ended, errors are
-// as the step to the method's order, which makes the run's error of the difference. Across contacts
-// they depend on how far into a stop the steps happen to end: there no more can be said than that
-// the error may be some times the difference, or what the energies are wrong by. Steps without a
-// fixed length cannot be made longer where samples and kinks end them: there the neighbour is the
-// better one, with half the length at most and a hundredth of the tolerance.
+// The neighbour's steps are up to twice as long and end at samples too, but nowhere else with the
+// run's; where the run has one step to a sample interval it has one to two of them. Where no
+// contact has begun or ended, errors are as the step to the method's order, which makes the run's
+// error of the difference. Across contacts they depend on how far into a stop the steps happen to
+// end: there no more can be said than that the error may be some times the difference, or what the
+// energies are wrong by. Steps without a fixed length cannot be made longer where samples and kinks
+// end them: there the neighbour is the better one, with half the length at most and a hundredth of
+// the tolerance.
 #include "core/solve/steps_run.h"
 
 #include <math.h>
@@ -55,16 +56,21 @@ double steps_contact_time(const Plan *plan) {
     return least;
 }
 
-// The shortest time in which a mode swings or dies away [s].
-static double mode_time(const Plan *plan) {
+double steps_mode_time(const Plan *plan) {
     const Modes *modes = &plan->modes;
     double fastest = 0;
+    if (modes->count == 0 && plan->storeys > 1)
+        return TURN / plan->fastest;
     if (modes->count == 0)
         return TURN /
                fmax(sqrt(plan->stiffness[0] / plan->mass[0]), plan->damping[0] / plan->mass[0]);
     for (size_t i = 0; i < modes->count; i++)
         fastest = fmax(fastest, fmax(modes->omega[i], modes->damping[i * modes->count + i]));
     return TURN / fastest;
+}
+
+bool steps_may_couple(const Plan *plan) {
+    return plan->storeys > 1 && !plan->modes.is_classical;
 }
 
 typedef struct Choice {
@@ -79,7 +85,8 @@ static Choice choose(const Plan *plan, const Accuracy *accuracy, double base_int
     double step = asked == NULL ? (double)NAN : asked->step;
     Choice choice = {1, 1, "asked", "the scene asks for it"};
     if (isnan(step)) {
-        const double mode = mode_time(plan) / PARTS, contact = steps_contact_time(plan) / PARTS;
+        const double mode = steps_mode_time(plan) / PARTS,
+                     contact = steps_contact_time(plan) / PARTS;
         choice.chose = mode < contact ? "mode" : "contact";
         choice.why = mode < contact ? "a 30th of the period of the fastest mode"
                                     : "a 30th of the shortest contact";
@@ -128,10 +135,9 @@ Status steps_decide(const Accuracy *accuracy, const Stepper *stepper, double bas
 
 double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_interval,
                   const Plan *plan) {
-    const Modes *modes = &plan->modes;
     double making;
-    const double each = stepper->cost(plan->storeys, plan->damper_count,
-                                      modes->count > 0 && !modes->is_classical, &making);
+    const double each =
+        stepper->cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
     const double steps =
         choose(plan, accuracy, base_interval).share * plan->duration * plan->sample_rate;
     return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
@@ -205,7 +211,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
     const size_t own = pair->run.share / kinks;
-    const size_t share = tolerance > 0 ? 2 : kinks * ((own + 1) / 2);
+    const size_t share = tolerance > 0 ? 2 : kinks * (own > 2 ? own / 2 + 1 : 1);
     pair->horizon = NAN;
     pair->stride = pair->run.share > 1 || tolerance > 0 ? 1 : 2;
     pair->longer = (double)(pair->run.share * pair->stride) / (double)share;
@@ -222,12 +228,24 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->is_spent = !pair->is_known;
 }
 
+// What one contact a step late moves a storey by, within the time that its speed turns in [m]: both
+// runs may be as late by chance.
+static double largest_jolt(const Pair *pair) {
+    const Frame *frame = &pair->run.frame;
+    const Impacts *impacts = &frame->ledger.response->impacts;
+    double most = 0;
+    for (size_t i = 0; i < impacts->count; i++)
+        most = fmax(most, impacts->at[i].impulse * frame->damper[impacts->at[i].damper - 1].thrust);
+    return pair->run.tolerance > 0 ? 0 : most * pair->run.length / 2;
+}
+
 static void tell(const Pair *pair, Response *response) {
     const double size = fmax(pair->largest, response->peaks.displacement);
     const Ledger *ledger = &pair->run.frame.ledger;
     const double balance =
         ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
-    const double error = size > 0 ? part_of(pair) * pair->worst / size : 0;
+    const double error =
+        size > 0 ? fmax(part_of(pair) * pair->worst, largest_jolt(pair)) / size : 0;
     response->has_trust = pair->is_known && pair->compared > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);

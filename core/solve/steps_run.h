@@ -32,6 +32,12 @@ double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_
 Status steps_run_pair(Run *run, const Stepper *stepper, size_t share, size_t kinks,
                       double tolerance, Response *response, Problem *problem);
 
+// The shortest time in which a mode swings or dies away [s].
+double steps_mode_time(const Plan *plan);
+
+// Whether damping couples the modes, or may where they are not known yet.
+bool steps_may_couple(const Plan *plan);
+
 // The shortest time that a contact lasts, or about that where it depends on its speed [s];
 // INFINITY without any.
 double steps_contact_time(const Plan *plan);

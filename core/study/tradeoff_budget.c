@@ -12,12 +12,8 @@ SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits
 }
 
 void budget_foretell(const Simulation *simulation, const TradeoffPoints *points, double *steps) {
-    Plan *plan;
-    if (plan_new(&simulation->scene, "", "", &plan, NULL) != STATUS_OK)
-        plan = NULL; // without memory: each point by itself
     for (size_t i = 0; i < points->count; i++)
-        steps[i] = ladder_cost(simulation, plan, &points->at[i]);
-    plan_free(plan);
+        steps[i] = ladder_cost(simulation, &points->at[i]);
 }
 
 size_t budget_trim(TradeoffPoints *points, double *steps, double most) {

@@ -299,13 +299,13 @@ bool ladder_has_force(const Simulation *simulation) {
            dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
 }
 
-double ladder_cost(const Simulation *simulation, const Plan *plan, const TradeoffPoint *point) {
+double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
     Simulation view = *simulation; // borrows all but what the point changes
     view.accuracy = NULL;
     if (apply_solver(point, &view) != STATUS_OK)
         return 0; // a guess without memory: the run will tell
     apply_output(point, &view);
-    const double steps = simulation_cost_planned(&view, plan).steps;
+    const double steps = simulation_cost(&view).steps;
     variant_free(view.accuracy);
     return steps;
 }

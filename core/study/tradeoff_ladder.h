@@ -21,8 +21,8 @@ Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
 // Whether contacts of the simulation have a force.
 bool ladder_has_force(const Simulation *simulation);
 
-// What a point is foretold to take, in solver steps. `plan` is the simulation's, or NULL.
-double ladder_cost(const Simulation *simulation, const Plan *plan, const TradeoffPoint *point);
+// What a point is foretold to take, in solver steps.
+double ladder_cost(const Simulation *simulation, const TradeoffPoint *point);
 
 // Asks for the channels that errors are measured by, and for no others; the spectra stay.
 Status ladder_watch(Simulation *simulation, Problem *problem);

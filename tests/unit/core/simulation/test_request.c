@@ -300,6 +300,26 @@ static void a_scene_that_would_take_too_long_is_refused_beforehand(void **state)
     simulation_clear(&simulation);
 }
 
+static void so_is_one_whose_solver_would_take_too_many_steps(void **state) {
+    (void)state;
+    const SimulationLimits few = {.samples = 1 << 25, .steps = 1e6};
+    for (const Solver *const *solver = solvers; *solver != NULL; solver++) {
+        if ((*solver)->cost == NULL)
+            continue;
+        Simulation simulation;
+        scene_with_damper(&simulation, 0.61, 0.025);
+        scene_choose(&simulation.accuracy, &solver_kinds, (*solver)->kind.name);
+        simulation.scene.duration = 1;
+        problem_clear(&told.problem);
+        assert_int_equal(simulation_complete(&simulation, &few, NULL, &told.problem), STATUS_OK);
+        simulation.scene.duration = 1e4;
+        assert_int_equal(simulation_complete(&simulation, &few, NULL, &told.problem),
+                         STATUS_INVALID);
+        assert_non_null(strstr(detail_at(&told.problem, "/accuracy"), (*solver)->kind.name));
+        simulation_clear(&simulation);
+    }
+}
+
 static void titles_and_labels_have_their_limits(void **state) {
     (void)state;
     Simulation simulation;
@@ -369,6 +389,7 @@ int main(void) {
         cmocka_unit_test(segments_overlap_by_less_than_themselves),
         cmocka_unit_test(statistics_begin_within_the_run),
         cmocka_unit_test(a_scene_that_would_take_too_long_is_refused_beforehand),
+        cmocka_unit_test(so_is_one_whose_solver_would_take_too_many_steps),
         cmocka_unit_test(titles_and_labels_have_their_limits),
         cmocka_unit_test(sixty_four_dampers_are_the_most),
         cmocka_unit_test(accuracy_is_chosen_by_its_solver),

@@ -78,35 +78,62 @@ static double miss(const Solver *solver, double knob, const Plan *plan, const Ba
     return error;
 }
 
-static Plan *swinging_frame(void) {
+// Damping may couple the modes, and whirl them.
+static Plan *swinging_frame(bool is_whirling) {
     Plan *plan = frames_new(3, 0, 2, 100);
     frames_uniform(plan, 10, 10 * 20 * 20, 0.02);
     plan->displacement[2] = 0.01;
+    if (is_whirling) {
+        plan->damping[0] += 20;
+        plan->damping[1] += 60;
+        plan->damping[3] -= 60;
+    }
     return plan;
 }
 
 static void between_contacts_errors_are_of_the_methods_order(void **state) {
     (void)state;
     const double orders[] = {2, 4, 2}; // of precise with a base that is a sine
-    Plan *plan = swinging_frame();
     const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 12};
-    for (size_t i = 0; i < COUNT(fixed); i++) {
+    for (size_t i = 0; i < 2 * COUNT(fixed); i++) {
+        Plan *plan = swinging_frame(i % 2 == 1);
+        const Solver *solver = fixed[i / 2];
         double last = NAN;
         for (double step = 0.005; step > 0.0005; step /= 2) {
             double estimate;
-            const double error = miss(fixed[i], step, plan, &sine, &estimate);
-            if (!isnan(last) && fabs(log2(last / error) - orders[i]) > 0.15)
-                fail_msg("%s: order %g at %g s", fixed[i]->kind.name, log2(last / error), step);
+            const double error = miss(solver, step, plan, &sine, &estimate);
+            if (!isnan(last) && fabs(log2(last / error) - orders[i / 2]) > 0.15)
+                fail_msg("%s: order %g at %g s", solver->kind.name, log2(last / error), step);
             assert_true(fabs(estimate / error - 1) < 0.2);
             last = error;
         }
+        plan_free(plan);
     }
-    plan_free(plan);
+}
+
+static void between_contacts_energy_is_right_to_the_methods_order(void **state) {
+    (void)state;
+    const double orders[] = {4, 4, 2};
+    const Base sine = {.form = BASE_SINE, .amplitude = 1, .omega = 12};
+    for (size_t i = 0; i < 2 * COUNT(fixed); i++) {
+        Plan *plan = swinging_frame(i % 2 == 1);
+        double residual[2];
+        for (int k = 0; k < 2; k++) {
+            Answer answer = solve(fixed[i / 2], 0.005 / (1 + k), plan, &sine);
+            assert_int_equal(answer.status, STATUS_OK);
+            residual[k] = answer.response.energy.residual;
+            answer_clear(&answer);
+        }
+        const double order = log2(residual[0] / residual[1]);
+        if (!(order > orders[i / 2] - 0.5 && residual[0] < 0.01))
+            fail_msg("%s: residual %g, order %g", fixed[i / 2]->kind.name, residual[0], order);
+        plan_free(plan);
+    }
 }
 
 static void precise_is_exact_where_the_base_is_linear_in_a_step(void **state) {
     (void)state;
-    Plan *plan = swinging_frame();
+    Plan *plan = swinging_frame(true);
     double values[201];
     for (size_t i = 0; i < COUNT(values); i++)
         values[i] = sin(0.3 * (double)i) + 0.2 * sin(2.1 * (double)(i * i));
@@ -315,6 +342,49 @@ static void stops_without_clearance_hold_the_mass(void **state) {
     plan_free(plan);
 }
 
+// A mass that leaves one buffer is in the other one at once.
+static void buffers_without_room_between_them_serve_too(void **state) {
+    (void)state;
+    const Base sine = {.form = BASE_SINE, .amplitude = 2, .omega = 9};
+    for (int i = 0; i < 2; i++) {
+        Plan *plan = frames_new(1, 1, 1, 500);
+        frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
+        frames_damper(plan, 0, 0, 0.5, 0, 0.8, 0.01);
+        plan->displacement[0] = 0.01;
+        plan->dampers[0].velocity = 0.1;
+        plan->separation = i == 0 ? SEPARATION_ZERO_PENETRATION : SEPARATION_ZERO_FORCE;
+        for (double tolerance = 1e-3; tolerance > 1e-13; tolerance /= 1e3) {
+            double estimate;
+            const double error = miss(&solver_adaptive, tolerance, plan, &sine, &estimate);
+            if (!(error < fmax(1e-3 * tolerance, 1e-6) && error < fmax(4 * estimate, 1e-12)))
+                fail_msg("%d: adaptive at %g misses by %g and says %g", i, tolerance, error,
+                         estimate);
+        }
+        for (size_t k = 0; k < COUNT(fixed); k++)
+            assert_true(miss(fixed[k], 1e-5, plan, &sine, NULL) < 1e-3);
+        plan_free(plan);
+    }
+}
+
+// Runs with steps of twice the length may be late by the same time: that must not be taken for
+// none.
+static void few_impacts_are_not_taken_for_exact(void **state) {
+    (void)state;
+    for (int i = 0; i < 40; i++) {
+        Plan *plan = frames_new(1, 1, 0.2, 1000);
+        frames_shear(plan, (double[]){2}, (double[]){2000}, (double[]){2});
+        frames_damper(plan, 0, 0, 0.1, 0.004 + 1e-5 * i, 0.5, NAN);
+        plan->displacement[0] = 0.01;
+        for (double share = 1; share <= 16; share *= 2) {
+            double estimate;
+            const double error = miss(&solver_rk4, 1e-3 / share, plan, &still, &estimate);
+            if (!(error < 5 * estimate))
+                fail_msg("clearance %d, %g steps: %g, says %g", i, share, error, estimate);
+        }
+        plan_free(plan);
+    }
+}
+
 static void a_step_that_cannot_be_stable_is_told(void **state) {
     (void)state;
     Plan *plan = frames_new(1, 1, 2, 1000);
@@ -503,12 +573,15 @@ static void precise_refuses_power_laws(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(between_contacts_errors_are_of_the_methods_order),
+        cmocka_unit_test(between_contacts_energy_is_right_to_the_methods_order),
         cmocka_unit_test(precise_is_exact_where_the_base_is_linear_in_a_step),
         cmocka_unit_test(across_a_contact_errors_are_of_first_order),
         cmocka_unit_test(every_solver_comes_to_the_exact_ones_answer),
         cmocka_unit_test(frames_of_many_dampers_come_to_the_exact_answer),
         cmocka_unit_test(a_pushed_mass_bounces_and_rests),
         cmocka_unit_test(stops_without_clearance_hold_the_mass),
+        cmocka_unit_test(buffers_without_room_between_them_serve_too),
+        cmocka_unit_test(few_impacts_are_not_taken_for_exact),
         cmocka_unit_test(a_step_that_cannot_be_stable_is_told),
         cmocka_unit_test(precise_at_a_millisecond_is_wrong_and_says_so),
         cmocka_unit_test(the_plan_says_which_step_and_why),

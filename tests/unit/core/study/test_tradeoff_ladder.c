@@ -201,13 +201,13 @@ static void a_step_ten_times_finer_costs_about_ten_times_as_much(void **state) {
     Simulation simulation = scene_make(0.025, 10);
     complete(&simulation);
     TradeoffPoint point = exact();
-    const double exact_cost = ladder_cost(&simulation, NULL, &point);
+    const double exact_cost = ladder_cost(&simulation, &point);
     assert_true(exact_cost == simulation_cost(&simulation).steps);
     point.solver = "rk4";
     point.step = 1e-4;
-    const double coarse = ladder_cost(&simulation, NULL, &point);
+    const double coarse = ladder_cost(&simulation, &point);
     point.step = 1e-5;
-    const double fine = ladder_cost(&simulation, NULL, &point);
+    const double fine = ladder_cost(&simulation, &point);
     assert_true(coarse > exact_cost && fine > 8 * coarse && fine < 12 * coarse);
     simulation_clear(&simulation);
 }
