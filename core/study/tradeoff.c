@@ -44,7 +44,6 @@ const Field tradeoff_point_fields[] = {
     FIELD_TEXT(TradeoffPoint, solver, 0, PRESENCE_OPTIONAL, 0, "solver"),
     FIELD_REAL(TradeoffPoint, step, "s", ANY, OPTIONAL, "its step"),
     FIELD_REAL(TradeoffPoint, tolerance, NULL, ANY, OPTIONAL, "its tolerance"),
-    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_LEAST(1), OPTIONAL, "modes kept; all if unknown"),
     FIELD_TEXT(TradeoffPoint, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model in place of the scene's"),
     FIELD_REAL(TradeoffPoint, sample_rate, "Hz", ANY, OPTIONAL, "sample rate in place of the scene's; the base keeps its own"),
     FIELD_REAL(TradeoffPoint, duration, "s", ANY, OPTIONAL, "duration in place of the scene's"),

@@ -52,7 +52,6 @@ typedef struct TradeoffPoint {
     char *name;   // "rk4, step 1e-05 s"
     char *solver; // of the solvers' table
     double step, tolerance;
-    uint64_t modes;
     char *contact_model;
     double sample_rate, duration;
     uint64_t segment;

@@ -1,5 +1,5 @@
-// Solvers tell by their own rows what they trade: a row "step", "tolerance" or "modes" makes points
-// of them, whatever the solver is called.
+// Solvers tell by their own rows what they trade: a row "step" or "tolerance" makes points of them,
+// whatever the solver is called.
 #include "core/study/tradeoff_ladder.h"
 
 #include <stdarg.h>
@@ -12,7 +12,6 @@
 enum {
     DECADES = 8,        // of steps at most, from the sample interval down
     SEGMENT_LEAST = 16, // samples of a segment
-    MODES_LEAST = 3,    // storeys from which modes are left out
     RATES = 3,
     SHARES = 2,
 };
@@ -109,17 +108,6 @@ static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Ran
     return true;
 }
 
-static bool add_modes(TradeoffPoints *points, const Kind *solver, size_t storeys) {
-    for (size_t modes = storeys / 2; storeys >= MODES_LEAST && modes > 0; modes /= 2) {
-        TradeoffPoint *point =
-            add(points, solver, "%s, %zu of %zu modes", solver->name, modes, storeys);
-        if (point == NULL)
-            return false;
-        point->modes = modes;
-    }
-    return true;
-}
-
 // What may be given up without giving up exactness.
 static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
@@ -180,9 +168,7 @@ static bool add_reference(TradeoffPoints *points, const Kind *solver,
         if (point == NULL || (point->contact_model = strdup(model)) == NULL)
             return false;
     }
-    return (row_of(solver, "modes", NULL) == NULL ||
-            add_modes(points, solver, structure_storeys(scene_structure(scene)))) &&
-           add_output(points, solver, simulation);
+    return add_output(points, solver, simulation);
 }
 
 Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
@@ -206,13 +192,6 @@ static void set_real(Variant *variant, const char *name, double value) {
         *(double *)(void *)((char *)variant + offset + row->offset) = value;
 }
 
-static void set_count(Variant *variant, const char *name, uint64_t value) {
-    size_t offset = 0;
-    const Field *row = row_of(variant->kind, name, &offset);
-    if (row != NULL && value != COUNT_ABSENT)
-        *(uint64_t *)(void *)((char *)variant + offset + row->offset) = value;
-}
-
 static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
     const Kind *kind = kind_find(&solver_kinds, point->solver);
     Variant *accuracy = variant_new(kind);
@@ -222,7 +201,6 @@ static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
     target->accuracy = accuracy;
     set_real(accuracy, "step", point->step);
     set_real(accuracy, "tolerance", point->tolerance);
-    set_count(accuracy, "modes", point->modes);
     return STATUS_OK;
 }
 
