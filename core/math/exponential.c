@@ -148,8 +148,19 @@ void exponential_form_double(size_t n, const long double *increment, long double
         form[i] += second[i];
 }
 
+// Multiplications, about, between looks at the watch.
+static const size_t WATCH_WORK = 1000000;
+
+// Who may stop it, and what has been done since the last look.
+typedef struct Patience {
+    const Watch *watch;
+    double fraction;
+    size_t work;
+} Patience;
+
 // out = left right; zeros in `left` cost nothing.
-static void product(const double *left, const double *right, size_t n, double *restrict out) {
+static bool product(const double *left, const double *right, size_t n, double *restrict out,
+                    Patience *patience) {
     for (size_t i = 0; i < n; i++) {
         double *restrict row = out + i * n;
         memset(row, 0, n * sizeof *row);
@@ -158,11 +169,19 @@ static void product(const double *left, const double *right, size_t n, double *r
             for (size_t j = 0; j < n && factor != 0; j++)
                 row[j] += factor * of[j];
         }
+        if ((patience->work += n * n) < WATCH_WORK)
+            continue;
+        patience->work = 0;
+        if (!watch_advance(patience->watch, patience->fraction))
+            return false;
     }
+    return true;
 }
 
-void exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch) {
+bool exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
+                           const Watch *watch, double fraction) {
     enum { PAPER = 20, MOST = 1000 };
+    Patience patience = {watch, fraction, 0};
     double norm = 0, *small = scratch, *next = scratch + n * n;
     for (size_t i = 0; i < n; i++) {
         double sum = 0;
@@ -175,19 +194,22 @@ void exponential_doublings(const double *A, size_t n, double h, double *out, dou
     int count = PAPER;
     for (double rest = ldexp(norm * h, -PAPER); rest > 1e-3 && count < MOST; rest /= 2)
         count++;
-    for (size_t i = 0; i < n * n; i++)
+    for (size_t i = 0; i < n * n; i++) {
         small[i] = ldexp(A[i] * h, -count);
-    // T = S (I + S/2 (I + S/3 (I + S/4)))
-    for (size_t i = 0; i < n * n; i++)
         out[i] = small[i] / 4;
+    }
+    // T = S (I + S/2 (I + S/3 (I + S/4)))
     for (int k = 3; k >= 1; k--) {
-        product(small, out, n, next);
+        if (!product(small, out, n, next, &patience))
+            return false;
         for (size_t i = 0; i < n * n; i++)
             out[i] = (small[i] + next[i]) / k;
     }
     for (int i = 0; i < count; i++) {
-        product(out, out, n, next);
+        if (!product(out, out, n, next, &patience))
+            return false;
         for (size_t j = 0; j < n * n; j++)
             out[j] = 2 * out[j] + next[j];
     }
+    return true;
 }

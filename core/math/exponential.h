@@ -4,7 +4,10 @@
 #ifndef CORE_MATH_EXPONENTIAL_H
 #define CORE_MATH_EXPONENTIAL_H
 
+#include <stdbool.h>
 #include <stddef.h>
+
+#include "core/base/watch.h"
 
 enum { EXPONENTIAL_SIZE = 8 };
 
@@ -25,7 +28,9 @@ void exponential_forms(const long double *A, size_t n, long double h, size_t cou
 void exponential_form_double(size_t n, const long double *increment, long double *form);
 
 // exp(A h) - I of any size in double: A h / 2^N, N >= 20, by four terms of the Taylor series, then
-// N doublings as above, as the paper has it. `out` may not be A; `scratch` holds 2 n * n.
-void exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch);
+// N doublings as above, as the paper has it. `out` may not be A; `scratch` holds 2 n * n. False:
+// `watch`, which is told of `fraction` now and then, said stop.
+bool exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
+                           const Watch *watch, double fraction);
 
 #endif

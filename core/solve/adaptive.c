@@ -199,13 +199,15 @@ static Status decide(const Accuracy *accuracy, double base_interval, Plan *plan,
 }
 
 // Steps of a sample, of the base's kinks, and of the fastest mode; a contact takes some steps for
-// its digits. At a guess seven contacts a second.
+// its digits. At a guess seven contacts a second, many of them at once where there are many
+// dampers.
 static double cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
     const double digits = -log10(tolerance_of(accuracy)), each = pow(10, digits / 8) / 2;
     double making, steps = plan->sample_rate;
     if (base_interval > 0)
         steps = fmax(steps, 1 / base_interval);
-    steps = fmax(steps, each / steps_mode_time(plan)) + 7 * 10 * each * (double)plan->damper_count;
+    steps = fmax(steps, each / steps_mode_time(plan)) +
+            7 * 10 * each * sqrt((double)plan->damper_count);
     const double one =
         adaptive_cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
     return 3 * one * steps * plan->duration; // the neighbour takes twice as many

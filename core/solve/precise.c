@@ -6,7 +6,7 @@
 // whose exponential is made once per set of pressed stops, and applied step by step. Exact while no
 // contact begins or ends and the base is linear in every step. Its rows hold many zeros where modes
 // do not couple: only what is not zero is kept.
-#include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,12 +15,12 @@
 
 // Tables that are kept: so many at most, and of so many values each at least two.
 enum { TABLES_MOST = 64 };
-static const size_t VALUES_MOST = (size_t)1 << 22;
+static const size_t VALUES_MOST = (size_t)1 << 20;
 
 typedef struct Table {
     double *key;    // step, then stiffness and damping of each damper in contact, else zeros
     size_t *starts; // of the rows; one more than those
-    size_t *columns;
+    uint32_t *columns;
     double *values; // of exp(A h) - I, the state's rows
 } Table;
 
@@ -115,7 +115,7 @@ static Status compress(const Precise *own, size_t size, const double *T, Table *
         table->starts[i] = count;
         for (size_t j = 0; j < own->wide; j++)
             if (T[i * own->wide + j] != 0) {
-                table->columns[count] = j;
+                table->columns[count] = (uint32_t)j;
                 table->values[count++] = T[i * own->wide + j];
             }
     }
@@ -125,6 +125,7 @@ static Status compress(const Precise *own, size_t size, const double *T, Table *
 
 static Status make_table(Steps *steps, Table *table) {
     const Precise *own = steps->own;
+    const Frame *frame = &steps->frame;
     const size_t square = own->wide * own->wide;
     double *A = calloc(square, 4 * sizeof *A);
     table->key = malloc(own->key_size * sizeof *table->key);
@@ -132,14 +133,18 @@ static Status make_table(Steps *steps, Table *table) {
     if (A != NULL && table->key != NULL) {
         memcpy(table->key, own->key, own->key_size * sizeof *table->key);
         make_system(steps, A);
-        exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square);
-        status = compress(own, steps->size, A + square, table);
+        status = exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square,
+                                       frame->run->watch, frame_time(frame) / frame->plan->duration)
+                     ? compress(own, steps->size, A + square, table)
+                     : STATUS_CANCELLED;
     }
     free(A);
     if (status == STATUS_OK)
         return STATUS_OK;
     forget(table);
-    return no_memory(steps);
+    return status == STATUS_CANCELLED
+               ? problem_set(frame->problem, status, "cancelled at t = %.6g s", frame_time(frame))
+               : no_memory(steps);
 }
 
 static Status find_table(Steps *steps, double length, const Table **table) {

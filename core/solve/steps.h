@@ -70,17 +70,6 @@ void steps_take_sample(Steps *steps);
 // To the end of a run that ends `length` seconds after its last sample.
 Status steps_finish(Steps *steps, double length);
 
-// Parts of the state.
-static inline double *steps_p(const Steps *steps, double *y) {
-    return y + steps->frame.storeys;
-}
-static inline double *steps_r(const Steps *steps, double *y) {
-    return y + 2 * steps->frame.storeys;
-}
-static inline double *steps_w(const Steps *steps, double *y) {
-    return y + 2 * steps->frame.storeys + steps->frame.dampers;
-}
-
 // out = D p + W^2 q.
 void steps_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
 // y' under forces N on the dampers' storeys; elastic becomes that of y.

@@ -80,11 +80,12 @@ typedef struct Choice {
 } Choice;
 
 static Choice choose(const Plan *plan, const Accuracy *accuracy, double base_interval) {
-    const AccuracyStep *asked = (const AccuracyStep *)(const void *)accuracy;
-    const double interval = 1 / plan->sample_rate;
-    double step = asked == NULL ? (double)NAN : asked->step;
+    const double interval = 1 / plan->sample_rate, near = 1e-9 * interval;
+    double step =
+        accuracy == NULL ? (double)NAN : ((const AccuracyStep *)(const void *)accuracy)->step;
+    const bool is_asked = !isnan(step);
     Choice choice = {1, 1, "asked", "the scene asks for it"};
-    if (isnan(step)) {
+    if (!is_asked) {
         const double mode = steps_mode_time(plan) / PARTS,
                      contact = steps_contact_time(plan) / PARTS;
         choice.chose = mode < contact ? "mode" : "contact";
@@ -95,13 +96,10 @@ static Choice choose(const Plan *plan, const Accuracy *accuracy, double base_int
             choice.chose = "sample";
             choice.why = "the sample interval, for all motion is slower";
         }
-    } else if (step > interval * (1 + 1e-9)) {
-        choice.why = "the scene asks for more, but a step ends at every sample";
     }
     choice.share = fmax(ceil(interval / step * (1 - 1e-9)), 1);
-    if (step * choice.share < interval * (1 - 1e-9) || step * choice.share > interval * (1 + 1e-9))
-        if (!isnan(asked == NULL ? (double)NAN : asked->step) && step < interval)
-            choice.why = "the scene asks for a little more, but a step ends at every sample";
+    if (is_asked && fabs(step * choice.share - interval) > near)
+        choice.why = "the scene asks for a longer one, but a step ends at every sample";
     // The base's own kinks lie at step ends wherever its grid divides the samples'.
     const double kinks = base_interval > 0 ? nearbyint(interval / base_interval) : 0;
     if (!(kinks > 1 && fabs(interval / base_interval - kinks) <= 1e-9 * kinks))
