@@ -12,10 +12,12 @@ void base_cursor_make(BaseCursor *cursor, const Base *base, double sample_rate) 
         cursor->ratio = (size_t)whole;
 }
 
-static Slice sine_slice(const Base *base, double time) {
-    // Reduced in long double, so that late phases are as good as early ones.
+static Slice sine_slice(const BaseCursor *cursor, size_t n, double offset) {
+    const Base *base = cursor->base;
+    // Timed and reduced in long double, so that late phases are as good as early ones.
     const long double turn = 6.28318530717958647692528676655900577L;
-    const double phase = (double)fmodl((long double)base->omega * time, turn);
+    const long double time = (long double)n / cursor->sample_rate + offset;
+    const double phase = (double)fmodl(base->omega * time, turn);
     return (Slice){base->amplitude * sin(phase), base->amplitude * cos(phase), base->omega};
 }
 
@@ -63,7 +65,7 @@ bool base_cursor_interval(const BaseCursor *cursor, size_t n, Slice *slice) {
         *slice = (Slice){0, 0, 0};
         return true;
     case BASE_SINE:
-        *slice = sine_slice(cursor->base, (double)n / cursor->sample_rate);
+        *slice = sine_slice(cursor, n, 0);
         return true;
     case BASE_PIECES:
         return piece_slice(cursor, n, 0, slice) >=
@@ -84,7 +86,7 @@ double base_cursor_slice(const BaseCursor *cursor, size_t n, double offset, Slic
     if (base->form == BASE_PIECES)
         return piece_slice(cursor, n, offset, slice);
     if (base->form == BASE_SINE)
-        *slice = sine_slice(base, time);
+        *slice = sine_slice(cursor, n, offset);
     if (base->form != BASE_SAMPLED)
         return INFINITY;
     if (cursor->ratio > 0) {
