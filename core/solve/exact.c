@@ -40,7 +40,8 @@ static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
 static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integrals) {
     const double mass = exact_effective_mass(exact);
     double s = -1;
-    const double peak = arc_peak_force(arc, exact->row.impact.peak_force / mass, &s);
+    const double peak =
+        arc_peak_force(arc, ledger_least_force(&exact->ledger, &exact->row) / mass, &s);
     ledger_force(&exact->ledger, &exact->row, mass * peak);
     if (s >= 0) {
         const State middle = arc_at(arc, s);
@@ -90,8 +91,9 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     }
     const double mass = exact_effective_mass(exact);
     State end;
-    const HoldLevel *level = hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
-                                       exact->row.impact.peak_force / mass, &end);
+    const HoldLevel *level =
+        hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
+                  ledger_least_force(&exact->ledger, &exact->row) / mass, &end);
     if (level == NULL)
         return false;
     double impulse;

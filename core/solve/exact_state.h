@@ -1,5 +1,6 @@
 // What the exact solver knows while it runs, and how it looks from outside: origin, room, forces,
-// energies. Not the stepping (exact.c) nor the events (exact_events.c); these three alone use it.
+// energies. Not the stepping (exact.c) nor the events (exact_events.c). Used by core/solve/exact*.c
+// and press*.
 #ifndef CORE_SOLVE_EXACT_STATE_H
 #define CORE_SOLVE_EXACT_STATE_H
 
@@ -34,8 +35,9 @@ typedef struct Exact {
     Problem *problem;
     Motion flying, touching[2], resting;
     Stretch stretch;
-    bool has_hops;    // intervals are short enough for hop.h
-    size_t pending;   // samples whose sums wait in `stretch`
+    bool has_hops;     // intervals are short enough for hop.h
+    double base_slope; // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
+    size_t pending;    // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
     Phase phase;
     Side side;       // of CONTACT and RESTING

@@ -10,20 +10,35 @@
 
 enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
 
-static double largest(const double *values, size_t count) {
-    enum { SIDE_BY_SIDE = 16 };
-    double most[SIDE_BY_SIDE] = {0}, all = 0;
-    size_t i = 0;
+// Of energies, over all samples of a contact: times DBL_EPSILON, what its closed form may lose.
+static const double APART_MOST = 4e4;
+
+// The largest of |values|, and of how far each is from the one before.
+INLINE void measure(const double *values, size_t count, double *most, double *step) {
+    enum { SIDE_BY_SIDE = 8 };
+    double sizes[SIDE_BY_SIDE] = {0}, steps[SIDE_BY_SIDE] = {0};
+    size_t i = 1;
     for (; i + SIDE_BY_SIDE <= count; i += SIDE_BY_SIDE)
         for (size_t j = 0; j < SIDE_BY_SIDE; j++) {
-            const double value = fabs(values[i + j]);
-            most[j] = value > most[j] ? value : most[j];
+            const double size = fabs(values[i + j]),
+                         change = fabs(values[i + j] - values[i + j - 1]);
+            sizes[j] = size > sizes[j] ? size : sizes[j];
+            steps[j] = change > steps[j] ? change : steps[j];
         }
-    for (; i < count; i++)
-        all = fmax(all, fabs(values[i]));
-    for (size_t j = 0; j < SIDE_BY_SIDE; j++)
-        all = fmax(all, most[j]);
-    return all;
+    *most = count > 0 ? fabs(values[0]) : 0;
+    *step = 0;
+    for (; i < count; i++) {
+        *most = ledger_larger(*most, fabs(values[i]));
+        *step = ledger_larger(*step, fabs(values[i] - values[i - 1]));
+    }
+    for (size_t j = 0; j < SIDE_BY_SIDE; j++) {
+        *most = ledger_larger(*most, sizes[j]);
+        *step = ledger_larger(*step, steps[j]);
+    }
+}
+
+WIDE static void measure_wide(const double *values, size_t count, double *most, double *step) {
+    measure(values, count, most, step);
 }
 
 void exact_stride_start(Exact *exact) {
@@ -43,10 +58,16 @@ void exact_stride_start(Exact *exact) {
     }
     exact->has_lanes = true;
     exact->has_hops = fmax(exact->flying.rate, base->omega) * exact->interval <= HOP_REACH;
-    if (base->form == BASE_SAMPLED)
-        stretch->base_most = largest(base->values, base->count);
+    if (base->form == BASE_SAMPLED) {
+        double step;
+        if (wide_is_at_hand())
+            measure_wide(base->values, base->count, &stretch->base_most, &step);
+        else
+            measure(base->values, base->count, &stretch->base_most, &step);
+        exact->base_slope = step * exact->plan->sample_rate;
+    }
     if (is_sine)
-        stretch->base_most = fabs(base->amplitude);
+        stretch->base_most = exact->base_slope = fabs(base->amplitude);
     stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
     stretch->left = stretch->right = INFINITY;
@@ -259,12 +280,29 @@ static void make_pulse(Exact *exact, Side side) {
     exact->has_pulse[side] = true;
 }
 
+// For how many samples the closed form keeps its digits. It counts the motion from where the base
+// would hold it, each sample anew, and beside a soft structure that may be far from where it is.
+static double keeps_digits(const Exact *exact, const Pulse *pulse) {
+    const double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
+    const double most = exact->stretch.base_most, slope = exact->base_slope;
+    const double x = fabs(a[PULSE_X]) * most + fabs(s[PULSE_X]) * slope;
+    const double v = fabs(a[PULSE_V]) * most + fabs(s[PULSE_V]) * slope;
+    const double apart = exact->plan->mass[0] * (v * v + exact->flying.omega2 * x * x);
+    const EnergyState now = exact_energy(exact);
+    const double held = ledger_larger(exact->ledger.largest_energy, now.kinetic + now.strain);
+    return apart > 0 ? APART_MOST * held / apart : INFINITY;
+}
+
 size_t exact_stride_press(Exact *exact, size_t most) {
     if (!exact->has_hops)
         return 0;
+    const Pulse *pulse = &exact->pulses[exact->side];
     if (!exact->has_pulse[exact->side])
         make_pulse(exact, exact->side);
-    return exact_press(exact, most);
+    const double samples = pulse->is_usable ? keeps_digits(exact, pulse) : 0;
+    if (!(samples >= 1))
+        return 0;
+    return exact_press(exact, samples < (double)most ? (size_t)samples : most);
 }
 
 size_t exact_stride(Exact *exact, size_t most) {

@@ -1,5 +1,6 @@
-// The exact solver's long strides: many samples of free flight at once. Not for whatever is out of
-// the ordinary: where it does nothing, exact.c goes on interval by interval. Used by exact.c.
+// The exact solver's long strides: many samples of free flight at once, stops, and contacts by
+// their closed form. Not for whatever is out of the ordinary: where it does nothing, exact.c goes
+// on interval by interval. Used by exact.c; exact_stride_pass by exact_press.c too.
 #ifndef CORE_SOLVE_EXACT_STRIDE_H
 #define CORE_SOLVE_EXACT_STRIDE_H
 

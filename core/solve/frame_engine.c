@@ -66,8 +66,8 @@ static void take_contact(FrameEngine *engine, size_t d) {
     FrameDamper *damper = &frame->damper[d];
     const FrameArc *arc = &engine->arc;
     double s = -1, impulse, lost;
-    const double peak =
-        arc_largest(frame_arc_force(arc, d), arc->degree - 1, damper->row.impact.peak_force, &s);
+    const double peak = arc_largest(frame_arc_force(arc, d), arc->degree - 1,
+                                    ledger_least_force(&frame->ledger, &damper->row), &s);
     ledger_force(&frame->ledger, &damper->row, peak);
     if (s > 0) {
         frame_arc_state(arc, frame, s);

@@ -202,7 +202,7 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
     at->size += lift * at->force;
     // A force that may be the largest so far is to be seen where it is so: at an end, once the mass
     // merely rides and S only rises or falls.
-    if (!frame->is_shadow && at->force > damper->row.impact.peak_force &&
+    if (!frame->is_shadow && at->force > ledger_least_force(&frame->ledger, &damper->row) &&
         !(hard * astray <= RIPPLE_MOST * largest && fabs(slope) > h * bent))
         return false;
     if (frame->plan->separation == SEPARATION_ZERO_FORCE)
@@ -236,8 +236,8 @@ static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const Fra
             ? !(sign * now > sag * climb && sign * then > sag * climb)
             : !(r > sag * bend && r + sign * moved > sag * bend))
         return false;
-    if (frame->is_shadow ||
-        fmax(fabs(now), fabs(then)) + sag * climb <= damper->row.impact.peak_force)
+    if (frame->is_shadow || fmax(fabs(now), fabs(then)) + sag * climb <=
+                                ledger_least_force(&frame->ledger, &damper->row))
         return true;
     // N only rises or falls where N' keeps its sign.
     const double leap = from->s - now / mass, rise = k * damper->w + c * leap; // r'', N'

@@ -65,6 +65,13 @@ static inline void ledger_force(Ledger *ledger, LedgerRow *row, double magnitude
     peaks->contact_force = ledger_larger(peaks->contact_force, magnitude);
 }
 
+// What no peak is asked for below: the row's own, or that of the statistics, which may have begun
+// after it [N].
+static inline double ledger_least_force(const Ledger *ledger, const LedgerRow *row) {
+    const double own = row->impact.peak_force, all = ledger->response->peaks.contact_force;
+    return own < all ? own : all;
+}
+
 void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation);
 // An instantaneous impact of two bodies with effective mass `mass`.
 void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double approach,

@@ -88,7 +88,8 @@ INLINE bool press_is_known(const Press *press, const Four *end, double length) {
     const double one = fabs(from[0]), other = fabs(to[0]);
     const double bend = p->size2[0] * slow + p->n_sway * press->exact->stretch.base_most;
     const double most = (one > other ? one : other) + 2 * fast + bend * length * length / 8;
-    if (exact_effective_mass(press->exact) * most <= press->exact->row.impact.peak_force)
+    if (exact_effective_mass(press->exact) * most <=
+        ledger_least_force(&press->exact->ledger, &press->exact->row))
         return true;
     return fast <= 1e-13 * one && from[1] * to[1] > 0;
 }

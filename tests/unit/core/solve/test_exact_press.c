@@ -123,8 +123,8 @@ static Small *press(const Case *c, LanesWidth width, size_t most) {
     }
     exact->key.base_omega = small->base.omega;
     base_cursor_make(&exact->base, &small->base, RATE);
-    const EnergyState none = {0, 0};
-    ledger_start(&exact->ledger, &small->response, 0, &none);
+    const EnergyState held = {0.2, 0}; // beside a base that jumps, closed forms want some
+    ledger_start(&exact->ledger, &small->response, 0, &held);
     recorder_start(&exact->recorder, &small->run, &small->response);
     small->run.columns = NULL;
     exact_stride_start(exact);
