@@ -191,6 +191,8 @@ def test_a_job_makes_the_study():
         assert daemon.get(base + "/tradeoff", headers={"Accept": "image/svg+xml"}).body == chart.body
         assert daemon.get(base + "/tradeoff", headers={"Accept": "application/json"}).body == table.body
         assert daemon.get(base + "/tradeoff.json", headers={"If-None-Match": table.headers["etag"]}).status == 304
+        manifest = daemon.get(base + "/manifest").json()
+        assert manifest["scene"]["study"]["kind"] == "tradeoff" and "CPU time" in manifest["again"]["why"]
         series = daemon.get(base + "/series.json").json()
         own = program.finished(daemon, program.scene("paper_free_sponge"))
         assert series == daemon.get(f"/v1/results/{own['result']}/series.json").json()
