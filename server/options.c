@@ -74,6 +74,24 @@ static Status text_set(char **target, const char *value) {
     return STATUS_OK;
 }
 
+// One more; what a weaker source gave is forgotten.
+static Status texts_add(Texts *texts, const char *value, bool is_first) {
+    for (size_t i = 0; is_first && i < texts->count; i++)
+        free(texts->at[i]);
+    if (is_first)
+        texts->count = 0;
+    char **at = realloc(texts->at, (texts->count + 1) * sizeof *at);
+    char *copy = strdup(value);
+    if (at != NULL)
+        texts->at = at;
+    if (at == NULL || copy == NULL) {
+        free(copy);
+        return STATUS_NO_MEMORY;
+    }
+    texts->at[texts->count++] = copy;
+    return STATUS_OK;
+}
+
 // The row's range judges the new value, but its fault is told under the name that was typed.
 static Status range_check(const Reader *reader, const char *typed, const Field *row) {
     const Field rows[] = {*row, FIELD_END};
@@ -126,6 +144,10 @@ static Status option_set(const Reader *reader, const Field *row, const char *typ
         *(int *)member(reader, row) = index;
         break;
     }
+    case FIELD_KIND_TEXTS:
+        TRY(texts_add(member(reader, row), value,
+                      reader->options->origins[row - reader->fields] != origin));
+        break;
     default:
         TRY(text_set((char **)member(reader, row), value));
         break;
@@ -317,6 +339,9 @@ static void value_print(const Field *row, const void *item, FILE *file) {
         fputs(*(const bool *)at ? "true" : "false", file);
     else if (row->kind == FIELD_KIND_CHOICE)
         fputs(row->choices[*(const int *)at], file);
+    else if (row->kind == FIELD_KIND_TEXTS)
+        for (size_t i = 0; i < ((const Texts *)at)->count; i++)
+            fprintf(file, "%s%s", i > 0 ? ", " : "", ((const Texts *)at)->at[i]);
     else
         fputs(*(char *const *)at, file);
 }
@@ -339,6 +364,7 @@ void options_help(const Field *fields, FILE *file) {
         for (const Field *other = fields; other < row; other++)
             is_first = is_first && other->name[0] != row->name[0];
         const char *value = row->kind == FIELD_KIND_TEXT    ? " TEXT"
+                            : row->kind == FIELD_KIND_TEXTS ? " TEXT ..."
                             : row->kind == FIELD_KIND_FLAG  ? ""
                             : row->kind == FIELD_KIND_COUNT ? " N"
                                                             : " X";

@@ -1,6 +1,6 @@
 // Settings by Field rows: flag over environment over file over default, and where each value came
 // from. Not the settings themselves: each command has its own struct and rows of REAL, COUNT, FLAG,
-// TEXT and CHOICE. Used by command/.
+// TEXT, TEXTS and CHOICE. Used by command/.
 #ifndef SERVER_OPTIONS_H
 #define SERVER_OPTIONS_H
 

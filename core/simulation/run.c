@@ -221,6 +221,7 @@ static Status travel(Journey *journey, Problem *problem) {
     run.columns = journey->wanted;
     run.column_count = journey->wanted_count;
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
+    outcome->steps = run.steps;
     summarize(outcome);
     TRY(check_finite(outcome, problem));
     if (caution_warn(scene, outcome) != STATUS_OK)

@@ -77,6 +77,7 @@ struct Outcome {
     Spectrum spectrum; // of output.psd; empty where none was asked for
     Summary summary;
     Warnings warnings; // what only the run could tell
+    double steps;      // solver steps, counted
 };
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT

@@ -65,12 +65,12 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
 
 void job_put_dry_run(Bytes *bytes, const DryRun *run) {
     bytes_text(bytes, "{\"dry_run\": true, \"scene\": ");
-    write_item(bytes, simulation_fields, &run->simulation, WRITE_SCENE);
+    write_item(bytes, inquiry_fields, &run->inquiry, WRITE_SCENE);
     bytes_format(bytes, ", \"result\": \"%s\", \"cached\": %s, \"plan\": ", run->result,
                  run->is_cached ? "true" : "false");
     write_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);
     bytes_format(bytes, ", \"samples\": %zu, \"cost\": {\"cpu_seconds\": ",
-                 scene_sample_count(&run->simulation.scene));
+                 scene_sample_count(&run->inquiry.simulation.scene));
     bytes_real(bytes, run->cpu_seconds);
     bytes_text(bytes, ", \"bytes\": ");
     bytes_real(bytes, run->cost.bytes);

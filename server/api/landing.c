@@ -11,7 +11,11 @@
     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \
     "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}], "            \
     "\"excitation\": {\"kind\": \"free\", \"displacement\": 0.015}, \"duration\": 10, "            \
-    "\"sample_rate\": 1000}"
+    "\"sample_rate\": 1000"
+#define STUDY                                                                                      \
+    "\"study\": {\"kind\": \"tradeoff\", \"solvers\": [\"exact\", \"rk4\"], \"repeats\": 1}"
+// Of a job's document.
+#define RESULT "grep -o '\"result\": \"r-[0-9a-f]*' | cut -d'\"' -f4"
 
 typedef struct Step {
     const char *what;
@@ -20,17 +24,19 @@ typedef struct Step {
 
 static const Step steps[] = {
     {"Simulate the paper's sponge damper, released from 15 mm:",
-     "curl -s --json '" SCENE "' @/v1/jobs"},
+     "curl -s --json '" SCENE "}' @/v1/jobs"},
     {"Keep the id of its result:",
      "R=$(curl -s @/v1/examples/paper_free_sponge | curl -s -H 'Prefer: "
-     "wait=30' --json @- @/v1/jobs | grep -o '\"result\": "
-     "\"r-[0-9a-f]*' | cut -d'\"' -f4)"},
+     "wait=30' --json @- @/v1/jobs | " RESULT ")"},
     {"The impacts, the time series, the spectrum:", "curl -s @/v1/results/$R/impacts.json"},
     {NULL, "curl -s \"@/v1/results/$R/series.csv?channels=displacement&to=0.1\""},
     {NULL, "curl -s -O @/v1/results/$R/series.npy"},
     {NULL, "curl -s @/v1/results/$R/psd.json"},
     {"Check a scene and see its plan without running it:",
      "curl -s @/v1/examples/paper_free_sponge | curl -s --json @- '@/v1/jobs?dry_run=1'"},
+    {"What speed costs in accuracy on this scene, as a chart:",
+     "R=$(curl -s -H 'Prefer: wait=30' --json '" SCENE ", " STUDY "}' @/v1/jobs | " RESULT ")"},
+    {NULL, "curl -s -O @/v1/results/$R/tradeoff.svg"},
     {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
     {NULL, "curl -s @/v1/materials"},
     {NULL, "curl -s @/v1/examples"},

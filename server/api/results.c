@@ -7,24 +7,24 @@
 #include <string.h>
 
 #include "server/api/app.h"
+#include "server/api/studies.h"
 #include "server/base/clock.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
-// The scene as it was run, read back from its canonical JSON. Cleared by simulation_clear in any
+// The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
 // case.
-static Status read_scene(const ResultRow *row, Simulation *simulation, Problem *problem) {
+static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *problem) {
     Problem *fault = malloc(sizeof *fault);
     if (fault == NULL || row->scene == NULL) {
         free(fault);
-        memset(simulation, 0, sizeof *simulation);
+        memset(inquiry, 0, sizeof *inquiry);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's scene");
     }
     problem_clear(fault);
-    const Status status =
-        read_json(row->scene, strlen(row->scene), simulation_fields, simulation, fault);
+    const Status status = read_json(row->scene, strlen(row->scene), inquiry_fields, inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
@@ -58,7 +58,7 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
     bytes_text(bytes, "}");
 }
 
-static void write_links(Bytes *bytes, const char *id) {
+static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer) {
     static const char *const ways[] = {"manifest", "series.json",  "series.csv", "series.npy",
                                        "psd.json", "impacts.json", "energy.json"};
     bytes_format(bytes, "{\"self\": \"/v1/results/%s\"", id);
@@ -68,6 +68,11 @@ static void write_links(Bytes *bytes, const char *id) {
             strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
         bytes_format(bytes, ", \"%.*s\": \"/v1/results/%s/%s\"", (int)size, ways[i], id, ways[i]);
     }
+    if (answer->study != NULL) {
+        const char *name = answer->study->kind->name;
+        bytes_format(bytes, ", \"%s\": \"/v1/results/%s/%s.json\"", name, id, name);
+        bytes_format(bytes, ", \"%s.svg\": \"/v1/results/%s/%s.svg\"", name, id, name);
+    }
     bytes_text(bytes, "}");
 }
 
@@ -75,7 +80,8 @@ static const char *json_or(const char *json, const char *otherwise) {
     return json != NULL ? json : otherwise;
 }
 
-static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *simulation) {
+static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
+                         const StudyAnswer *answer) {
     bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
     bytes_json_string(bytes, row->engine);
     bytes_text(bytes, ", \"scene\": ");
@@ -95,23 +101,32 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_real(bytes, row->sample_rate);
     bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
+    bytes_text(bytes, ", \"study\": ");
+    if (answer->study != NULL)
+        document_answer(bytes, answer->study);
+    else
+        bytes_text(bytes, "null");
     bytes_text(bytes, ", \"links\": ");
-    write_links(bytes, row->id);
+    write_links(bytes, row->id, answer);
     bytes_text(bytes, "}\n");
 }
 
 Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
+    StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
-        status = read_scene(&row, &simulation, problem);
+        status = read_scene(&row, &inquiry, problem);
+        if (status == STATUS_OK && row.study != NULL)
+            status = study_read(&row, &answer, problem);
         if (status == STATUS_OK) {
-            write_result(&bytes, &row, &simulation);
+            write_result(&bytes, &row, &inquiry.simulation, &answer);
             status = reply_bytes(reply, 200, type_json, &bytes, problem);
         }
-        simulation_clear(&simulation);
+        inquiry_clear(&inquiry);
+        fields_clear(study_answer_fields, &answer);
     }
     result_row_clear(&row);
     return status;
@@ -163,11 +178,11 @@ static void write_materials(App *app, Bytes *bytes, const Simulation *simulation
 
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
-        status = read_scene(&row, &simulation, problem);
+        status = read_scene(&row, &inquiry, problem);
     if (status == STATUS_OK) {
         char created[32];
         clock_rfc3339(row.created_unix_ms, created);
@@ -181,15 +196,20 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
         bytes_text(&bytes, "}, \"scene\": ");
         bytes_text(&bytes, json_or(row.scene, "null"));
         bytes_text(&bytes, ", \"materials\": ");
-        write_materials(app, &bytes, &simulation);
+        write_materials(app, &bytes, &inquiry.simulation);
         bytes_text(&bytes,
                    ", \"again\": {\"method\": \"POST\", \"path\": \"/v1/jobs\", \"content_type\": "
                    "\"application/json\", \"body\": \"the member scene of this document\", "
                    "\"why\": \"the same "
-                   "scene and engine give the same id and the same bytes\"}}\n");
+                   "scene and engine give the same id and the same bytes");
+        // It is measured once and then kept; elsewhere it comes out a little differently.
+        if (row.study != NULL)
+            bytes_text(&bytes, ", but for the CPU time that a study measures and what follows of "
+                               "it");
+        bytes_text(&bytes, "\"}}\n");
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     }
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     result_row_clear(&row);
     return status;
 }

@@ -4,11 +4,11 @@
 
 #include <stdio.h>
 
-#include "core/simulation/simulation.h"
+#include "core/study/inquiry.h"
 
 // clang-format off
 const SchemaDocument schema_documents[] = {
-    {"scene", "A scene: what impactd is asked to simulate", simulation_fields},
+    {"scene", "A scene: what impactd is asked to simulate", inquiry_fields},
     {NULL, NULL, NULL},
 };
 // clang-format on

@@ -70,15 +70,17 @@ static void modes_print(const PlanModes *modes) {
 }
 
 static void plan_print(const char *path, const DryRun *run) {
-    const Scene *scene = &run->simulation.scene;
+    const Scene *scene = &run->inquiry.simulation.scene;
     char duration[32], rate[32];
     printf("%s is a good scene.\n\n", scene_file_name(path));
-    if (run->simulation.title != NULL)
-        printf("Title: %s\n", run->simulation.title);
+    if (run->inquiry.simulation.title != NULL)
+        printf("Title: %s\n", run->inquiry.simulation.title);
     printf("Result: %s\n", run->result);
     printf("Samples: %zu per channel, %s s at %s Hz, %zu channels\n", scene_sample_count(scene),
            text_real(duration, scene->duration), text_real(rate, scene->sample_rate),
-           run->simulation.output.channels.count);
+           run->inquiry.simulation.output.channels.count);
+    if (run->inquiry.study != NULL)
+        printf("Study: %s\n", run->inquiry.study->kind->name);
     printf("Cost: about %.2g s of CPU, %.3g MB\n", run->cpu_seconds, run->cost.bytes * 1e-6);
     printf("Contact model: %s\nSolver: %s\n", run->plan.contact_model, run->plan.solver);
     if (run->plan.decisions.count > 0)

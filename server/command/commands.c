@@ -9,6 +9,7 @@
 #include "server/command/import.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
+#include "server/command/tradeoff.h"
 #include "server/options.h"
 
 static int help_run(int argc, char *const *argv);
@@ -29,8 +30,8 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve, &command_run,     &command_check, &command_import,
-    &command_help,  &command_version, NULL,
+    &command_serve,  &command_run,  &command_check,   &command_tradeoff,
+    &command_import, &command_help, &command_version, NULL,
 };
 
 static const char overview[] =
@@ -40,6 +41,7 @@ static const char overview[] =
     "  impactd run scene.json               run one scene here and print the finished job\n"
     "  impactd run scene.json -o out.csv    write its time series (json, csv, npy)\n"
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
+    "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "\n"
     "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"

@@ -63,9 +63,8 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
 }
 
 // A job of nobody's queue, finished.
-static Status job_write(const Simulation *simulation, const Warnings *warnings,
-                        const Outcome *outcome, const int64_t began_unix_ms, double took,
-                        Bytes *bytes) {
+static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const Outcome *outcome,
+                        const int64_t began_unix_ms, double took, Bytes *bytes) {
     Bytes plan = {0}, summary = {0}, told = {0}, notes = {0};
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
@@ -83,8 +82,8 @@ static Status job_write(const Simulation *simulation, const Warnings *warnings,
                     .summary = summary.at,
                     .warnings = told.at,
                     .notes = notes.at,
-                    .title = simulation->title};
-    intake_result_id(simulation, show.result);
+                    .title = inquiry->simulation.title};
+    intake_result_id(inquiry, show.result);
     const bool is_failed = plan.is_failed || summary.is_failed || told.is_failed || notes.is_failed;
     if (!is_failed)
         job_put(bytes, &show, JOB_PUT_WHOLE);
@@ -96,7 +95,7 @@ static Status job_write(const Simulation *simulation, const Warnings *warnings,
 }
 
 // Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
-static Status scene_run(const char *path, const Simulation *simulation, const Warnings *warnings,
+static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings *warnings,
                         const char *output, const Encoder *encoder, Problem *problem) {
     Outcome *outcome = NULL;
     Bytes job = {0}, bytes = {0};
@@ -104,13 +103,13 @@ static Status scene_run(const char *path, const Simulation *simulation, const Wa
     const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
-    Status status = simulation_run(simulation, &limits, &watch, NULL, &outcome, problem);
+    Status status = simulation_run(&inquiry->simulation, &limits, &watch, NULL, &outcome, problem);
     bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
     if (status == STATUS_OK)
         scene_file_warn(path, &outcome->warnings);
     if (status == STATUS_OK)
-        status = job_write(simulation, warnings, outcome, began_unix_ms, took, &job);
+        status = job_write(inquiry, warnings, outcome, began_unix_ms, took, &job);
     if (status == STATUS_OK && output == NULL) {
         bytes_text(&job, "\n");
         (void)fwrite(job.at, 1, job.count, stdout);
@@ -136,22 +135,26 @@ static Status scene_run(const char *path, const Simulation *simulation, const Wa
 static Status scene_prepare_and_run(const char *path, const Bytes *text, const char *output,
                                     const Encoder *encoder, Problem *problem) {
     Store *store = NULL;
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
     Warnings warnings = {0};
     TRY(store_open(NULL, &store, problem));
     Status status =
-        intake_prepare(store, text->at, text->count, &limits, &simulation, &warnings, problem);
+        intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
     store_close(store);
+    if (status == STATUS_OK && inquiry.study != NULL)
+        status = problem_add(problem, STATUS_INVALID, "/study",
+                             "is not for `run`, which runs the scene alone: `impactd tradeoff` "
+                             "makes the study, or the daemon");
     if (status == STATUS_OK) {
         scene_file_warn(path, &warnings);
         // Before the run, so that a wrong folder is told now and not after it.
         if (output != NULL)
             status = output_open(output, problem);
         if (status == STATUS_OK)
-            status = scene_run(path, &simulation, &warnings, output, encoder, problem);
+            status = scene_run(path, &inquiry, &warnings, output, encoder, problem);
         output_drop();
     }
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }

@@ -80,9 +80,21 @@ void document_psd(Bytes *bytes, const Spectrum *spectrum) {
     bytes_text(bytes, "}}");
 }
 
-void document_scene(Bytes *bytes, const Simulation *simulation) {
-    Simulation plain = *simulation; // a borrowed view: nothing is cleared
-    plain.title = NULL;
-    plain.labels = (Texts){NULL, 0};
-    write_item(bytes, simulation_fields, &plain, WRITE_SCENE);
+void document_scene(Bytes *bytes, const Inquiry *inquiry) {
+    Inquiry plain = *inquiry; // a borrowed view: nothing is cleared
+    plain.simulation.title = NULL;
+    plain.simulation.labels = (Texts){NULL, 0};
+    write_item(bytes, inquiry_fields, &plain, WRITE_SCENE);
+}
+
+void document_study(Bytes *bytes, const StudyAnswer *answer) {
+    write_item(bytes, study_answer_fields, answer, WRITE_SCENE);
+}
+
+void document_answer(Bytes *bytes, const Variant *answer) {
+    bytes_text(bytes, "{\"kind\": ");
+    bytes_json_string(bytes, answer->kind->name);
+    bytes_text(bytes, ", ");
+    (void)write_members(bytes, answer->kind->fields, answer, WRITE_REPORT);
+    bytes_text(bytes, "}");
 }

@@ -3,7 +3,7 @@
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 
-#include "core/simulation/simulation.h"
+#include "core/study/inquiry.h"
 #include "server/base/bytes.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan);
@@ -15,7 +15,11 @@ void document_energy(Bytes *bytes, const Energy *energy);
 void document_impacts(Bytes *bytes, const Impacts *impacts);
 // Without any density: null.
 void document_psd(Bytes *bytes, const Spectrum *spectrum);
-// The scene as it can be submitted again, without its notes.
-void document_scene(Bytes *bytes, const Simulation *simulation);
+// The scene as it can be submitted again, with its study, without its notes.
+void document_scene(Bytes *bytes, const Inquiry *inquiry);
+// A study's answer, as it is kept: what is unknown is left out, so that it can be read again.
+void document_study(Bytes *bytes, const StudyAnswer *answer);
+// The same as people get it: {"kind": ..., what is unknown null}.
+void document_answer(Bytes *bytes, const Variant *answer);
 
 #endif

@@ -25,7 +25,7 @@ Computation *computation_new(const char *result) {
 void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
-    simulation_clear(&computation->simulation);
+    inquiry_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
     free(computation->askers.at);

@@ -4,7 +4,7 @@
 #ifndef SERVER_JOBS_INTAKE_H
 #define SERVER_JOBS_INTAKE_H
 
-#include "core/simulation/simulation.h"
+#include "core/study/inquiry.h"
 #include "server/jobs/job.h"
 #include "server/store/store.h"
 
@@ -18,13 +18,13 @@ typedef struct IntakeSettings {
     SimulationLimits limits;
 } IntakeSettings;
 
-// Reads a scene's JSON, resolves its materials, judges and completes it, all faults at once.
-// `simulation` is cleared by simulation_clear in any case, `warnings` by warnings_clear.
+// Reads a scene's JSON, perhaps with a study, resolves its materials, judges and completes it, all
+// faults at once. `inquiry` is cleared by inquiry_clear in any case, `warnings` by warnings_clear.
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      Simulation *simulation, Warnings *warnings, Problem *problem);
+                      Inquiry *inquiry, Warnings *warnings, Problem *problem);
 
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
-void intake_result_id(const Simulation *simulation, char target[72]);
+void intake_result_id(const Inquiry *inquiry, char target[72]);
 
 // Opens the queue, takes up unfinished jobs of the store, starts the workers. Borrows `store`.
 Status intake_open(Store *store, const IntakeSettings *settings, Intake **intake, Problem *problem);
@@ -39,7 +39,7 @@ Status intake_submit(Intake *intake, const char *text, size_t size, Job **job, P
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
-    Simulation simulation;
+    Inquiry inquiry;
     Warnings warnings;
     PlanReport plan;
     Cost cost;

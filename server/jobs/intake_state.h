@@ -21,7 +21,7 @@ typedef struct Wakers {
 typedef struct Computation {
     IndexEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
-    Simulation simulation;
+    Inquiry inquiry;
     char *scene, *warnings;   // documents
     struct Computation *next; // in the queue
     bool is_running;

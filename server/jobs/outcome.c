@@ -21,7 +21,7 @@ static Status tell_failure(Intake *intake, const char *result, Problem *problem)
 static Status compute_again(Intake *intake, const char *result, const Waker *waker,
                             Problem *problem) {
     ResultRow row = {0};
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
     Computation *computation = NULL;
     Status status = store_result_scene(intake->store, result, &row, problem);
@@ -32,19 +32,19 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
             row.engine, engine_version);
     // The scene was judged when it came; today's limits are no reason to refuse it now.
     if (status == STATUS_OK)
-        status = intake_prepare(intake->store, row.scene, strlen(row.scene), NULL, &simulation,
+        status = intake_prepare(intake->store, row.scene, strlen(row.scene), NULL, &inquiry,
                                 &warnings, problem);
     char id[72] = "";
     if (status == STATUS_OK)
-        intake_result_id(&simulation, id);
+        intake_result_id(&inquiry, id);
     if (status == STATUS_OK && strcmp(id, result) != 0)
         status = problem_set(problem, STATUS_INTERNAL,
                              "the stored scene no longer stands for this result");
     if (status == STATUS_OK && (computation = computation_new(result)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
     if (status == STATUS_OK) {
-        computation->simulation = simulation;
-        simulation = (Simulation){0};
+        computation->inquiry = inquiry;
+        inquiry = (Inquiry){0};
         computation->is_again = true;
         pthread_mutex_lock(&intake->lock);
         Computation *other = index_find(intake->in_flight, result);
@@ -58,7 +58,7 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
         pthread_mutex_unlock(&intake->lock);
     }
     computation_free(computation);
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     result_row_clear(&row);
     return status;

@@ -157,18 +157,18 @@ static Status resolve_all(Store *store, Simulation *simulation, Warnings *warnin
 }
 
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      Simulation *simulation, Warnings *warnings, Problem *problem) {
+                      Inquiry *inquiry, Warnings *warnings, Problem *problem) {
     // All three add to one problem: what could not be read is judged no further, the rest is.
     Problem *own = NULL;
     if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
         return STATUS_NO_MEMORY;
-    Status status = read_json(text, size, simulation_fields, simulation, problem);
+    Status status = read_json(text, size, inquiry_fields, inquiry, problem);
     if (status == STATUS_OK || status == STATUS_INVALID) {
-        const Status resolved = resolve_all(store, simulation, warnings, problem);
+        const Status resolved = resolve_all(store, &inquiry->simulation, warnings, problem);
         if (resolved != STATUS_OK && resolved != STATUS_INVALID)
             status = resolved;
         else
-            status = simulation_complete(simulation, limits, warnings, problem);
+            status = inquiry_complete(inquiry, limits, warnings, problem);
         if (status == STATUS_OK)
             status = resolved;
     }
@@ -176,14 +176,14 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     return status;
 }
 
-void intake_result_id(const Simulation *simulation, char target[72]) {
+void intake_result_id(const Inquiry *inquiry, char target[72]) {
     char hex[65];
     Digest *digest = digest_new();
     target[0] = '\0';
     if (digest == NULL)
         return;
     digest_take(digest, engine_version, strlen(engine_version) + 1);
-    canonical_write(simulation_fields, simulation, digest_take, digest);
+    canonical_write(inquiry_fields, inquiry, digest_take, digest);
     digest_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
 }

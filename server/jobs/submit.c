@@ -90,33 +90,33 @@ static void leave(Intake *intake, Job *job) {
     pthread_mutex_unlock(&intake->lock);
 }
 
-// A computation of this scene, without jobs. Takes the simulation. NULL without memory.
-static Computation *begin(const char *result, Simulation *simulation, const char *warnings) {
+// A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
+static Computation *begin(const char *result, Inquiry *inquiry, const char *warnings) {
     Computation *computation = computation_new(result);
     Bytes scene = {0};
     if (computation != NULL) {
-        document_scene(&scene, simulation);
+        document_scene(&scene, inquiry);
         computation->scene = bytes_take(&scene, NULL);
         computation->warnings = strdup(warnings);
-        computation->simulation = *simulation;
-        *simulation = (Simulation){0};
+        computation->inquiry = *inquiry;
+        *inquiry = (Inquiry){0};
         if (computation->scene != NULL && computation->warnings != NULL)
             return computation;
     }
     computation_free(computation);
-    simulation_clear(simulation);
+    inquiry_clear(inquiry);
     return NULL;
 }
 
-// Takes the simulation unless the computation is under way already.
-static Status start(Intake *intake, Job *job, Simulation *simulation, Problem *problem) {
+// Takes the inquiry unless the computation is under way already.
+static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     Computation *computation = index_find(intake->in_flight, job->row.result);
     // It may have been dismissed meanwhile, by whoever saw it in the store.
     if (!job_state_is_final(job->row.state)) {
         if (computation == NULL &&
-            (computation = begin(job->row.result, simulation, job->row.warnings)) != NULL)
+            (computation = begin(job->row.result, inquiry, job->row.warnings)) != NULL)
             intake_enqueue(intake, computation, false);
         if (computation != NULL)
             intake_attach(job, computation);
@@ -130,23 +130,24 @@ static Status start(Intake *intake, Job *job, Simulation *simulation, Problem *p
     return status;
 }
 
-static Status fill_job(Job *job, const Simulation *simulation, const Warnings *warnings,
+static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warnings,
                        Problem *problem) {
     JobRow *row = &job->row;
+    const char *title = inquiry->simulation.title;
     Bytes scene = {0}, told = {0};
     TRY(make_id(row->id) == STATUS_OK
             ? STATUS_OK
             : problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id"));
     job->indexed.key = row->id;
     row->created_unix_ms = clock_unix_ms();
-    intake_result_id(simulation, row->result);
-    document_scene(&scene, simulation);
+    intake_result_id(inquiry, row->result);
+    document_scene(&scene, inquiry);
     document_warnings(&told, warnings);
     row->scene = bytes_take(&scene, NULL);
     row->warnings = bytes_take(&told, NULL);
-    row->title = simulation->title == NULL ? NULL : strdup(simulation->title);
+    row->title = title == NULL ? NULL : strdup(title);
     if (row->result[0] == '\0' || row->scene == NULL || row->warnings == NULL ||
-        (row->title == NULL && simulation->title != NULL))
+        (row->title == NULL && title != NULL))
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     return STATUS_OK;
 }
@@ -159,7 +160,7 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, Simulation *simulation, Problem *problem) {
+static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
     const Status known = find_known(intake, job, problem);
     if (known == STATUS_OK)
         return finish_known(intake, job, problem);
@@ -167,7 +168,7 @@ static Status submit(Intake *intake, Job *job, Simulation *simulation, Problem *
         return known;
     TRY(enter(intake, job, problem));
     Status status = store_job_add(intake->store, &job->row, problem);
-    if (status == STATUS_OK && (status = start(intake, job, simulation, problem)) != STATUS_OK) {
+    if (status == STATUS_OK && (status = start(intake, job, inquiry, problem)) != STATUS_OK) {
         // The client is told that it was refused: the next start must not run it all the same.
         fail_row(&job->row, problem);
         (void)store_job_update(intake->store, &job->row, NULL);
@@ -184,15 +185,15 @@ Status intake_submit(Intake *intake, const char *text, size_t size, Job **accept
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->submitted_ns = clock_monotonic_ns();
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
-    Status status = intake_prepare(intake->store, text, size, &intake->settings.limits, &simulation,
+    Status status = intake_prepare(intake->store, text, size, &intake->settings.limits, &inquiry,
                                    &warnings, problem);
     if (status == STATUS_OK)
-        status = fill_job(job, &simulation, &warnings, problem);
+        status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
-        status = submit(intake, job, &simulation, problem);
-    simulation_clear(&simulation);
+        status = submit(intake, job, &inquiry, problem);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {
         job_drop(job);
@@ -202,14 +203,14 @@ Status intake_submit(Intake *intake, const char *text, size_t size, Job **accept
     return STATUS_OK;
 }
 
-// Takes the row and the simulation.
-static Status resume(Intake *intake, JobRow *row, Simulation *simulation, Problem *problem) {
+// Takes the row and the inquiry.
+static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *problem) {
     Job *job = job_new(intake);
     Computation *computation = NULL;
-    intake_result_id(simulation, row->result);
+    intake_result_id(inquiry, row->result);
     if (job != NULL && row->result[0] != '\0' &&
         (computation = index_find(intake->in_flight, row->result)) == NULL &&
-        (computation = begin(row->result, simulation, row->warnings)) != NULL)
+        (computation = begin(row->result, inquiry, row->warnings)) != NULL)
         intake_enqueue(intake, computation, false);
     if (computation == NULL) {
         job_drop(job);
@@ -232,14 +233,14 @@ static Status resume(Intake *intake, JobRow *row, Simulation *simulation, Proble
 
 Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
-    Simulation simulation = {0};
+    Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
     Status status = intake_prepare(intake->store, row->scene, strlen(row->scene),
-                                   &intake->settings.limits, &simulation, &warnings, fault);
+                                   &intake->settings.limits, &inquiry, &warnings, fault);
     if (status == STATUS_OK) {
-        status = resume(intake, row, &simulation, problem);
+        status = resume(intake, row, &inquiry, problem);
     } else if (status == STATUS_INVALID || status == STATUS_UNREADABLE) {
         // The limits or the program changed meanwhile: the job's owner learns why.
         fail_row(row, fault);
@@ -247,14 +248,14 @@ Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     } else {
         problem_set(problem, status, "%s", fault->detail);
     }
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     free(fault);
     return status;
 }
 
 void dry_run_clear(DryRun *dry_run) {
-    simulation_clear(&dry_run->simulation);
+    inquiry_clear(&dry_run->inquiry);
     warnings_clear(&dry_run->warnings);
     fields_clear(plan_report_fields, &dry_run->plan);
 }
@@ -262,11 +263,11 @@ void dry_run_clear(DryRun *dry_run) {
 Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
                       Problem *problem) {
     memset(dry_run, 0, sizeof *dry_run);
-    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->simulation,
+    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->inquiry,
                        &dry_run->warnings, problem));
-    intake_result_id(&dry_run->simulation, dry_run->result);
-    TRY(simulation_plan(&dry_run->simulation, &dry_run->plan, problem));
-    dry_run->cost = simulation_cost(&dry_run->simulation);
+    intake_result_id(&dry_run->inquiry, dry_run->result);
+    TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
+    TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
     dry_run->cpu_seconds = dry_run->cost.steps * step_seconds;
     pthread_mutex_lock(&intake->lock);
     Outcome *outcome = cache_find(intake->cache, dry_run->result);

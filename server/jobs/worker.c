@@ -11,17 +11,27 @@
 #include "server/jobs/documents.h"
 #include "server/jobs/intake_state.h"
 
+// A computation's run, or the study after it, as a part of the whole.
+typedef struct Part {
+    Computation *computation;
+    double from, share;
+} Part;
+
+static const double own_share = 0.05; // of the scene's own run where a study follows
+
 static bool advance(void *context, double fraction) {
-    Computation *computation = context;
+    const Part *part = context;
     const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
-    atomic_store(&computation->progress, (unsigned)(share * 10000));
-    return !atomic_load(&computation->is_stopped);
+    atomic_store(&part->computation->progress,
+                 (unsigned)((part->from + share * part->share) * 10000));
+    return !atomic_load(&part->computation->is_stopped);
 }
 
 // What a computation came to, as documents.
 typedef struct Findings {
     Status status;
-    Outcome *outcome; // NULL unless STATUS_OK
+    Outcome *outcome;   // NULL unless STATUS_OK
+    StudyAnswer answer; // its study NULL where none was asked for
     ResultRow result;
     char *problem; // of failed jobs
     char detail[256];
@@ -30,6 +40,7 @@ typedef struct Findings {
 
 static void findings_clear(Findings *findings) {
     outcome_drop(findings->outcome);
+    fields_clear(study_answer_fields, &findings->answer);
     result_row_clear(&findings->result);
     free(findings->problem);
 }
@@ -68,6 +79,11 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->impacts = take(&impacts, &status);
     if (outcome->spectrum.densities.count > 0)
         row->psd = take(&psd, &status);
+    if (findings->answer.study != NULL) {
+        Bytes study = {.most = DOCUMENT_BYTES};
+        document_study(&study, &findings->answer);
+        row->study = take(&study, &status);
+    }
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
@@ -84,15 +100,37 @@ static void fail(Findings *findings, Status status, const Problem *problem) {
     findings->problem = bytes_take(&bytes, NULL);
 }
 
+static double thread_cpu(void *context) {
+    (void)context;
+    return 1e-9 * (double)clock_thread_cpu_ns();
+}
+
+static Status run_study(Worker *worker, Computation *computation, Findings *findings,
+                        Problem *problem) {
+    Part part = {computation, own_share, 1 - own_share};
+    const Watch watch = {&part, advance};
+    const StudyTools tools = {.limits = &worker->intake->settings.limits,
+                              .watch = &watch,
+                              .workspace = &worker->workspace,
+                              .cpu = thread_cpu};
+    return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
+                     &findings->answer.study, problem);
+}
+
 static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
     const Intake *intake = worker->intake;
-    const Watch watch = {computation, advance};
+    // Only the scene's own series is ever wanted again.
+    const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
+    Part part = {computation, 0, has_study ? own_share : 1};
+    const Watch watch = {&part, advance};
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
-    Status status = simulation_run(&computation->simulation, limits, &watch, &worker->workspace,
-                                   &findings->outcome, problem);
+    Status status = simulation_run(&computation->inquiry.simulation, limits, &watch,
+                                   &worker->workspace, &findings->outcome, problem);
+    if (status == STATUS_OK && has_study)
+        status = run_study(worker, computation, findings, problem);
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);

@@ -20,6 +20,7 @@ static const RowColumn result_columns[] = {
     ROW_COLUMN(ResultRow, scene, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, impacts, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, psd, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, study, COLUMN_TEXT),
     ROW_END
 };
 // clang-format on
@@ -35,11 +36,12 @@ typedef struct Finish {
 } Finish;
 
 static Status finish(Database *database, const void *work, Problem *problem) {
-    static const char sql[] = "INSERT INTO results (id, engine, sample_rate, count, "
-                              "created_unix_ms, summary, plan, warnings, notes, energy, scene, "
-                              "impacts, psd) VALUES (:id, :engine, :sample_rate, :count, "
-                              ":created_unix_ms, :summary, :plan, :warnings, :notes, "
-                              ":energy, :scene, :impacts, :psd) ON CONFLICT (id) DO NOTHING";
+    static const char sql[] =
+        "INSERT INTO results (id, engine, sample_rate, count, "
+        "created_unix_ms, summary, plan, warnings, notes, energy, scene, "
+        "impacts, psd, study) VALUES (:id, :engine, :sample_rate, :count, "
+        ":created_unix_ms, :summary, :plan, :warnings, :notes, "
+        ":energy, :scene, :impacts, :psd, :study) ON CONFLICT (id) DO NOTHING";
     const Finish *both = work;
     if (both->result != NULL)
         TRY(database_change(database, sql, result_columns, both->result, NULL, problem));
@@ -71,7 +73,7 @@ static Status load(Store *store, const char *sql, const char *id, ResultRow *row
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, notes, "
-        "energy, scene, impacts, psd FROM results WHERE id = :id";
+        "energy, scene, impacts, psd, study FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 

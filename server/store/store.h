@@ -72,6 +72,7 @@ typedef struct ResultRow {
     char *scene, *plan, *summary, *warnings, *energy, *impacts; // JSON documents
     char *notes;    // JSON array, what the run itself warned of; NULL: nothing
     char *psd;      // JSON; NULL where none was asked for
+    char *study;    // JSON, the answer of the scene's study; NULL: none
     uint64_t count; // samples
     double sample_rate;
     int64_t created_unix_ms;
@@ -82,7 +83,7 @@ void result_row_clear(ResultRow *row);
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
-// The same without scene, energy, impacts and psd, which may be long.
+// The same without scene, energy, impacts, psd and study, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);

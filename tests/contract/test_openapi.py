@@ -97,7 +97,10 @@ def test_real_answers_have_the_promised_shapes():
     called, statuses = set(), set()
     with program.daemon() as daemon:
         job = program.finished(daemon, program.scene("paper_free_sponge"))
-        values = {"/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
+        study = program.finished(daemon, {**program.scene("paper_free_sponge"), "study": {"solvers": ["exact", "rk4"]}})
+        tradeoff = {"id": study["result"]}
+        values = {"/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
+                  "/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
 
@@ -132,6 +135,7 @@ def test_real_answers_have_the_promised_shapes():
             if "304" in operation["responses"]:
                 call(method, path, target, headers={"If-None-Match": "*"})
 
+        call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         scene = program.scene("paper_random_sponge")
         slow = program.scene("paper_sine_aluminium")
         slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})

@@ -16,6 +16,7 @@ typedef struct Settings {
     char *listen, *config;
     bool quiet;
     int level;
+    Texts names;
 } Settings;
 
 static const char *const levels[] = {"low", "high", NULL};
@@ -28,6 +29,7 @@ static const Field fields[] = {
     FIELD_TEXT(Settings, config, 200, PRESENCE_OPTIONAL, 0, "file"),
     FIELD_FLAG(Settings, quiet, false, "say less"),
     FIELD_CHOICE(Settings, level, levels, 0, "level"),
+    FIELD_TEXTS(Settings, names, NULL, NULL, 3, PRESENCE_OPTIONAL, 0, "names"),
     FIELD_END,
 };
 // clang-format on
@@ -48,12 +50,33 @@ static int stop(void **state) {
     unsetenv("TEST_QUEUE_MOST");
     unsetenv("TEST_CONFIG");
     unsetenv("TEST_RATE");
+    unsetenv("TEST_NAMES");
     return 0;
 }
 
 #define READ(prefix, ...)                                                                          \
     options_read(fields, &settings, (int)COUNT(((char *[]){__VA_ARGS__})),                         \
                  (char *[]){__VA_ARGS__}, prefix, &options, &problem)
+
+static void texts_grow_with_each_flag_and_a_stronger_source_begins_anew(void **state) {
+    (void)state;
+    setenv("TEST_NAMES", "of the environment", 1);
+    assert_int_equal(READ("TEST_", "--names", "a", "-n", "b", "--names=c d"), STATUS_OK);
+    assert_int_equal(settings.names.count, 3);
+    assert_string_equal(settings.names.at[0], "a");
+    assert_string_equal(settings.names.at[1], "b");
+    assert_string_equal(settings.names.at[2], "c d");
+    char *text = NULL;
+    size_t size = 0;
+    FILE *file = open_memstream(&text, &size);
+    assert_non_null(file);
+    options_print(fields, &settings, &options, file);
+    fclose(file);
+    assert_non_null(strstr(text, "names = a, b, c d  # flag"));
+    free(text);
+    assert_int_equal(READ("TEST_", "-n", "e", "-n", "f", "-n", "g", "-n", "h"), STATUS_USAGE);
+    assert_string_equal(problem.faults[0].pointer, "-n");
+}
 
 static void flags_set_values_and_the_rest_are_operands(void **state) {
     (void)state;
@@ -162,6 +185,8 @@ static void what_is_printed_can_be_read_as_a_file(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(texts_grow_with_each_flag_and_a_stronger_source_begins_anew,
+                                        start, stop),
         cmocka_unit_test_setup_teardown(flags_set_values_and_the_rest_are_operands, start, stop),
         cmocka_unit_test_setup_teardown(a_flag_beats_the_environment_that_the_file_that_the_default,
                                         start, stop),

@@ -308,21 +308,101 @@ static void a_failing_job_says_why(void **state) {
     room_end(&room);
 }
 
+static const char *const studied =
+    "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"dampers\": [{\"mass\": 0.1107, "
+    "\"clearance\": 0.015, \"buffer\": \"sponge\"}], \"excitation\": {\"kind\": \"free\", "
+    "\"displacement\": 0.015}, \"duration\": 2, \"sample_rate\": 1000, "
+    "\"study\": {\"kind\": \"tradeoff\", \"repeats\": %d, \"point_steps\": 1e6}}";
+
+static Job *submit_study(Room *room, int repeats) {
+    char text[1024];
+    Job *job = NULL;
+    snprintf(text, sizeof text, studied, repeats);
+    problem_clear(&problem);
+    if (intake_submit(room->intake, text, strlen(text), &job, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return job;
+}
+
+static void a_studys_answer_is_kept_with_the_result_of_its_scene(void **state) {
+    (void)state;
+    Room room = room_make(2);
+    Job *job = submit_study(&room, 1), *twin = submit_study(&room, 1);
+    wait_for(job);
+    wait_for(twin);
+    JobShow now = show(job), other = show(twin);
+    assert_int_equal(now.state, JOB_SUCCESSFUL);
+    assert_string_equal(now.result, other.result); // one measurement for both
+    ResultRow row;
+    assert_int_equal(store_result_load(room.store, now.result, &row, &problem), STATUS_OK);
+    assert_non_null(strstr(row.study, "{\"study\": {\"kind\": \"tradeoff\", "));
+    assert_non_null(strstr(row.scene, "\"point_steps\": 1000000"));
+    assert_null(strstr(row.study, "null")); // it can be read again
+    result_row_clear(&row);
+    job_show_clear(&now);
+    job_show_clear(&other);
+    job_drop(job);
+    job_drop(twin);
+    // Another number of repeats is another study.
+    job = submit_study(&room, 2);
+    wait_for(job);
+    now = show(job);
+    assert_false(now.is_cached);
+    job_show_clear(&now);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    Job *job = submit_study(&room, 1000), *gone = NULL;
+    const struct timespec moment = {0, 1000000};
+    JobShow now = show(job);
+    for (int i = 0; i < 60000 && now.progress <= 5; i++) { // beyond the scene's own run
+        nanosleep(&moment, NULL);
+        job_show_clear(&now);
+        now = show(job);
+    }
+    assert_int_equal(now.state, JOB_RUNNING);
+    assert_true(now.progress > 5 && now.progress < 100);
+    char id[40];
+    strcpy(id, now.id);
+    job_show_clear(&now);
+    job_drop(job);
+    room_close(&room);
+    room_open(&room);
+    assert_int_equal(intake_find(room.intake, id, &job, &problem), STATUS_OK);
+    assert_false(job_is_finished(job));
+    assert_int_equal(intake_dismiss(room.intake, id, &gone, &problem), STATUS_OK);
+    now = show(gone);
+    assert_int_equal(now.state, JOB_DISMISSED);
+    assert_false(store_result_exists(room.store, now.result));
+    job_show_clear(&now);
+    job_drop(gone);
+    job_drop(job);
+    // The worker is free for others.
+    job = submit(&room, 0.015, 1);
+    wait_for(job);
+    job_drop(job);
+    room_end(&room);
+}
+
 static void names_are_resolved_and_all_faults_told(void **state) {
     (void)state;
     Room room = room_make(1);
-    Simulation simulation;
+    Inquiry inquiry;
     Warnings warnings = {NULL, 0};
     char text[1024];
     scene_text(text, 0.015, 1, "spnge");
     problem_clear(&problem);
     assert_int_equal(
-        intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+        intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
         STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
     assert_string_equal(problem.faults[0].did_you_mean, "sponge");
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     static const struct {
         const char *buffer, *pointer, *did_you_mean;
@@ -341,7 +421,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
                  cases[i].buffer);
         problem_clear(&problem);
         assert_int_equal(
-            intake_prepare(room.store, text, strlen(text), NULL, &simulation, &warnings, &problem),
+            intake_prepare(room.store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
             STATUS_INVALID);
         assert_true(problem_concerns(&problem, "/structure/mass"));
         if (problem.count != 2 || !problem_concerns(&problem, cases[i].pointer))
@@ -350,7 +430,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
         for (size_t k = 0; k < problem.count; k++)
             if (strncmp(problem.faults[k].pointer, "/dampers", 8) == 0)
                 assert_string_equal(problem.faults[k].did_you_mean, cases[i].did_you_mean);
-        simulation_clear(&simulation);
+        inquiry_clear(&inquiry);
         warnings_clear(&warnings);
     }
     room_end(&room);
@@ -565,6 +645,8 @@ int main(void) {
         cmocka_unit_test(unfinished_jobs_go_on_after_a_restart),
         cmocka_unit_test(a_series_that_is_gone_is_computed_again_with_the_same_bytes),
         cmocka_unit_test(a_failing_job_says_why),
+        cmocka_unit_test(a_studys_answer_is_kept_with_the_result_of_its_scene),
+        cmocka_unit_test(a_study_is_stopped_with_its_job_and_goes_on_after_a_restart),
         cmocka_unit_test(names_are_resolved_and_all_faults_told),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
         cmocka_unit_test(a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost),

@@ -1,0 +1,59 @@
+#include "core/study/inquiry.h"
+
+const Field inquiry_fields[] = {
+    FIELD_BASE(Inquiry, simulation, simulation_fields),
+    FIELD_VARIANT(Inquiry, study, &study_kinds, PRESENCE_OPTIONAL,
+                  "what is to be found out about the scene beside its run"),
+    FIELD_END,
+};
+
+void inquiry_clear(Inquiry *inquiry) {
+    fields_clear(inquiry_fields, inquiry);
+}
+
+static const double study_runs = 10; // a study may take as long as so many runs
+
+static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits,
+                          Problem *problem) {
+    if (limits == NULL || !(limits->steps > 0))
+        return STATUS_OK;
+    Cost cost;
+    TRY(inquiry_cost(inquiry, limits, &cost, problem));
+    if (cost.steps <= study_runs * limits->steps)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/study",
+                       "would take about %.2g solver steps in all, must be at most %.2g: ask for "
+                       "fewer solvers or repeats, or lower point_steps",
+                       cost.steps, study_runs * limits->steps);
+}
+
+Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,
+                        Problem *problem) {
+    Status status = simulation_complete(&inquiry->simulation, limits, warnings, problem);
+    if (inquiry->study == NULL || (status != STATUS_OK && status != STATUS_INVALID))
+        return status;
+    const Field *row = &inquiry_fields[1];
+    const Field rows[] = {*row, FIELD_END};
+    const Status own = fields_check(rows, inquiry, "", problem);
+    if (status == STATUS_OK)
+        status = own;
+    // The rest can only be judged beside a sound scene.
+    if (status == STATUS_OK)
+        status =
+            study_kind(inquiry->study)
+                ->complete((Study *)(void *)inquiry->study, &inquiry->simulation, limits, problem);
+    return status == STATUS_OK ? check_steps(inquiry, limits, problem) : status;
+}
+
+Status inquiry_cost(const Inquiry *inquiry, const SimulationLimits *limits, Cost *cost,
+                    Problem *problem) {
+    *cost = simulation_cost(&inquiry->simulation);
+    if (inquiry->study == NULL)
+        return STATUS_OK;
+    double steps;
+    TRY(study_kind(inquiry->study)
+            ->cost((const Study *)(const void *)inquiry->study, &inquiry->simulation, limits,
+                   &steps, problem));
+    cost->steps += steps;
+    return STATUS_OK;
+}

@@ -1,0 +1,104 @@
+// The study "tradeoff": what speed costs in accuracy, measured on the scene itself. What is asked,
+// and the table that answers. Not how: tradeoff.c runs it, tradeoff_ladder.h lists what is tried,
+// tradeoff_errors.h measures, tradeoff_choice.h chooses. Used by whoever shows a table or a chart.
+#ifndef CORE_STUDY_TRADEOFF_H
+#define CORE_STUDY_TRADEOFF_H
+
+#include "core/study/study.h"
+
+typedef enum TradeoffMetric {
+    TRADEOFF_DISPLACEMENT,
+    TRADEOFF_MEAN_ACCELERATION,
+    TRADEOFF_PEAK_FORCE,
+    TRADEOFF_IMPACTS,
+    TRADEOFF_PSD,
+    TRADEOFF_RMS_DISPLACEMENT,
+    TRADEOFF_METRICS
+} TradeoffMetric;
+extern const char *const tradeoff_metric_names[]; // NULL-terminated
+extern const char *const tradeoff_metric_units[]; // to stand behind a number: "", " dB"
+
+// What is asked.
+typedef struct TradeoffStudy {
+    Study study;
+    double error; // wanted; NAN until completed: the metric's usual one
+    int metric;   // TradeoffMetric
+    uint64_t repeats;
+    uint64_t trial;     // another number measures anew
+    double point_steps; // no point may take more solver steps
+    Texts solvers;      // none: all
+} TradeoffStudy;
+
+// Differences from the reference; NAN where a point does not answer it.
+typedef struct TradeoffErrors {
+    double displacement;      // largest over the largest
+    double mean_acceleration; // rms over rms
+    double peak_force;        // of the largest
+    double impacts;           // how many more or fewer
+    double psd;               // rms [dB]
+    double rms_displacement;
+} TradeoffErrors;
+
+typedef enum TradeoffStatus {
+    TRADEOFF_MEASURED,
+    TRADEOFF_REFUSED, // foretold or judged impossible: not begun
+    TRADEOFF_FAILED,  // begun and not brought to an end
+} TradeoffStatus;
+extern const char *const tradeoff_status_names[];
+
+// One way to run the scene. The first part says how it differs from the scene; what is absent is as
+// there.
+typedef struct TradeoffPoint {
+    char *name;   // "rk4, step 1e-05 s"
+    char *solver; // of the solvers' table
+    double step, tolerance;
+    char *contact_model;
+    double sample_rate, duration;
+    uint64_t segment;
+
+    int status;                     // TradeoffStatus
+    char *why;                      // of one that was not measured
+    double cpu_minimum, cpu_median; // of one run [s]
+    uint64_t runs;                  // that were timed
+    double steps;                   // that the solver counted
+    TradeoffErrors errors;
+    bool is_best; // nothing is both cheaper and closer by the metric
+} TradeoffPoint;
+
+typedef struct TradeoffPoints {
+    TradeoffPoint *at;
+    size_t count;
+} TradeoffPoints;
+
+// What the points are compared with.
+typedef struct TradeoffReference {
+    char *solver;
+    double error_estimate, trust_horizon;
+    uint64_t impacts;        // within the horizon
+    double peak_force;       // of those [N]
+    double largest;          // displacement [m]
+    double psd_from, psd_to; // the band compared [Hz]
+} TradeoffReference;
+
+typedef struct TradeoffChoice {
+    uint64_t point; // its number, from 1; COUNT_ABSENT: none keeps the error
+    char *why;
+} TradeoffChoice;
+
+// The answer.
+typedef struct Tradeoff {
+    Variant variant;
+    int metric;
+    double error;
+    uint64_t repeats, trial;
+    TradeoffReference reference;
+    TradeoffPoints points;
+    TradeoffChoice recommendation;
+} Tradeoff;
+
+extern const Field tradeoff_point_fields[], tradeoff_error_fields[];
+
+// The error by one metric.
+double tradeoff_error(const TradeoffErrors *errors, int metric);
+
+#endif

@@ -1,0 +1,209 @@
+// A point may have fewer samples than the reference: then its displacement is the line between its
+// samples, and its mean acceleration holds for the whole of its interval. Both are what a reader of
+// the coarser series has.
+#include "core/study/tradeoff_errors.h"
+
+#include <string.h>
+
+// The part of a spectrum's power that its band holds.
+static const double band_power = 0.999;
+
+static double ratio(double difference, double whole) {
+    if (whole > 0)
+        return difference / whole;
+    return difference == 0 ? 0 : (double)NAN;
+}
+
+// How far the reference itself is off in the samples compared: an estimate for the whole run says
+// nothing of those before the horizon, which is where it passes RESPONSE_PARTING.
+static double own_error(const Summary *reference) {
+    return isnan(reference->trust_horizon) ? reference->error_estimate
+                                           : fmin(reference->error_estimate, RESPONSE_PARTING);
+}
+
+// Samples of the reference that can be compared.
+static size_t samples_within(const Outcome *reference) {
+    const double horizon = reference->summary.trust_horizon;
+    const size_t count = reference->response.count;
+    if (isnan(horizon))
+        return count;
+    const double within = floor(horizon * reference->response.sample_rate) + 1;
+    return within < (double)count ? (size_t)within : count;
+}
+
+// Sample i of the reference stands at index at + part of the point's, 0 <= part < 1.
+typedef struct Place {
+    size_t at;
+    double part;
+} Place;
+
+static Place place_of(size_t i, const Response *reference, const Response *point) {
+    const double index = (double)i * point->sample_rate / reference->sample_rate;
+    const double at = floor(index * (1 + 1e-12));
+    const double part = index - at;
+    return (Place){(size_t)at, part > 1e-9 ? part : 0};
+}
+
+static double displacement_error(const Compared *reference, const Compared *point, size_t count) {
+    const Response *from = &reference->outcome->response, *to = &point->outcome->response;
+    double largest = 0, worst = 0;
+    for (size_t s = 0; s < reference->storeys; s++) {
+        const double *x = from->series.at[s].values, *y = to->series.at[s].values;
+        for (size_t i = 0; i < from->count; i++)
+            largest = fmax(largest, fabs(x[i]));
+        for (size_t i = 0; i < count; i++) {
+            const Place place = place_of(i, from, to);
+            if (place.at + (place.part > 0) >= to->count)
+                break;
+            double value = y[place.at];
+            if (place.part > 0)
+                value += place.part * (y[place.at + 1] - value);
+            worst = fmax(worst, fabs(value - x[i]));
+        }
+    }
+    return ratio(worst, largest);
+}
+
+static double acceleration_error(const Compared *reference, const Compared *point, size_t count) {
+    const Response *from = &reference->outcome->response, *to = &point->outcome->response;
+    double squares = 0, differences = 0;
+    for (size_t s = 0; s < reference->storeys; s++) {
+        const double *x = from->series.at[reference->storeys + s].values;
+        const double *y = to->series.at[reference->storeys + s].values;
+        for (size_t i = 0; i < count; i++) {
+            const Place place = place_of(i, from, to);
+            const size_t at = place.at + (place.part > 0); // the mean before its sample
+            if (at >= to->count)
+                break;
+            squares += x[i] * x[i];
+            differences += (y[at] - x[i]) * (y[at] - x[i]);
+        }
+    }
+    return sqrt(ratio(differences, squares));
+}
+
+typedef struct Within {
+    uint64_t impacts;
+    double peak; // NAN where no contact has one
+} Within;
+
+// Of the contacts that begin within the horizon.
+static Within ledger_within(const Impacts *impacts, double horizon) {
+    Within within = {0, (double)NAN};
+    for (size_t i = 0; i < impacts->count; i++) {
+        const Impact *impact = &impacts->at[i];
+        if (impact->start > horizon)
+            continue;
+        within.impacts += impact->kind == IMPACT_IMPACT;
+        within.peak = fmax(within.peak, impact->peak_force);
+    }
+    return within;
+}
+
+// The bins, from 1 on, that hold all but a thousandth of the power.
+static size_t band_end(const double *density, size_t rows) {
+    double all = 0, sum = 0;
+    for (size_t k = 1; k < rows; k++)
+        all += density[k];
+    if (!(all > 0))
+        return 0;
+    size_t end = 1;
+    while (end < rows && sum < band_power * all)
+        sum += density[end++];
+    return end;
+}
+
+// The density at a frequency, on the line between the bins beside it. NAN beyond the last one.
+static double density_at(const Spectrum *spectrum, const double *density, double frequency) {
+    const size_t last = spectrum->densities.rows - 1;
+    if (last < 1 || frequency > spectrum->frequency[last] * (1 + 1e-12))
+        return (double)NAN;
+    const double index = frequency / spectrum->frequency[1];
+    if (index <= 1)
+        return density[1]; // the mean is taken off: bin 0 says nothing of what is beside it
+    const size_t at = index * (1 + 1e-12) >= (double)last ? last : (size_t)(index * (1 + 1e-12));
+    const double part = index - (double)at;
+    return at == last || part < 1e-9 ? density[at]
+                                     : density[at] + part * (density[at + 1] - density[at]);
+}
+
+static double channel_distance(const Spectrum *reference, const double *wanted,
+                               const Spectrum *point, const double *density) {
+    const size_t end = band_end(wanted, reference->densities.rows);
+    double squares = 0;
+    size_t count = 0;
+    for (size_t k = 1; k < end; k++) {
+        if (!(wanted[k] > 0))
+            continue;
+        const double level =
+            10 * log10(density_at(point, density, reference->frequency[k]) / wanted[k]);
+        squares += level * level;
+        count++;
+    }
+    return count > 0 && isfinite(squares) ? sqrt(squares / (double)count) : (double)NAN;
+}
+
+// Of the channel that is farthest off.
+static double psd_error(const Spectrum *reference, const Spectrum *point) {
+    const size_t count = reference->densities.count;
+    double worst = (double)NAN;
+    for (size_t i = 0; i < count && i < point->densities.count; i++) {
+        const double own = channel_distance(reference, reference->densities.at[i].values, point,
+                                            point->densities.at[i].values);
+        if (isnan(own))
+            return own;
+        worst = fmax(worst, own);
+    }
+    return worst;
+}
+
+void errors_reference(const Compared *reference, TradeoffReference *told) {
+    const Outcome *outcome = reference->outcome;
+    const double horizon = outcome->summary.trust_horizon;
+    const Within within =
+        ledger_within(&outcome->response.impacts, isnan(horizon) ? (double)INFINITY : horizon);
+    told->error_estimate = own_error(&outcome->summary);
+    told->trust_horizon = horizon;
+    told->impacts = within.impacts;
+    told->peak_force = within.peak;
+    told->largest = outcome->summary.peak_displacement;
+    told->psd_from = told->psd_to = (double)NAN;
+    const Spectrum *spectrum = &outcome->spectrum;
+    for (size_t i = 0; i < spectrum->densities.count; i++) {
+        const size_t end = band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
+        if (end < 2)
+            continue;
+        told->psd_from = spectrum->frequency[1];
+        told->psd_to = fmax(told->psd_to, spectrum->frequency[end - 1]);
+    }
+}
+
+TradeoffErrors errors_measure(const Compared *reference, const Compared *point) {
+    const Outcome *from = reference->outcome, *to = point->outcome;
+    TradeoffErrors errors = {.displacement = (double)NAN,
+                             .mean_acceleration = (double)NAN,
+                             .peak_force = (double)NAN,
+                             .impacts = (double)NAN,
+                             .psd = psd_error(&from->spectrum, &to->spectrum),
+                             .rms_displacement = (double)NAN};
+    if (!point->has_motion)
+        return errors;
+    const size_t count = samples_within(from);
+    if (count > 1) {
+        // Nothing closer than the reference itself can be told.
+        errors.displacement =
+            fmax(displacement_error(reference, point, count), own_error(&from->summary));
+        errors.mean_acceleration = acceleration_error(reference, point, count);
+    }
+    const double horizon =
+        isnan(from->summary.trust_horizon) ? (double)INFINITY : from->summary.trust_horizon;
+    const Within a = ledger_within(&from->response.impacts, horizon);
+    const Within b = ledger_within(&to->response.impacts, horizon);
+    errors.impacts = fabs((double)a.impacts - (double)b.impacts);
+    if (point->has_force && reference->has_force && !isnan(a.peak))
+        errors.peak_force = ratio(fabs(fmax(b.peak, 0) - a.peak), a.peak);
+    errors.rms_displacement =
+        ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
+              from->summary.rms_displacement);
+    return errors;
+}

@@ -1,0 +1,290 @@
+#!/usr/bin/env python3
+"""The study tradeoff: its command, its jobs, its table and its chart."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+SANITIZED = True
+SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
+SVG = "{http://www.w3.org/2000/svg}"
+ERRORS = ["displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement"]
+QUICK = ["--repeats", "1", "--point-steps", "1e6"]
+
+
+def study(name="paper_free_sponge", **members):
+    """A scene with a quick study."""
+    return {**program.scene(name), "study": {"kind": "tradeoff", "repeats": 1, "point_steps": 1e6, **members}}
+
+
+def check_table(table):
+    """What holds in every table."""
+    points = table["points"]
+    assert list(points[0]["errors"]) == ERRORS
+    for point in points:
+        if point["status"] == "measured":
+            assert 0 < point["cpu_minimum"] <= point["cpu_median"], point
+            assert point["steps"] > 0 and point["runs"] >= table["repeats"] and point["why"] is None, point
+        else:
+            assert point["why"] and point["cpu_minimum"] is None and not point["is_best"], point
+            assert all(value is None for value in point["errors"].values()), point
+
+    def both(point):
+        return point["cpu_minimum"], point["errors"][table["metric"]]
+
+    sound = [p for p in points if p["status"] == "measured" and both(p)[1] is not None]
+    for point in sound:
+        beaten = any(all(a <= b for a, b in zip(both(other), both(point))) and both(other) != both(point)
+                     for other in sound)
+        assert point["is_best"] != beaten, point
+    chosen = table["recommendation"]["point"]
+    keep = [p for p in sound if both(p)[1] <= table["error"]]
+    assert (chosen is None) == (not keep)
+    if keep:
+        alike = [p for p in keep if p["cpu_minimum"] <= 1.25 * min(q["cpu_minimum"] for q in keep)]
+        assert points[chosen - 1] == min(alike, key=lambda p: (p["errors"][table["metric"]], p["cpu_minimum"]))
+        assert points[chosen - 1]["name"] in table["recommendation"]["why"]
+
+
+def check_chart(text, table):
+    """Well-formed, in the page's colours by media query, no foreign thing, and every point is in it."""
+    root = xml.etree.ElementTree.fromstring(text)
+    assert root.tag == SVG + "svg" and root.get("viewBox").startswith("0 0 640 ")
+    assert "@media (prefers-color-scheme: dark)" in text
+    assert "url(" not in text and "href" not in text and "@import" not in text and "<script" not in text
+    titles = [mark.find(SVG + "title").text for mark in root.iter(SVG + "path") if mark.find(SVG + "title") is not None]
+    told = root.find(SVG + "desc").text
+    drawn = 0
+    for point in table["points"]:
+        if point["status"] == "measured" and point["errors"][table["metric"]] is not None:
+            assert sum(title.startswith(point["name"] + ": ") for title in titles) == 1, point["name"]
+            drawn += 1
+        else:
+            assert "Not drawn: " + point["name"] in told, point["name"]
+    assert drawn == len(titles) > 3
+
+
+def test_the_command_prints_a_table_and_writes_table_and_chart():
+    """`tradeoff` prints every point aligned, with what to take; -o may be given again, for json and svg."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [os.path.join(folder, name) for name in ("out.json", "out.svg")]
+        code, out, errors = program.run("tradeoff", SPONGE, *QUICK, "-o", paths[0], "-o", paths[1])
+        assert (code, errors) == (0, ""), (code, errors)
+        assert sorted(os.listdir(folder)) == ["out.json", "out.svg"]
+        with open(paths[0], encoding="utf-8") as file:
+            table = json.load(file)
+        check_table(table)
+        with open(paths[1], encoding="utf-8") as file:
+            check_chart(file.read(), table)
+    assert table["kind"] == "tradeoff" and table["repeats"] == 1 and table["error"] == 1e-3
+    solvers = {point["solver"] for point in table["points"]}
+    assert {"exact", "precise", "rk4", "newmark"} <= solvers, solvers
+    lines = out.splitlines()
+    assert lines[0].startswith("Errors against exact, whose own is 1.7e-13;"), lines[0]
+    for point in table["points"]:
+        assert sum((line[2:] + "  ").startswith(point["name"] + "  ") for line in lines) == 1, point["name"]
+    rows = [line for line in lines if line[:2] in ("> ", "* ", "  ") and not line.startswith("* no other")]
+    measured = [line for line in rows if "refused" not in line and "failed" not in line]
+    assert len({len(line) for line in measured}) == 1 and len(measured[0]) <= 110, measured
+    assert sum(line.startswith("> ") for line in lines) == 1
+    assert table["recommendation"]["why"] in out
+
+
+def test_settings_are_the_studys():
+    """--error, --metric, --solver and a study in the scene say the same; flags come first."""
+    code, out, errors = program.run("tradeoff", SPONGE, *QUICK, "--metric", "psd", "--error", "30",
+                                    "--solver", "exact", "--solver", "rk4")
+    assert code == 0 and "newmark" not in out and "precise" not in out and "rk4, step" in out, (out, errors)
+    assert "within 30 dB" in out
+    scene = json.dumps(study(metric="impacts", solvers=["exact"]))
+    code, out, errors = program.run("tradeoff", "-", *QUICK, text=scene)
+    assert code == 0 and "keeps impacts within 0" in out and "rk4" not in out, (out, errors)
+    code, out, errors = program.run("tradeoff", "-", *QUICK, "--metric", "peak_force", text=scene)
+    assert code == 0 and "keeps peak_force within 0.01" in out, (out, errors)
+    code, out, errors = program.run("tradeoff", "-", *QUICK, "--error", "1e-20", text=json.dumps(study()))
+    assert code == 0 and "no point keeps displacement within 1e-20; the closest, exact, is at 1.7e-13" in out
+
+
+def test_faults_have_their_exit_codes():
+    """2 for wrong words, 3 for a scene or study with faults, 4 for a missing file, 1 for what cannot be written."""
+    for arguments, code, expected in [
+            (("tradeoff",), 2, "takes one scene"),
+            (("tradeoff", SPONGE, "-o", "out.csv"), 2, ".svg"),
+            (("tradeoff", SPONGE, "--metric", "pds"), 2, "did you mean psd?"),
+            (("tradeoff", SPONGE, "--eror", "1"), 2, "did you mean --error?"),
+            (("tradeoff", SPONGE, "--error", "-1"), 3, "/study/error: must be at least 0"),
+            (("tradeoff", SPONGE, "--repeats", "0"), 3, "/study/repeats: must be within [1, 1000]"),
+            (("tradeoff", SPONGE, "--solver", "rk5"), 3, 'did you mean "rk4"?'),
+            (("tradeoff", SPONGE, "-o", "/nonexistent/out.svg"), 1, "cannot be written"),
+            (("tradeoff", "/nonexistent.json"), 4, "cannot be read")]:
+        done, out, errors = program.run(*arguments)
+        assert done == code and expected in errors and out == "", (arguments, done, out, errors)
+    code, _, errors = program.run("run", "-", text=json.dumps(study()))
+    assert code == 3 and "impactd tradeoff" in errors, (code, errors)
+    code, out, _ = program.run("check", "-", text=json.dumps(study()))
+    assert code == 0 and "Study: tradeoff" in out
+    code, out, _ = program.run("tradeoff", "--help")
+    assert code == 0 and out.splitlines()[2].strip().startswith("impactd tradeoff scene.json"), out
+
+
+def test_an_interrupt_stops_at_once():
+    """Ctrl-C ends a long study within half a second, exit code 130, and leaves no file."""
+    scene = study(repeats=20, point_steps=2e7)
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "scene.json")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(scene, file)
+        process = subprocess.Popen([program.impactd(), "tradeoff", path, "-o", os.path.join(folder, "out.svg")],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        time.sleep(1)
+        assert process.poll() is None, process.communicate()
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+        assert process.returncode == 130 and time.monotonic() - began < 0.5
+        assert os.listdir(folder) == ["scene.json"]
+
+
+def test_errors_are_the_same_each_time():
+    """Two runs differ in their CPU times and in what follows of them, in nothing else."""
+    tables = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("a.json", "b.json"):
+            path = os.path.join(folder, name)
+            assert program.run("tradeoff", SPONGE, *QUICK, "-o", path)[0] == 0
+            with open(path, encoding="utf-8") as file:
+                tables.append(json.load(file))
+    for table in tables:
+        del table["recommendation"]
+        for point in table["points"]:
+            for name in ("cpu_minimum", "cpu_median", "runs", "is_best"):
+                del point[name]
+    assert tables[0] == tables[1]
+
+
+def test_a_job_makes_the_study():
+    """POST with "study": the result has the table and the scene's own series; both never change."""
+    with program.daemon() as daemon:
+        scene = study()
+        plan = daemon.request("POST", "/v1/jobs?dry_run=1", json=scene).json()
+        alone = daemon.request("POST", "/v1/jobs?dry_run=1", json=program.scene("paper_free_sponge")).json()
+        assert plan["cost"]["cpu_seconds"] > 10 * alone["cost"]["cpu_seconds"] and plan["result"] != alone["result"]
+        assert plan["scene"]["study"]["error"] == 1e-3, plan["scene"]["study"]
+        job = program.finished(daemon, scene)
+        assert job["result"] == plan["result"] and job["summary"]["impacts"] == 22
+        base = "/v1/results/" + job["result"]
+        result = daemon.get(base).json()
+        table = daemon.get(base + "/tradeoff.json")
+        assert table.json() == result["study"] and result["links"]["tradeoff"] == base + "/tradeoff.json"
+        check_table(table.json())
+        chart = daemon.get(result["links"]["tradeoff.svg"])
+        assert chart.headers["content-type"] == "image/svg+xml"
+        check_chart(chart.body.decode(), table.json())
+        assert daemon.get(base + "/tradeoff", headers={"Accept": "image/svg+xml"}).body == chart.body
+        assert daemon.get(base + "/tradeoff", headers={"Accept": "application/json"}).body == table.body
+        assert daemon.get(base + "/tradeoff.json", headers={"If-None-Match": table.headers["etag"]}).status == 304
+        manifest = daemon.get(base + "/manifest").json()
+        assert manifest["scene"]["study"]["kind"] == "tradeoff" and "CPU time" in manifest["again"]["why"]
+        series = daemon.get(base + "/series.json").json()
+        own = program.finished(daemon, program.scene("paper_free_sponge"))
+        assert series == daemon.get(f"/v1/results/{own['result']}/series.json").json()
+        again = daemon.submit(scene, wait=20).json()
+        assert again["cached"] and again["result"] == job["result"]
+        assert daemon.get(base + "/tradeoff.json").body == table.body
+        anew = program.finished(daemon, study(trial=2))
+        assert not anew["cached"] and anew["result"] != job["result"]
+        other = daemon.get(f"/v1/results/{anew['result']}/tradeoff.json").json()
+        assert [p["errors"] for p in other["points"]] == [p["errors"] for p in table.json()["points"]]
+        reply = daemon.get(f"/v1/results/{own['result']}/tradeoff.json")
+        assert reply.status == 404 and "study" in reply.json()["detail"]
+        assert daemon.get(f"/v1/results/{own['result']}").json()["study"] is None
+
+
+def test_a_study_outlives_the_daemon():
+    """Table and chart are the same bytes after a restart, and the series is computed anew."""
+    with tempfile.TemporaryDirectory() as folder:
+        bodies = []
+        for _ in range(2):
+            with program.daemon(data=folder) as daemon:
+                job = program.finished(daemon, study(solvers=["exact", "rk4"]))
+                base = "/v1/results/" + job["result"]
+                bodies.append([daemon.get(base + way).body for way in
+                               ("", "/tradeoff.json", "/tradeoff.svg", "/series.csv")])
+        assert bodies[0] == bodies[1]
+
+
+def test_progress_and_cancel():
+    """A long study tells its progress and can be dismissed; nothing of it is kept."""
+    with program.daemon() as daemon:
+        scene = study(repeats=25, point_steps=1e7)
+        job = daemon.submit(scene, headers={"Prefer": "respond-async"}).json()
+        seen, end = [0], time.monotonic() + 60
+        while seen[-1] <= 10:
+            assert time.monotonic() < end, seen
+            shown = daemon.get("/v1/jobs/" + job["id"]).json()
+            assert shown["status"] in ("accepted", "running"), shown
+            assert shown["progress"] >= seen[-1], (seen, shown["progress"])
+            seen.append(shown["progress"])
+            time.sleep(0.02)
+        began = time.monotonic()
+        gone = daemon.request("DELETE", "/v1/jobs/" + job["id"]).json()
+        assert gone["status"] == "dismissed" and gone["result"] is None
+        while daemon.get("/health/ready").json().get("running"):
+            assert time.monotonic() - began < 10
+            time.sleep(0.01)
+        # The one worker is free again at once.
+        program.finished(daemon, program.scene("paper_free_sponge"))
+        assert time.monotonic() - began < 5 or program.is_sanitized()
+
+
+def test_faults_of_a_study_are_told_with_the_scenes():
+    """422 with the pointer; what is too long in all is refused before anything runs."""
+    with program.daemon("--max-steps", "1000000") as daemon:
+        for members, pointer, expected in [
+                ({"kind": "trade"}, "/study/kind", "must be one of tradeoff"),
+                ({"kind": 5}, "/study/kind", "must be a string"),
+                ({"metric": "peak"}, "/study/metric", "must be one of displacement"),
+                ({"solvers": ["exact", "rk5"]}, "/study/solvers/1", "must be one of exact"),
+                ({"eror": 1}, "/study/eror", "unknown key"),
+                ({"trial": 0}, "/study/trial", "must be at least 1"),
+                ({"repeats": 1000}, "/study", "solver steps in all, must be at most 1e+07")]:
+            reply = daemon.submit(study(**members))
+            faults = reply.json()["errors"]
+            assert reply.status == 422 and [f["pointer"] for f in faults] == [pointer], (members, faults)
+            assert expected in faults[0]["detail"], faults
+        both = study(metric="peak")
+        both["structure"]["mass"] = -1
+        assert {f["pointer"] for f in daemon.submit(both).json()["errors"]} == {"/study/metric", "/structure/mass"}
+        no_psd = study(metric="psd")
+        no_psd["output"] = {"psd": None}
+        assert daemon.submit(no_psd).json()["errors"][0]["pointer"] == "/study/metric"
+
+
+def test_wrong_types_in_a_study():
+    """Every member of a study gets a value of every other type: 422 at its place, or a plan."""
+    with program.daemon() as daemon:
+        refused = 0
+        for name in ("kind", "error", "metric", "repeats", "solvers", "point_steps", "trial"):
+            for wrong in (None, True, -1, 1e308, 0.5, "x", [], {}, [[]], ["x", "x"], {"x": 1}):
+                reply = daemon.request("POST", "/v1/jobs?dry_run=1", json=study(**{name: wrong}))
+                assert reply.status in (200, 422), (name, wrong, reply)
+                if reply.status == 422:
+                    refused += 1
+                    pointers = [fault["pointer"] for fault in reply.json()["errors"]]
+                    assert all(p == "/study" or p.startswith("/study/" + name) for p in pointers), (name, wrong, pointers)
+        assert refused > 50, refused
+        for wrong in (None, True, 1, "tradeoff", [], [{}]):
+            reply = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": wrong})
+            assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == "/study", (wrong, reply)
+
+
+if __name__ == "__main__":
+    program.main(globals())

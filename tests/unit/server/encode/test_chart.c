@@ -1,0 +1,114 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/encode/chart.h"
+
+static TradeoffPoint point_make(char *name, char *solver, double cpu, double error) {
+    TradeoffPoint point;
+    assert_int_equal(fields_default(tradeoff_point_fields, &point), STATUS_OK);
+    point.name = name;
+    point.solver = solver;
+    point.cpu_minimum = cpu;
+    point.errors.displacement = error;
+    return point;
+}
+
+static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t choice) {
+    const Tradeoff tradeoff = {.metric = TRADEOFF_DISPLACEMENT,
+                               .error = error,
+                               .points = {points, count},
+                               .recommendation = {choice, "because a < b & c"}};
+    Bytes bytes = {0};
+    chart_tradeoff(&tradeoff, &bytes);
+    char *text = bytes_take(&bytes, NULL);
+    assert_non_null(text);
+    assert_null(strstr(text, "nan"));
+    assert_null(strstr(text, "inf"));
+    return text;
+}
+
+static size_t count_of(const char *text, const char *part) {
+    size_t count = 0;
+    for (const char *at = text; (at = strstr(at, part)) != NULL; at++)
+        count++;
+    return count;
+}
+
+static void every_measured_point_has_a_mark_and_the_others_are_told(void **state) {
+    (void)state;
+    TradeoffPoint points[] = {
+        point_make("exact", "exact", 1e-5, 1e-13),
+        point_make("rk4, step 0.001 s", "rk4", 1e-3, 1e-2),
+        point_make("rk4, step 0.0001 s", "rk4", 1e-2, 1e-6),
+        point_make("rk4, step 1e-05 s", "rk4", (double)NAN, (double)NAN),
+        point_make("exact, shorter", "exact", 1e-6, (double)NAN),
+    };
+    points[0].is_best = true;
+    points[3].status = TRADEOFF_REFUSED;
+    points[3].why = "1e9 steps > 1e7";
+    char *text = draw(points, COUNT(points), 1e-3, 1);
+    assert_int_equal(count_of(text, "<title>"), 1 + 3);
+    assert_int_equal(count_of(text, "<title>rk4, step 0.001 s: 0.01 in 0.001 s"), 1);
+    assert_int_equal(count_of(text, "class=\"line s1\""), 1);
+    assert_int_equal(count_of(text, "Not drawn: "), 2);
+    assert_non_null(strstr(text, "Not drawn: rk4, step 1e-05 s, because: 1e9 steps &gt; 1e7."));
+    assert_non_null(strstr(text, "because a &lt; b &amp; c"));
+    assert_int_equal(count_of(text, "class=\"ring\""), 2); // its own and the legend's
+    assert_non_null(strstr(text, ">wanted: 0.001"));
+    assert_non_null(strstr(text, "prefers-color-scheme: dark"));
+    free(text);
+}
+
+static void an_error_of_0_stands_on_the_floor(void **state) {
+    (void)state;
+    TradeoffPoint points[] = {point_make("exact", "exact", 1e-5, 0),
+                              point_make("rk4", "rk4", 1e-3, 3)};
+    char *text = draw(points, COUNT(points), 0, COUNT_ABSENT);
+    assert_non_null(strstr(text, ">0</text>"));
+    assert_null(strstr(text, ">wanted"));
+    assert_int_equal(count_of(text, "class=\"mark s0\""), 2);
+    assert_non_null(strstr(text, " 376.0)")); // at the bottom of the plot
+    free(text);
+}
+
+static void there_may_be_nothing_to_draw(void **state) {
+    (void)state;
+    char *text = draw(NULL, 0, 1e-3, COUNT_ABSENT);
+    assert_int_equal(count_of(text, "class=\"mark"), 0);
+    free(text);
+    TradeoffPoint one = point_make("exact", "exact", 1e-5, 1e-3);
+    text = draw(&one, 1, 1e-3, 7); // no such number
+    assert_int_equal(count_of(text, "class=\"mark"), 2);
+    free(text);
+}
+
+static void more_groups_than_colours_share_the_last_one(void **state) {
+    (void)state;
+    TradeoffPoint points[20];
+    char names[20][8];
+    for (size_t i = 0; i < COUNT(points); i++) {
+        snprintf(names[i], sizeof names[i], "s%zu", i);
+        points[i] = point_make(names[i], names[i], 1e-5 * (double)(i + 1), 1e-3);
+    }
+    char *text = draw(points, COUNT(points), 1e-3, 20);
+    assert_int_equal(count_of(text, "<title>s"), 20);
+    free(text);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_measured_point_has_a_mark_and_the_others_are_told),
+        cmocka_unit_test(an_error_of_0_stands_on_the_floor),
+        cmocka_unit_test(there_may_be_nothing_to_draw),
+        cmocka_unit_test(more_groups_than_colours_share_the_last_one),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
