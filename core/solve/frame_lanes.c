@@ -4,7 +4,10 @@
 
 #include <stdint.h>
 
-enum { LANES = FRAME_LANES, LARGE = 4096 };
+#include "core/solve/lanes.h"
+
+enum { LARGE = 4096 };
+_Static_assert((int)LANES == (int)FRAME_LANES, "one width for both");
 
 static inline double total(const double s[LANES]) {
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
@@ -39,11 +42,5 @@ const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(plain
 #endif
 
 size_t frame_lanes_widest(void) {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return 2;
-    if (__builtin_cpu_supports("avx2"))
-        return 1;
-#endif
-    return 0;
+    return (size_t)lanes_widest();
 }

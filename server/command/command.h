@@ -4,6 +4,7 @@
 #define SERVER_COMMAND_COMMAND_H
 
 #include "core/base/field.h"
+#include "server/options.h"
 
 // Exit codes of the program.
 typedef enum CommandExit {
@@ -37,6 +38,12 @@ int command_main(int argc, char *const *argv);
 // Usage faults on stderr, "impactd run: --outpt is no option (did you mean --output?)"; returns
 // COMMAND_USAGE.
 int command_refuse(const char *name, const Problem *problem);
+
+// Reads the options of command `name` into `settings`, a struct of `fields`, goes on with them and
+// clears them. Returns the exit code.
+int command_with_options(const char *name, const Field *fields, void *settings, int argc,
+                         char *const *argv,
+                         int (*go_on)(void *settings, const Options *options, Problem *problem));
 
 // What a Status means to a shell.
 int command_exit(Status status);

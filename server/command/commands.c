@@ -129,6 +129,24 @@ int command_refuse(const char *name, const Problem *problem) {
     return COMMAND_USAGE;
 }
 
+int command_with_options(const char *name, const Field *fields, void *settings, int argc,
+                         char *const *argv,
+                         int (*go_on)(void *settings, const Options *options, Problem *problem)) {
+    Options options;
+    Problem *problem = calloc(1, sizeof *problem);
+    if (problem == NULL || fields_default(fields, settings) != STATUS_OK) {
+        free(problem);
+        return command_exit(STATUS_NO_MEMORY);
+    }
+    const int code =
+        options_read(fields, settings, argc, argv, NULL, &options, problem) == STATUS_OK
+            ? go_on(settings, &options, problem)
+            : command_refuse(name, problem);
+    fields_clear(fields, settings);
+    free(problem);
+    return code;
+}
+
 int command_exit(Status status) {
     switch (status) {
     case STATUS_OK:

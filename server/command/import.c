@@ -117,7 +117,8 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
     return status;
 }
 
-static int import(const ImportSettings *settings, const Options *options, Problem *problem) {
+static int import(void *of, const Options *options, Problem *problem) {
+    const ImportSettings *settings = of;
     if (options->operand_count != 1) {
         (void)problem_set(problem, STATUS_USAGE, "takes one file, is given %zu",
                           options->operand_count);
@@ -137,19 +138,7 @@ static int import(const ImportSettings *settings, const Options *options, Proble
 
 static int import_run(int argc, char *const *argv) {
     ImportSettings settings;
-    Options options;
-    Problem *problem = calloc(1, sizeof *problem);
-    if (problem == NULL || fields_default(import_fields, &settings) != STATUS_OK) {
-        free(problem);
-        return command_exit(STATUS_NO_MEMORY);
-    }
-    const int code =
-        options_read(import_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
-            ? import(&settings, &options, problem)
-            : command_refuse("import", problem);
-    fields_clear(import_fields, &settings);
-    free(problem);
-    return code;
+    return command_with_options("import", import_fields, &settings, argc, argv, import);
 }
 
 const Command command_import = {

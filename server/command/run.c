@@ -178,7 +178,8 @@ static Status encoder_choose(const char *output, const Encoder **encoder, Proble
                        output);
 }
 
-static int run(const RunSettings *settings, const Options *options, Problem *problem) {
+static int run(void *of, const Options *options, Problem *problem) {
+    const RunSettings *settings = of;
     const Encoder *encoder = NULL;
     Status status = encoder_choose(settings->output, &encoder, problem);
     if (status == STATUS_OK && options->operand_count != 1)
@@ -200,19 +201,7 @@ static int run(const RunSettings *settings, const Options *options, Problem *pro
 
 static int run_run(int argc, char *const *argv) {
     RunSettings settings;
-    Options options;
-    Problem *problem = calloc(1, sizeof *problem);
-    if (problem == NULL || fields_default(run_fields, &settings) != STATUS_OK) {
-        free(problem);
-        return command_exit(STATUS_NO_MEMORY);
-    }
-    const int code =
-        options_read(run_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
-            ? run(&settings, &options, problem)
-            : command_refuse("run", problem);
-    fields_clear(run_fields, &settings);
-    free(problem);
-    return code;
+    return command_with_options("run", run_fields, &settings, argc, argv, run);
 }
 
 const Command command_run = {

@@ -213,7 +213,8 @@ static Status scene_study(const char *path, const Bytes *text, TradeoffSettings 
     return status;
 }
 
-static int tradeoff(TradeoffSettings *settings, const Options *options, Problem *problem) {
+static int tradeoff(void *of, const Options *options, Problem *problem) {
+    TradeoffSettings *settings = of;
     Status status = STATUS_OK;
     for (size_t i = 0; i < settings->output.count; i++)
         if (!is_chart(settings->output.at[i]) && !is_table(settings->output.at[i]))
@@ -239,19 +240,7 @@ static int tradeoff(TradeoffSettings *settings, const Options *options, Problem 
 
 static int tradeoff_run(int argc, char *const *argv) {
     TradeoffSettings settings;
-    Options options;
-    Problem *problem = calloc(1, sizeof *problem);
-    if (problem == NULL || fields_default(tradeoff_fields, &settings) != STATUS_OK) {
-        free(problem);
-        return command_exit(STATUS_NO_MEMORY);
-    }
-    const int code =
-        options_read(tradeoff_fields, &settings, argc, argv, NULL, &options, problem) == STATUS_OK
-            ? tradeoff(&settings, &options, problem)
-            : command_refuse("tradeoff", problem);
-    fields_clear(tradeoff_fields, &settings);
-    free(problem);
-    return code;
+    return command_with_options("tradeoff", tradeoff_fields, &settings, argc, argv, tradeoff);
 }
 
 const Command command_tradeoff = {
