@@ -121,13 +121,30 @@ def test_ambiguous_heads_are_refused_and_the_connection_closed():
         assert daemon.get("/version").status == 200
 
 
+def stop_within_a_head(daemon, data):
+    """Sends less than a head and then nothing more: what the daemon says of that within a second. The connection may stay
+    until the daemon's patience with an idle one ends."""
+    with connect(daemon) as client:
+        got = b""
+        try:
+            client.sendall(data)
+            client.shutdown(socket.SHUT_WR)
+            client.settimeout(1)
+            while piece := client.recv(65536):
+                got += piece
+        except (ConnectionError, TimeoutError):
+            pass
+    return [int(code) for code in re.findall(rb"^HTTP/1\.1 (\d{3}) ", got, re.M)], got
+
+
 def test_garbage_is_not_served():
-    """Bytes that are no HTTP at all end in a 4xx or a closed connection."""
+    """Bytes that are no HTTP at all end in a 4xx or a closed connection, or are not answered."""
     with program.daemon() as daemon:
         for data in (b"garbage\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"GET\r\n\r\n", b"GET /version\r\n\r\n",
                      b"\x00" * 5000, b"\r\n" * 3000, os.urandom(3000), b"GET /version HTTP/1.1 extra\r\n" + HOST + b"\r\n",
                      GET + HOST + b" folded: x\r\n\r\n", GET + b": x\r\n" + HOST + b"\r\n", b"A" * 70000):
-            statuses, got = exchange(daemon, data, ends=True)
+            has_head = b"\r\n\r\n" in data.lstrip(b"\r\n")
+            statuses, got = exchange(daemon, data, ends=True) if has_head else stop_within_a_head(daemon, data)
             assert all(status >= 400 for status in statuses), (data[:60], got)
         assert daemon.get("/version").status == 200
 
