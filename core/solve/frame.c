@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/solve/frame_neighbour.h"
+#include "core/solve/frame_record.h"
 
 static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
     Frame *frame = &engine->frame;
@@ -24,16 +25,7 @@ static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
     TRY(frame_engine_cross(engine, plan->duration - (double)frame->sample / plan->sample_rate));
     frame_record_note(frame);
     TRY(frame_engine_check(engine));
-    LedgerRow *rows = calloc(frame->dampers + 1, sizeof *rows);
-    if (rows == NULL)
-        return problem_set(frame->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
-    for (size_t d = 0; d < frame->dampers; d++)
-        rows[d] = frame->damper[d].row;
-    const EnergyState energy = frame_energy(frame);
-    const Status status =
-        ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
-    free(rows);
-    return status;
+    return frame_record_ledger(frame);
 }
 
 Status frame_run(Run *run, Response *response, Problem *problem) {

@@ -297,3 +297,16 @@ void frame_record_note(Frame *frame) {
     const EnergyState energy = frame_energy(frame);
     ledger_balance(&frame->ledger, &energy);
 }
+
+Status frame_record_ledger(Frame *frame) {
+    LedgerRow *rows = calloc(frame->dampers + 1, sizeof *rows);
+    if (rows == NULL)
+        return problem_set(frame->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
+    for (size_t d = 0; d < frame->dampers; d++)
+        rows[d] = frame->damper[d].row;
+    const EnergyState energy = frame_energy(frame);
+    const Status status =
+        ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
+    free(rows);
+    return status;
+}

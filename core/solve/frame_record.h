@@ -1,5 +1,6 @@
 // Writes the general engine's samples into the wanted columns, and takes peaks and sums over all
-// storeys and dampers. Not the ledger of impacts (ledger.h). Used by core/solve/frame*.c.
+// storeys and dampers. Not the ledger of impacts (ledger.h), but for its end. Used by
+// core/solve/frame*.c and steps*.c.
 #ifndef CORE_SOLVE_FRAME_RECORD_H
 #define CORE_SOLVE_FRAME_RECORD_H
 
@@ -29,6 +30,8 @@ void frame_record_take(FrameRecord *record, Frame *frame, size_t count);
 // Takes their peaks, all of them being samples of flight.
 void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count);
 void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response);
+// The run is over: the ledger lists what is still open and writes its energies.
+Status frame_record_ledger(Frame *frame);
 
 // Takes peaks at this instant, after frame_feel; of accelerations alone.
 void frame_record_peaks(Frame *frame);

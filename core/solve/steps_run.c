@@ -261,16 +261,7 @@ static Status solve(Pair *pair, Response *response) {
     tell(pair, response);
     // The duration may end between samples.
     TRY(steps_finish(&pair->run, plan->duration - (double)frame->sample / plan->sample_rate));
-    LedgerRow *rows = calloc(frame->dampers + 1, sizeof *rows);
-    if (rows == NULL)
-        return problem_set(frame->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
-    for (size_t d = 0; d < frame->dampers; d++)
-        rows[d] = frame->damper[d].row;
-    const EnergyState energy = frame_energy(frame);
-    const Status status =
-        ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
-    free(rows);
-    return status;
+    return frame_record_ledger(frame);
 }
 
 Status steps_run_pair(Run *run, const Stepper *stepper, size_t share, size_t kinks,
