@@ -12,8 +12,9 @@
 // One choice of the planner, for people. Texts are static or live as long as the Decisions.
 typedef struct Decision {
     char *about, *chose, *why;
-    double value; // NAN if there is none
-    char *unit;   // NULL if there is none
+    double value;  // NAN if there is none
+    char *unit;    // NULL if there is none
+    double saving; // of what is left out: the part of the foretold cost; NAN: nothing is left out
 } Decision;
 typedef struct Decisions {
     Decision *at;
@@ -126,5 +127,8 @@ void warnings_clear(Warnings *warnings);
 Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
                      const char *unit, const char *format, ...)
     __attribute__((format(printf, 6, 7)));
+// Of something the scene does not require: chose "left_out".
+Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
+                      double saving, const char *format, ...) __attribute__((format(printf, 6, 7)));
 
 #endif

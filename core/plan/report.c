@@ -16,6 +16,7 @@ const Field decision_fields[] = {
     FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
     FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
+    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of what is left out: the part of the foretold cost that this saves"),
     FIELD_END
 };
 
@@ -96,30 +97,49 @@ void warnings_clear(Warnings *warnings) {
     *warnings = (Warnings){NULL, 0};
 }
 
-Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
-                     const char *unit, const char *format, ...) {
+// One line; its `why` is made of a format and arguments.
+static Status add(Decisions *decisions, const Decision *given, const char *format,
+                  va_list arguments) {
     if (decisions == NULL || decisions->count >= REPORT_LINES)
         return STATUS_OK;
     Decision *at = realloc(decisions->at, (decisions->count + 1) * sizeof *at);
     if (at == NULL)
         return STATUS_NO_MEMORY;
     decisions->at = at;
-    va_list arguments;
-    va_start(arguments, format);
     const Decision decision = {
-        .about = strdup(about),
-        .chose = strdup(chose),
+        .about = strdup(given->about),
+        .chose = strdup(given->chose),
         .why = text_of(format, arguments),
-        .value = value,
-        .unit = unit != NULL ? strdup(unit) : NULL,
+        .value = given->value,
+        .unit = given->unit != NULL ? strdup(given->unit) : NULL,
+        .saving = given->saving,
     };
-    va_end(arguments);
     at[decisions->count] = decision;
     if (decision.about == NULL || decision.chose == NULL || decision.why == NULL ||
-        (unit != NULL && decision.unit == NULL)) {
+        (given->unit != NULL && decision.unit == NULL)) {
         fields_clear(decision_fields, &at[decisions->count]);
         return STATUS_NO_MEMORY;
     }
     decisions->count++;
     return STATUS_OK;
+}
+
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
+                     const char *unit, const char *format, ...) {
+    const Decision given = {(char *)about, (char *)chose, NULL, value, (char *)unit, (double)NAN};
+    va_list arguments;
+    va_start(arguments, format);
+    const Status status = add(decisions, &given, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
+                      double saving, const char *format, ...) {
+    const Decision given = {(char *)about, (char *)"left_out", NULL, value, (char *)unit, saving};
+    va_list arguments;
+    va_start(arguments, format);
+    const Status status = add(decisions, &given, format, arguments);
+    va_end(arguments);
+    return status;
 }
