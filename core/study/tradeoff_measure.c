@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/compare.h"
 #include "core/study/tradeoff_budget.h"
 #include "core/study/tradeoff_choice.h"
-#include "core/study/tradeoff_errors.h"
 #include "core/study/tradeoff_ladder.h"
 
 enum { BATCH = 10000 };                   // runs of a timing at most
@@ -193,7 +193,7 @@ static Status measure_all(Session *session, Problem *problem) {
     const TradeoffPoints *points = &session->answer->points;
     TRY(make_reference(session, problem));
     const Compared reference = compare(session->reference, session->simulation, NULL);
-    errors_reference(&reference, &session->answer->reference);
+    session->answer->reference.yardstick = yardstick_make(&reference);
     session->done += BUDGET_BATCH;
     for (size_t i = 0; i < points->count; i++)
         TRY(measure_errors(session, i, problem));

@@ -1,9 +1,44 @@
 // A point may have fewer samples than the reference: then its displacement is the line between its
 // samples, and its mean acceleration holds for the whole of its interval. Both are what a reader of
 // the coarser series has.
-#include "core/study/tradeoff_errors.h"
+#include "core/simulation/compare.h"
 
 #include <string.h>
+
+const char *const metric_names[] = {
+    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
+};
+const char *const metric_units[] = {"", "", "", "", " dB", "", NULL};
+
+// clang-format off
+const Field error_fields[] = {
+    FIELD_REAL(Errors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),
+    FIELD_REAL(Errors, mean_acceleration, NULL, ANY, OPTIONAL, "rms of the difference over rms within the horizon"),
+    FIELD_REAL(Errors, peak_force, NULL, ANY, OPTIONAL, "difference of the largest contact force within the horizon, of that force; unknown where impacts have no force"),
+    FIELD_REAL(Errors, impacts, NULL, ANY, OPTIONAL, "impacts within the horizon, how many more or fewer"),
+    FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel that is farthest off; unknown where that band is not covered"),
+    FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "difference of the rms displacement of the whole run, of that rms"),
+    FIELD_END
+};
+
+const Field yardstick_fields[] = {
+    FIELD_REAL(Yardstick, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
+    FIELD_REAL(Yardstick, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
+    FIELD_COUNT(Yardstick, impacts, NULL, AT_LEAST(0), OPTIONAL, "its impacts within the horizon"),
+    FIELD_REAL(Yardstick, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),
+    FIELD_REAL(Yardstick, largest, "m", ANY, OPTIONAL, "its largest displacement"),
+    FIELD_REAL(Yardstick, psd_from, "Hz", ANY, OPTIONAL, "its spectra are compared from here"),
+    FIELD_REAL(Yardstick, psd_to, "Hz", ANY, OPTIONAL, "to here"),
+    FIELD_END
+};
+// clang-format on
+
+double errors_by(const Errors *errors, int metric) {
+    const double all[METRICS] = {errors->displacement, errors->mean_acceleration,
+                                 errors->peak_force,   errors->impacts,
+                                 errors->psd,          errors->rms_displacement};
+    return all[metric];
+}
 
 // The part of a spectrum's power that its band holds.
 static const double band_power = 0.999;
@@ -157,35 +192,37 @@ static double psd_error(const Spectrum *reference, const Spectrum *point) {
     return worst;
 }
 
-void errors_reference(const Compared *reference, TradeoffReference *told) {
+Yardstick yardstick_make(const Compared *reference) {
     const Outcome *outcome = reference->outcome;
     const double horizon = outcome->summary.trust_horizon;
     const Within within =
         ledger_within(&outcome->response.impacts, isnan(horizon) ? (double)INFINITY : horizon);
-    told->error_estimate = own_error(&outcome->summary);
-    told->trust_horizon = horizon;
-    told->impacts = within.impacts;
-    told->peak_force = within.peak;
-    told->largest = outcome->summary.peak_displacement;
-    told->psd_from = told->psd_to = (double)NAN;
+    Yardstick told = {.error_estimate = own_error(&outcome->summary),
+                      .trust_horizon = horizon,
+                      .impacts = within.impacts,
+                      .peak_force = within.peak,
+                      .largest = outcome->summary.peak_displacement,
+                      .psd_from = (double)NAN,
+                      .psd_to = (double)NAN};
     const Spectrum *spectrum = &outcome->spectrum;
     for (size_t i = 0; i < spectrum->densities.count; i++) {
         const size_t end = band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
         if (end < 2)
             continue;
-        told->psd_from = spectrum->frequency[1];
-        told->psd_to = fmax(told->psd_to, spectrum->frequency[end - 1]);
+        told.psd_from = spectrum->frequency[1];
+        told.psd_to = fmax(told.psd_to, spectrum->frequency[end - 1]);
     }
+    return told;
 }
 
-TradeoffErrors errors_measure(const Compared *reference, const Compared *point) {
+Errors errors_measure(const Compared *reference, const Compared *point) {
     const Outcome *from = reference->outcome, *to = point->outcome;
-    TradeoffErrors errors = {.displacement = (double)NAN,
-                             .mean_acceleration = (double)NAN,
-                             .peak_force = (double)NAN,
-                             .impacts = (double)NAN,
-                             .psd = psd_error(&from->spectrum, &to->spectrum),
-                             .rms_displacement = (double)NAN};
+    Errors errors = {.displacement = (double)NAN,
+                     .mean_acceleration = (double)NAN,
+                     .peak_force = (double)NAN,
+                     .impacts = (double)NAN,
+                     .psd = psd_error(&from->spectrum, &to->spectrum),
+                     .rms_displacement = (double)NAN};
     if (!point->has_motion)
         return errors;
     const size_t count = samples_within(from);
