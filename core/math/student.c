@@ -15,7 +15,7 @@ double student_share(double t, size_t freedom) {
     if (freedom == 0)
         return erf(t / sqrt(2));
     const double n = (double)freedom, square = n / (n + t * t);
-    const double theta = atan(t / sqrt(n)), sine = t / sqrt(n + t * t), cosine = sqrt(square);
+    const double theta = atan(t / sqrt(n)), cosine = sqrt(square), sine = t / hypot(sqrt(n), t);
     const size_t first = freedom % 2;
     double term = 1, sum = freedom > 1 ? 1 : 0;
     for (size_t k = 2 + first; k < freedom; k += 2) {
