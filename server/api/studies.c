@@ -46,7 +46,7 @@ static Status choose_format(const Request *request, const AnswerFormat *formats,
                             const AnswerFormat **format, Problem *problem) {
     const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
     char names[64];
-    answer_formats_name(formats, names, sizeof names);
+    answer_formats_name(formats, "", names, sizeof names);
     reply->varies_by_accept = extension == NULL;
     if (extension != NULL) {
         *format = answer_format_find(formats, extension);

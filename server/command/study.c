@@ -34,12 +34,11 @@ static const AnswerFormat *format_of(const StudyCommand *command, const char *pa
 static Status check_outputs(const StudyCommand *command, const Texts *outputs, Problem *problem) {
     Status status = STATUS_OK;
     char names[64];
-    answer_formats_name(answer_formats(command->kind->answer), names, sizeof names);
+    answer_formats_name(answer_formats(command->kind->answer), ".", names, sizeof names);
     for (size_t i = 0; i < outputs->count; i++)
         if (format_of(command, outputs->at[i]) == NULL)
-            status =
-                problem_add(problem, STATUS_USAGE, "--output",
-                            "must end in a dot and one of %s, is %.200s", names, outputs->at[i]);
+            status = problem_add(problem, STATUS_USAGE, "--output",
+                                 "must end in one of %s, is %.200s", names, outputs->at[i]);
     return status;
 }
 

@@ -56,10 +56,11 @@ const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *
     return formats->extension != NULL ? formats : NULL;
 }
 
-void answer_formats_name(const AnswerFormat *formats, char *target, size_t size) {
+void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
+                         size_t size) {
     *target = '\0';
     for (size_t length = 0; formats->extension != NULL && length < size; formats++) {
-        snprintf(target + length, size - length, "%s%s", length > 0 ? ", " : "",
+        snprintf(target + length, size - length, "%s%s%s", length > 0 ? ", " : "", before,
                  formats->extension);
         length = strlen(target);
     }

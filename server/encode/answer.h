@@ -18,7 +18,8 @@ typedef struct AnswerFormat {
 const AnswerFormat *answer_formats(const Kind *kind);
 const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *extension);
 
-// "json, svg"
-void answer_formats_name(const AnswerFormat *formats, char *target, size_t size);
+// "json, svg", each behind `before`.
+void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
+                         size_t size);
 
 #endif

@@ -185,8 +185,8 @@ def test_faults_have_their_exit_codes():
     free = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
     for arguments, code, expected in [
             (("ensemble",), 2, "takes one scene"),
-            (("ensemble", SPONGE, "-o", "out.npy"), 2, "one of json, csv, svg"),
-            (("ensemble", SPONGE, "-o", ".svg"), 2, "one of json, csv, svg"),
+            (("ensemble", SPONGE, "-o", "out.npy"), 2, "one of .json, .csv, .svg"),
+            (("ensemble", SPONGE, "-o", ".svg"), 2, "one of .json, .csv, .svg"),
             (("ensemble", SPONGE, "--metric", "impact"), 2, "did you mean impacts?"),
             (("ensemble", SPONGE, "--run", "1"), 2, "did you mean --runs?"),
             (("ensemble", SPONGE, "--runs", "1"), 3, "/study/runs: must be within [2, 10000]"),
