@@ -5,11 +5,6 @@
 
 #include <string.h>
 
-const char *const metric_names[] = {
-    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
-};
-const char *const metric_units[] = {"", "", "", "", " dB", "", NULL};
-
 // clang-format off
 const Field error_fields[] = {
     FIELD_REAL(Errors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),

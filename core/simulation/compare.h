@@ -4,19 +4,8 @@
 #ifndef CORE_SIMULATION_COMPARE_H
 #define CORE_SIMULATION_COMPARE_H
 
+#include "core/result/metric.h"
 #include "core/simulation/simulation.h"
-
-typedef enum Metric {
-    METRIC_DISPLACEMENT,
-    METRIC_MEAN_ACCELERATION,
-    METRIC_PEAK_FORCE,
-    METRIC_IMPACTS,
-    METRIC_PSD,
-    METRIC_RMS_DISPLACEMENT,
-    METRICS
-} Metric;
-extern const char *const metric_names[]; // NULL-terminated
-extern const char *const metric_units[]; // to stand behind a number: "", " dB"
 
 // Differences from the reference; NAN where an outcome does not answer it.
 typedef struct Errors {
