@@ -38,7 +38,11 @@ typedef struct Compared {
     size_t storeys;
     bool has_motion; // false: its samples answer something else, and only its spectra count
     bool has_force;  // a contact force is known of every impact
+    double horizon;  // of a reference: compared to here [s]; NAN: to the end
 } Compared;
+
+// Asks for the channels that errors are measured by, and for no others; the spectra stay.
+Status compare_watch(Simulation *simulation, Problem *problem);
 
 Yardstick yardstick_make(const Compared *reference);
 
