@@ -13,7 +13,7 @@ enum {
     STORM_EVENTS = 100,
     FLIGHT_WORK = 8,
     PRESS_WORK = 64,
-    PRESS_STEPS = 32
+    WORK_OF_STEP = 20 // multiplications
 };
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
@@ -136,17 +136,19 @@ static double arc_most(const Frame *frame, const Slice *slice) {
 static Status press(FrameEngine *engine, const Slice *slice, double length) {
     Frame *frame = &engine->frame;
     FrameOdeStep step;
-    TRY(frame_ode_step(&engine->ode, slice, length, &step, frame->problem));
+    frame_ode_step(&engine->ode, slice, length, &step);
     ledger_work(&frame->ledger, step.input, step.damping);
     engine->record.base_speed += step.ground;
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
-    frame_record_note(frame);
     if (step.is_event)
         TRY(happen(frame, &step.event));
-    frame->run->steps += PRESS_STEPS; // it takes as long as so many arcs
-    return count_steps(engine, 1, PRESS_WORK);
+    else
+        frame_record_note(frame);
+    frame->run->steps += step.work / WORK_OF_STEP;
+    engine->work += step.work;
+    return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
 }
 
 // A long step of contact. False: it must go by arcs.
@@ -329,7 +331,7 @@ Status frame_engine_make(FrameEngine *engine, Run *run, Response *response, Prob
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
     TRY(frame_press_make(&engine->pressing, frame, problem));
-    TRY(frame_ode_make(&engine->ode, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, FRAME_ODE_TOLERANCE, problem));
     TRY(frame_trail_make(&engine->trail, frame, problem));
     TRY(frame_record_start(&engine->record, &engine->trail, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
@@ -342,7 +344,7 @@ Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
                            Response *response) {
     Frame *frame = &engine->frame;
     TRY(frame_make(frame, run, NULL));
-    TRY(frame_ode_make(&engine->ode, frame, NULL));
+    TRY(frame_ode_make(&engine->ode, frame, of->ode.tolerance, NULL));
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
