@@ -3,12 +3,9 @@
 // the coarser series has.
 #include "core/simulation/compare.h"
 
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-
-const char *const metric_names[] = {
-    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
-};
-const char *const metric_units[] = {"", "", "", "", " dB", "", NULL};
 
 // clang-format off
 const Field error_fields[] = {
@@ -49,20 +46,23 @@ static double ratio(double difference, double whole) {
     return difference == 0 ? 0 : (double)NAN;
 }
 
+static double end_of(const Compared *reference) {
+    return isnan(reference->horizon) ? (double)INFINITY : reference->horizon;
+}
+
 // How far the reference itself is off in the samples compared: an estimate for the whole run says
 // nothing of those before the horizon, which is where it passes RESPONSE_PARTING.
-static double own_error(const Summary *reference) {
-    return isnan(reference->trust_horizon) ? reference->error_estimate
-                                           : fmin(reference->error_estimate, RESPONSE_PARTING);
+static double own_error(const Compared *reference) {
+    const double estimate = reference->outcome->summary.error_estimate;
+    return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_PARTING);
 }
 
 // Samples of the reference that can be compared.
-static size_t samples_within(const Outcome *reference) {
-    const double horizon = reference->summary.trust_horizon;
-    const size_t count = reference->response.count;
-    if (isnan(horizon))
+static size_t samples_within(const Compared *reference) {
+    const size_t count = reference->outcome->response.count;
+    if (isnan(reference->horizon))
         return count;
-    const double within = floor(horizon * reference->response.sample_rate) + 1;
+    const double within = floor(reference->horizon * reference->outcome->response.sample_rate) + 1;
     return within < (double)count ? (size_t)within : count;
 }
 
@@ -194,11 +194,9 @@ static double psd_error(const Spectrum *reference, const Spectrum *point) {
 
 Yardstick yardstick_make(const Compared *reference) {
     const Outcome *outcome = reference->outcome;
-    const double horizon = outcome->summary.trust_horizon;
-    const Within within =
-        ledger_within(&outcome->response.impacts, isnan(horizon) ? (double)INFINITY : horizon);
-    Yardstick told = {.error_estimate = own_error(&outcome->summary),
-                      .trust_horizon = horizon,
+    const Within within = ledger_within(&outcome->response.impacts, end_of(reference));
+    Yardstick told = {.error_estimate = own_error(reference),
+                      .trust_horizon = reference->horizon,
                       .impacts = within.impacts,
                       .peak_force = within.peak,
                       .largest = outcome->summary.peak_displacement,
@@ -225,15 +223,14 @@ Errors errors_measure(const Compared *reference, const Compared *point) {
                      .rms_displacement = (double)NAN};
     if (!point->has_motion)
         return errors;
-    const size_t count = samples_within(from);
+    const size_t count = samples_within(reference);
     if (count > 1) {
         // Nothing closer than the reference itself can be told.
         errors.displacement =
-            fmax(displacement_error(reference, point, count), own_error(&from->summary));
+            fmax(displacement_error(reference, point, count), own_error(reference));
         errors.mean_acceleration = acceleration_error(reference, point, count);
     }
-    const double horizon =
-        isnan(from->summary.trust_horizon) ? (double)INFINITY : from->summary.trust_horizon;
+    const double horizon = end_of(reference);
     const Within a = ledger_within(&from->response.impacts, horizon);
     const Within b = ledger_within(&to->response.impacts, horizon);
     errors.impacts = fabs((double)a.impacts - (double)b.impacts);
@@ -243,4 +240,30 @@ Errors errors_measure(const Compared *reference, const Compared *point) {
         ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
               from->summary.rms_displacement);
     return errors;
+}
+
+Status compare_watch(Simulation *simulation, Problem *problem) {
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    const bool are_numbered = storeys > 1 || simulation->scene.dampers.count > 1;
+    static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
+    Texts names = {calloc(COUNT(wanted) * storeys, sizeof *names.at), 0};
+    bool is_whole = names.at != NULL;
+    for (size_t i = 0; i < COUNT(wanted) * storeys && is_whole; i++) {
+        char name[64];
+        if (are_numbered)
+            snprintf(name, sizeof name, "%s_%zu", channels[wanted[i / storeys]].name,
+                     i % storeys + 1);
+        else
+            snprintf(name, sizeof name, "%s", channels[wanted[i / storeys]].name);
+        names.at[i] = strdup(name);
+        is_whole = names.at[i] != NULL;
+        names.count += is_whole;
+    }
+    Texts *asked = &simulation->output.channels;
+    for (size_t i = 0; i < asked->count; i++)
+        free(asked->at[i]);
+    free(asked->at);
+    *asked = names;
+    return is_whole ? STATUS_OK
+                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
 }

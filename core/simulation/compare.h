@@ -4,19 +4,8 @@
 #ifndef CORE_SIMULATION_COMPARE_H
 #define CORE_SIMULATION_COMPARE_H
 
+#include "core/result/metric.h"
 #include "core/simulation/simulation.h"
-
-typedef enum Metric {
-    METRIC_DISPLACEMENT,
-    METRIC_MEAN_ACCELERATION,
-    METRIC_PEAK_FORCE,
-    METRIC_IMPACTS,
-    METRIC_PSD,
-    METRIC_RMS_DISPLACEMENT,
-    METRICS
-} Metric;
-extern const char *const metric_names[]; // NULL-terminated
-extern const char *const metric_units[]; // to stand behind a number: "", " dB"
 
 // Differences from the reference; NAN where an outcome does not answer it.
 typedef struct Errors {
@@ -49,7 +38,11 @@ typedef struct Compared {
     size_t storeys;
     bool has_motion; // false: its samples answer something else, and only its spectra count
     bool has_force;  // a contact force is known of every impact
+    double horizon;  // of a reference: compared to here [s]; NAN: to the end
 } Compared;
+
+// Asks for the channels that errors are measured by, and for no others; the spectra stay.
+Status compare_watch(Simulation *simulation, Problem *problem);
 
 Yardstick yardstick_make(const Compared *reference);
 

@@ -78,7 +78,7 @@ static Status make_reference(Session *session, Problem *problem) {
     Status status =
         ladder_apply(session->simulation, &exact, session->tools->limits, &simulation, problem);
     if (status == STATUS_OK)
-        status = ladder_watch(&simulation, problem);
+        status = compare_watch(&simulation, problem);
     if (status == STATUS_OK)
         status = run(session, &simulation, session->tools->limits, BUDGET_BATCH,
                      &session->reference, problem);
@@ -93,6 +93,7 @@ static Compared compare(const Outcome *outcome, const Simulation *simulation,
         .storeys = structure_storeys(scene_structure(&simulation->scene)),
         .has_motion = point == NULL || (isnan(point->duration) && point->segment == COUNT_ABSENT),
         .has_force = ladder_has_force(simulation),
+        .horizon = outcome->summary.trust_horizon,
     };
 }
 
@@ -108,7 +109,7 @@ static Status measure_errors(Session *session, size_t index, Problem *problem) {
         ladder_apply(session->simulation, point, &session->limits, &simulation, session->fault);
     TradeoffStatus as = TRADEOFF_REFUSED;
     if (status == STATUS_OK)
-        status = ladder_watch(&simulation, session->fault);
+        status = compare_watch(&simulation, session->fault);
     if (status == STATUS_OK) {
         as = TRADEOFF_FAILED;
         status = run(session, &simulation, &session->limits, steps, &outcome, session->fault);

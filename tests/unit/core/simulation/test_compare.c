@@ -38,7 +38,8 @@ static void outcome_free(Outcome *outcome) {
 }
 
 static Errors measure(const Outcome *reference, const Outcome *point) {
-    const Compared from = {reference, 1, true, true}, to = {point, 1, true, true};
+    const Compared from = {reference, 1, true, true, reference->summary.trust_horizon},
+                   to = {point, 1, true, true, (double)NAN};
     return errors_measure(&from, &to);
 }
 
@@ -116,13 +117,13 @@ static void impacts_and_forces_are_those_within_the_horizon(void **state) {
     a.summary.trust_horizon = 0.45;
     assert_true(measure(&a, &b).impacts == 2);
     assert_true(fabs(measure(&a, &b).peak_force - 0.25) < 1e-15);
-    const Compared from = {&a, 1, true, true};
+    const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
     const Yardstick told = yardstick_make(&from);
     assert_int_equal(told.impacts, 1);
     assert_true(told.peak_force == 4 && told.trust_horizon == 0.45);
-    const Compared impulsive = {&b, 1, true, false};
+    const Compared impulsive = {&b, 1, true, false, (double)NAN};
     assert_true(isnan(errors_measure(&from, &impulsive).peak_force));
-    const Compared shorter = {&b, 1, false, true};
+    const Compared shorter = {&b, 1, false, true, (double)NAN};
     const Errors errors = errors_measure(&from, &shorter);
     assert_true(isnan(errors.displacement) && isnan(errors.mean_acceleration) &&
                 isnan(errors.impacts) && isnan(errors.peak_force) &&
@@ -136,7 +137,7 @@ static void spectra_are_compared_over_the_band_that_holds_the_power(void **state
     (void)state;
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     double *density = b.spectrum.densities.at[0].values;
-    const Compared from = {&a, 1, true, true};
+    const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
     const Yardstick told = yardstick_make(&from);
     assert_true(told.psd_from == 1 && told.psd_to == 9);
     density[0] = 1e6;   // the mean is taken off
