@@ -94,7 +94,7 @@ static const Field run_fields[] = {
     FIELD_END
 };
 
-static const Field target_fields[] = {
+static const Field kept_fields[] = {
     FIELD_REAL(EnsembleTarget, error, NULL, ANY, OPTIONAL, "relative error wanted of the mean, against the mean of all runs asked for"),
     FIELD_CHOICE(EnsembleTarget, metric, ensemble_metric_names, OPTIONAL, "of what"),
     FIELD_REAL(EnsembleTarget, confidence, NULL, ANY, OPTIONAL, "that the error is no larger than estimated"),
@@ -113,7 +113,7 @@ static const Field answer_fields[] = {
     FIELD_COUNT(Ensemble, failed, NULL, AT_LEAST(0), 0, "those of them that failed; the others alone are counted in all that follows"),
     FIELD_REAL(Ensemble, steps, NULL, ANY, 0, "solver steps of all, counted"),
     FIELD_REAL(Ensemble, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
-    FIELD_ITEM_OR_NULL(Ensemble, target, target_fields, PRESENCE_OPTIONAL, "what became of the target"),
+    FIELD_ITEM_OR_NULL(Ensemble, target, kept_fields, PRESENCE_OPTIONAL, "what became of the target"),
     FIELD_ITEM(Ensemble, statistics, statistics_fields, NULL, PRESENCE_DEFAULT, "over the runs"),
     FIELD_ITEM(Ensemble, trust, trust_fields, NULL, PRESENCE_DEFAULT, "how far single trajectories can be trusted"),
     FIELD_LIST(Ensemble, failures, failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
