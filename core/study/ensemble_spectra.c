@@ -135,6 +135,10 @@ static Status tell_channel(const SpectraFold *fold, size_t channel, const Column
         told->standard_deviation.at[k] = deviation;
         told->low.at[k] = mean[k] / factor;
         told->high.at[k] = mean[k] * factor;
+        if (!isfinite(mean[k] + deviation + told->high.at[k]))
+            return problem_set(problem, STATUS_UNSTABLE,
+                               "the spectra are too large: their deviations leave what double "
+                               "precision can hold");
     }
     return STATUS_OK;
 }

@@ -43,34 +43,43 @@ typedef struct Values {
     double skewness;
 } Values;
 
+// In units of a power of two near the largest, so that no square or cube leaves what doubles hold.
+static void values_measure(Values *values) {
+    const double n = (double)values->count;
+    double largest = 0, sum = 0, rest = 0, squares = 0, cubes = 0;
+    int exponent;
+    for (size_t i = 0; i < values->count; i++)
+        largest = fmax(largest, fabs(values->at[i]));
+    (void)frexp(largest, &exponent);
+    for (size_t i = 0; i < values->count; i++)
+        sum += ldexp(values->at[i], -exponent);
+    for (size_t i = 0; i < values->count; i++)
+        rest += ldexp(values->at[i], -exponent) - sum / n;
+    const double mean = sum / n + rest / n;
+    for (size_t i = 0; i < values->count; i++) {
+        const double off = ldexp(values->at[i], -exponent) - mean;
+        squares += off * off;
+        cubes += off * off * off;
+    }
+    values->mean = ldexp(mean, exponent);
+    if (values->count < 2)
+        return;
+    const double usual = sqrt(squares / n);
+    values->deviation = ldexp(sqrt(squares / (n - 1)), exponent);
+    values->skewness = usual > 0 ? cubes / n / (usual * usual * usual) : 0;
+}
+
 static Status values_take(const EnsembleRuns *table, int metric, Values *values, Problem *problem) {
     *values = (Values){.at = calloc(table->count + 1, sizeof *values->at),
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
     if (values->at == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's statistics");
-    double sum = 0;
     for (size_t i = 0; i < table->count; i++)
         if (is_known(&table->at[i], metric))
-            sum += values->at[values->count++] = value_of(&table->at[i].summary, metric);
-    const double n = (double)values->count;
-    if (values->count == 0)
-        return STATUS_OK;
-    double mean = sum / n, rest = 0;
-    for (size_t i = 0; i < values->count; i++)
-        rest += values->at[i] - mean;
-    values->mean = mean += rest / n;
-    if (values->count < 2)
-        return STATUS_OK;
-    double squares = 0, cubes = 0;
-    for (size_t i = 0; i < values->count; i++) {
-        const double off = values->at[i] - mean;
-        squares += off * off;
-        cubes += off * off * off;
-    }
-    values->deviation = sqrt(squares / (n - 1));
-    const double usual = sqrt(squares / n);
-    values->skewness = usual > 0 ? cubes / n / (usual * usual * usual) : 0;
+            values->at[values->count++] = value_of(&table->at[i].summary, metric);
+    if (values->count > 0)
+        values_measure(values);
     return STATUS_OK;
 }
 

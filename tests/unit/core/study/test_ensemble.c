@@ -142,8 +142,7 @@ static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
     bool is_first = true;
     for (size_t i = 0; i < 20; i++) {
         const EnsembleRun *row = &answer->table.at[i];
-        assert_true((row->why != NULL) ==
-                    (whole->table.at[i].summary.impacts > (double)limits.impacts));
+        assert_true((row->why != NULL) == (whole->table.at[i].summary.impacts > limits.impacts));
         if (row->why == NULL)
             continue;
         assert_true(isnan(row->steps) && isnan(row->summary.rms_displacement));

@@ -78,6 +78,29 @@ static void a_mean_far_from_its_spread_loses_no_digits(void **state) {
     free(of.unit);
 }
 
+static void numbers_of_any_size_have_statistics(void **state) {
+    (void)state;
+    static const double scales[] = {1e-300, 1e-160, 1e160, 1e307};
+    for (size_t k = 0; k < COUNT(scales); k++) {
+        for (size_t i = 0; i < RUNS; i++)
+            runs[i] = (EnsembleRun){
+                .seed = i, .summary = {.rms_displacement = scales[k] * (double)(1 + i * i % 5)}};
+        const EnsembleRuns table = {runs, RUNS};
+        EnsembleStatistic of = blank();
+        Spread spread;
+        assert_int_equal(statistics_fold(&table, ENSEMBLE_RMS_DISPLACEMENT, &of, &problem),
+                         STATUS_OK);
+        assert_int_equal(statistics_spread(&table, ENSEMBLE_RMS_DISPLACEMENT, &spread, &problem),
+                         STATUS_OK);
+        // 1, 2, 5, 5, 2, 1, 2, 5, 5
+        assert_near(of.mean, scales[k] * (28 / 9.0));
+        assert_near(of.standard_deviation, scales[k] * sqrt((114 - 28 * 28 / 9.0) / 8));
+        assert_near(spread.relative, of.standard_deviation / of.mean);
+        assert_true(fabs(spread.skewness) < 1);
+        free(of.unit);
+    }
+}
+
 static void too_few_runs_leave_numbers_unknown(void **state) {
     (void)state;
     EnsembleRuns table = seven();
@@ -137,6 +160,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(statistics_are_numpys_over_the_runs_that_ended),
         cmocka_unit_test(a_mean_far_from_its_spread_loses_no_digits),
+        cmocka_unit_test(numbers_of_any_size_have_statistics),
         cmocka_unit_test(too_few_runs_leave_numbers_unknown),
         cmocka_unit_test(the_spread_tells_what_the_rule_needs),
         cmocka_unit_test(trust_and_failures_are_counted),
