@@ -212,19 +212,29 @@ static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *sc
     return fmin(SPAN * scale->root / ode->speed[series->contact[0].damper], 1.02 * length / mean);
 }
 
-// Cuts the step where t is `length`. Whether it is.
-static bool cut_time(FrameOde *ode, double length) {
-    FrameSeries *series = &ode->series;
+// Cuts the step where the leader leaves, for behind it t would fall. Whether it does.
+static bool cut_end(FrameSeries *series) {
+    double s;
+    if (!root_first_crossing(frame_series_root(series), series->degree, &s))
+        return false;
+    frame_series_cut(series, s);
+    return true;
+}
+
+// Cuts the step where t is `length`. Whether it comes that far, *is_cut whether it came further.
+static bool cut_time(FrameSeries *series, double length, bool *is_cut) {
     double left[ROW], s, t = 0;
     frame_series_of(series, series->at_t, left);
     for (size_t k = series->degree; k > 0; k--) {
         t += left[k];
         left[k] = -left[k];
     }
+    *is_cut = false;
     if (t <= length)
         return t >= length * (1 - 4 * DBL_EPSILON);
     left[0] = length;
-    if (root_first_crossing(left, series->degree, &s))
+    *is_cut = root_first_crossing(left, series->degree, &s);
+    if (*is_cut)
         frame_series_cut(series, s);
     return true;
 }
@@ -250,15 +260,13 @@ static void find_end(const FrameOde *ode, size_t c, Found *found) {
     const FrameDamper *damper = &ode->frame->damper[contact->damper];
     const double negligible = ode->contact[contact->damper].negligible;
     double gap[ROW];
-    if (c == 0) {
+    if (c == 0)
         memcpy(gap, frame_series_root(series), (series->degree + 1) * sizeof *gap);
-    } else {
+    else
         frame_series_of(series, series->at_r + contact->damper, gap);
-        for (size_t k = 0; k <= series->degree; k++)
-            gap[k] *= contact->sign;
-    }
-    if (falls(series, gap, found)) {
-        found->contact = c;
+    for (size_t k = 0; k <= series->degree && c > 0; k++)
+        gap[k] *= contact->sign;
+    if (c > 0 && falls(series, gap, found)) {
         found->event.damper = contact->damper;
         found->event.side = damper->side;
     }
@@ -441,9 +449,15 @@ static bool find_open(const FrameOde *ode, FrameOdeStep *step) {
     return false;
 }
 
-static void find_first(const FrameOde *ode, Found *found) {
+// `is_end`: at its end the leader leaves.
+static void find_first(const FrameOde *ode, bool is_end, Found *found) {
     const FrameSeries *series = &ode->series;
     *found = (Found){0};
+    if (is_end) {
+        const size_t d = series->contact[0].damper;
+        found->is_found = true;
+        found->event = (FrameEvent){.damper = d, .s = 1, .side = ode->frame->damper[d].side};
+    }
     for (size_t c = 0; c < series->contacts; c++) {
         find_end(ode, c, found);
         find_kink(ode, c, found);
@@ -468,9 +482,11 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     const double Y = find_contacts(ode);
     const double span = make_scale(ode, Y, length, &scale);
     frame_series_cut(series, frame_series_make(series, frame, slice, Y, span, &scale));
-    const bool is_whole = cut_time(ode, length);
-    find_first(ode, &found);
-    if (found.is_found)
+    const bool is_leaving = cut_end(series);
+    bool is_cut;
+    const bool is_whole = cut_time(series, length, &is_cut);
+    find_first(ode, is_leaving && !is_cut, &found);
+    if (found.is_found && found.event.s < 1)
         frame_series_cut(series, found.event.s);
     const bool is_end = found.is_found && !found.is_kink && !found.is_stop;
     if (!frame->is_shadow) {

@@ -281,10 +281,11 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
         }
     }
     series->degree = k;
-    double shrink = 1;
+    // Coefficients fall as powers of 1 / R; the first one left out is to be small enough.
+    double wide = INFINITY;
     for (size_t j = k - window + 1; j <= k; j++)
-        shrink = fmin(shrink, log(scale->error / size[j]) / (double)j);
-    return exp(shrink);
+        wide = fmin(wide, -log(size[j]) / (double)j);
+    return exp(fmin(wide + log(scale->error) / (double)(k + 1), 1));
 }
 
 double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *slice, double Y,
