@@ -13,11 +13,11 @@ typedef struct FrameOdeContact {
     ContactParameters parameters; // of the contact that the rest is of
     ContactTerms terms;
     SeriesLaw law;
-    double speed;      // of the motion in it, about [m/s]
-    double depth;      // p that such a speed comes to [m]
-    double push;       // p'' without N [m/s^2]
-    double negligible; // N is, below this p [m]
-    double strain;     // at the start of a step [J]
+    double speed;         // of the motion in it, about [m/s]
+    double depth;         // p that such a speed comes to [m]
+    double push;          // p'' without N [m/s^2]
+    double negligible;    // N is, below this p [m]
+    double strain;        // at the start of a step [J]
     double impulse, work; // of N over it [N s], [J]
 } FrameOdeContact;
 
@@ -27,8 +27,9 @@ typedef struct FrameOde {
     FrameSeries series;
     FrameOdeContact *contact; // damper after damper
     double *speed, *modal;    // scales
-    double *row, *elastic, *q, *p; // scratch
-    size_t still;             // kinks in a row, without time passing
+    double *row, *elastic;    // scratch
+    double *nodes; // scratch: of all modes, or of all dampers, at the nodes of a quadrature
+    size_t still;  // kinks in a row, without time passing
     double *block;
 } FrameOde;
 

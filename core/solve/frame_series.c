@@ -15,6 +15,11 @@
 
 #include "core/solve/wide.h"
 
+// Pairs fill the registers that every processor has.
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
+#define TWO(values) (*(const Two *)(values))
+#define PUT_TWO(values, two) (*(Two *)(values) = (two))
+
 enum { ROOTS = 4, POWER_MOST = 18, GAP_LEAST = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
@@ -63,14 +68,19 @@ Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *probl
     series->at_a = series->at_p + n;
     series->at_r = series->at_a + (series->is_sine ? 2 : 0);
     series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
-    series->block = calloc(frame_lanes_room(2 * SERIES_ROW * series->stride + n + 8),
-                           sizeof *series->block);
+    series->block =
+        calloc(frame_lanes_room(2 * SERIES_ROW * series->stride + n + 8), sizeof *series->block);
     series->contact = calloc(m, sizeof *series->contact);
     if (series->block == NULL || series->contact == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
     series->z = frame_lanes_start(series->block);
     series->rate = series->z + SERIES_ROW * series->stride;
     series->elastic = series->rate + SERIES_ROW * series->stride;
+    for (size_t i = 0; i < ARC_RULES; i++)
+        for (size_t node = 0; node < arc_rules[i].count; node++)
+            for (size_t k = 0; k < SERIES_ROW; k++)
+                series->node_power[i][k * SERIES_NODES + node] =
+                    pow(arc_rules[i].node[node], (double)k);
     return STATUS_OK;
 }
 
@@ -150,8 +160,8 @@ INLINE void elastic_order(FrameSeries *series, const Frame *frame, const double 
     double *restrict out = series->elastic;
     if (n == 1 || frame->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
-            out[i] = (n == 1 ? frame->damping[0] : frame->diagonal[i]) * p[i] +
-                     frame->omega2[i] * q[i];
+            out[i] =
+                (n == 1 ? frame->damping[0] : frame->diagonal[i]) * p[i] + frame->omega2[i] * q[i];
         return;
     }
     for (size_t i = 0; i < n; i++)
@@ -213,22 +223,21 @@ INLINE void state_order(FrameSeries *series, const double *pace, size_t k, size_
         return;
     }
     for (size_t i = 0; i < stride; i += 4) {
-        Four sum = {0}, more = {0};
+        Two sum[4] = {{0}};
         size_t j = 0;
         for (; j + 2 <= k + 1; j += 2) {
-            Four first, second;
-            memcpy(&first, rate + (k - j) * stride + i, sizeof first);
-            memcpy(&second, rate + (k - j - 1) * stride + i, sizeof second);
-            sum += pace[j] * first;
-            more += pace[j + 1] * second;
+            const double *first = rate + (k - j) * stride + i, *second = first - stride;
+            sum[0] += pace[j] * TWO(first);
+            sum[1] += pace[j] * TWO(first + 2);
+            sum[2] += pace[j + 1] * TWO(second);
+            sum[3] += pace[j + 1] * TWO(second + 2);
         }
         if (j <= k) {
-            Four first;
-            memcpy(&first, rate + (k - j) * stride + i, sizeof first);
-            sum += pace[j] * first;
+            sum[0] += pace[j] * TWO(rate + i);
+            sum[1] += pace[j] * TWO(rate + i + 2);
         }
-        sum = scale * (sum + more);
-        memcpy(next + i, &sum, sizeof sum);
+        PUT_TWO(next + i, scale * (sum[0] + sum[2]));
+        PUT_TWO(next + i + 2, scale * (sum[1] + sum[3]));
     }
 }
 
@@ -271,8 +280,8 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
         rate_order(series, frame, slice, k, n, m);
         state_order(series, pace, k, stride);
         series->powers[0][k + 1] = 0;
-        series->powers[1][k + 1] =
-            series->length / (double)(k + 1) * leader->sign * series->z[k * stride + leader->damper];
+        series->powers[1][k + 1] = series->length / (double)(k + 1) * leader->sign *
+                                   series->z[k * stride + leader->damper];
         size[k + 1] = size_of(series, scale, k + 1, n, m);
         small = size[k + 1] <= scale->error ? small + 1 : 0;
         if (small >= window) {
@@ -333,15 +342,47 @@ void frame_series_of(const FrameSeries *series, size_t place, double *out) {
         out[k] = series->z[k * series->stride + place];
 }
 
-// Horner's scheme; of s = 1 too, where small terms come first.
 void frame_series_at(const FrameSeries *series, double s, double *row) {
     const size_t stride = series->stride;
     for (size_t i = 0; i < stride; i += 4) {
-        Four sum = {0}, c;
-        for (size_t k = series->degree + 1; k-- > 0;) {
-            memcpy(&c, series->z + k * stride + i, sizeof c);
-            sum = sum * s + c;
+        const double *at = series->z + series->degree * stride + i;
+        Two sum[2] = {TWO(at), TWO(at + 2)};
+        for (size_t k = series->degree; k > 0; k--) {
+            at -= stride;
+            sum[0] = sum[0] * s + TWO(at);
+            sum[1] = sum[1] * s + TWO(at + 2);
         }
-        memcpy(row + i, &sum, sizeof sum);
+        PUT_TWO(row + i, sum[0]);
+        PUT_TWO(row + i + 2, sum[1]);
     }
+}
+
+void frame_series_end(const FrameSeries *series, double *row) {
+    const size_t stride = series->stride;
+    for (size_t i = 0; i < stride; i += 4) {
+        const double *at = series->z + series->degree * stride + i;
+        Two sum[2] = {TWO(at), TWO(at + 2)};
+        for (size_t k = series->degree; k > 0; k--) { // small terms first
+            at -= stride;
+            sum[0] += TWO(at);
+            sum[1] += TWO(at + 2);
+        }
+        PUT_TWO(row + i, sum[0]);
+        PUT_TWO(row + i + 2, sum[1]);
+    }
+}
+
+void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+                        size_t degree, double *out) {
+    const double *power = series->node_power[rule];
+    Two sum[SERIES_NODES / 2] = {{0}};
+    for (size_t k = 0; k <= degree; k++, power += SERIES_NODES) {
+        const double of = c[k * stride];
+        sum[0] += of * TWO(power);
+        sum[1] += of * TWO(power + 2);
+        sum[2] += of * TWO(power + 4);
+        sum[3] += of * TWO(power + 6);
+    }
+    for (size_t i = 0; i < SERIES_NODES / 2; i++)
+        PUT_TWO(out + 2 * i, sum[i]);
 }

@@ -7,7 +7,7 @@
 #include "core/contact/contact.h"
 #include "core/solve/frame_state.h"
 
-enum { SERIES_DEGREE = 26, SERIES_ROW = SERIES_DEGREE + 2, SERIES_POWERS = 20 };
+enum { SERIES_DEGREE = 26, SERIES_ROW = SERIES_DEGREE + 2, SERIES_POWERS = 20, SERIES_NODES = 8 };
 
 // How N follows from Y = p^(1/root), where all of its exponents times root are whole numbers, and
 // else only as far as Y > 0.
@@ -27,8 +27,8 @@ typedef struct SeriesContact {
     double sign;
     ContactTerms terms;
     const SeriesLaw *law;
-    bool is_felt;   // else N is left out, being too small to matter
-    bool is_damped; // p' is above its turn
+    bool is_felt;                                   // else N is left out, being too small to matter
+    bool is_damped;                                 // p' is above its turn
     double spring[SERIES_ROW], viscous[SERIES_ROW]; // powers of p
     double force[SERIES_ROW];                       // N
 } SeriesContact;
@@ -47,8 +47,9 @@ typedef struct FrameSeries {
     double *elastic;
     SeriesContact *contact; // those in contact, the leader first
     size_t contacts;
-    int root;                                 // of the leader; 1: tau is time
-    double powers[SERIES_POWERS][SERIES_ROW]; // of Y
+    int root;                                                // of the leader; 1: tau is time
+    double powers[SERIES_POWERS][SERIES_ROW];                // of Y
+    double node_power[ARC_RULES][SERIES_ROW * SERIES_NODES]; // of the nodes of arc_rules
     double *block;
 } FrameSeries;
 
@@ -78,7 +79,11 @@ static inline const double *frame_series_root(const FrameSeries *series) {
 
 // One component's coefficients.
 void frame_series_of(const FrameSeries *series, size_t place, double *out);
-// The whole row at s.
+// The whole row at s, and at s = 1.
 void frame_series_at(const FrameSeries *series, double s, double *row);
+void frame_series_end(const FrameSeries *series, double *row);
+// A polynomial's values at the nodes of one of arc_rules; its coefficients are `stride` apart.
+void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+                        size_t degree, double *out);
 
 #endif
