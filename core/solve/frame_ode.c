@@ -18,17 +18,21 @@
 #include "core/contact/power.h"
 #include "core/solve/frame_record.h"
 
-enum { ROW = SERIES_ROW, STILL_KINKS = 8 };
+enum { ROW = SERIES_ROW, STILL_KINKS = 8, ORDER_MOST = 22 };
 
 static const double STEP_PART = 0.1;    // of a contact's tolerance, what a step may be wrong by
 static const double SPAN = 0.3;         // a step is about so long, in (root of depth) / speed
 static const double NEARLY_SMALL = 0.9; // of negligible: there it still is
 static const double ROUNDING = DBL_EPSILON / 4;
+static const double ORDER_BASE = 2.5, ORDER_RISE = 0.55; // the cheapest order, of log(error)
 
 Status frame_ode_make(FrameOde *ode, Frame *frame, double tolerance, Problem *problem) {
     memset(ode, 0, sizeof *ode);
     ode->frame = frame;
     ode->tolerance = tolerance;
+    ode->error = fmax(STEP_PART * tolerance, ROUNDING);
+    const double order = ORDER_BASE - ORDER_RISE * log(ode->error);
+    ode->order = order > ORDER_MOST ? ORDER_MOST : (size_t)order;
     if (frame->plan->form != CONTACT_POWER || frame->dampers == 0)
         return STATUS_OK;
     const size_t n = frame->storeys, m = frame->dampers;
@@ -57,10 +61,6 @@ bool frame_ode_serves(const FrameOde *ode) {
         if (ode->frame->damper[d].phase == FRAME_CONTACT)
             return true;
     return false;
-}
-
-static double error_of(const FrameOde *ode) {
-    return fmax(STEP_PART * ode->tolerance, ROUNDING);
 }
 
 static double root_of(double value, int root) {
@@ -121,7 +121,7 @@ static void look_at(FrameOde *ode, size_t d) {
         at->speed = fmax(speed, sqrt(2 * fabs(at->push) * at->depth));
     }
     at->depth = fmax(at->depth, p);
-    at->negligible = find_negligible(at, error_of(ode), w, mass);
+    at->negligible = find_negligible(at, ode->error, w, mass);
     at->strain = at->terms.stiffness * power_of(p, n) * p / (n + 1);
 }
 
@@ -192,26 +192,33 @@ static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *sc
         const size_t d = series->contact[c].damper;
         const FrameDamper *damper = &frame->damper[d];
         const FrameOdeContact *at = &ode->contact[d];
-        ode->speed[d] = at->speed + DBL_MIN;
+        const double speed = at->speed + DBL_MIN;
+        ode->speed[d] = 1 / speed;
         for (size_t i = 0; i < n; i++)
-            ode->modal[i] += fabs(damper->shape[i]) * damper->effective_mass * at->speed;
-        span = fmin(span, at->depth / ode->speed[d]);
+            ode->modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
+        const double own = at->depth / speed;
+        span = own < span ? own : span;
     }
-    const FrameOdeContact *leader = &ode->contact[series->contact[0].damper];
-    const double w = series->contact[0].sign * frame->damper[series->contact[0].damper].w;
-    *scale = (SeriesScale){.error = error_of(ode),
-                           .root = root_of(leader->depth, root) + DBL_MIN,
-                           .time = span + DBL_MIN,
-                           .speed = ode->speed,
-                           .modal = ode->modal};
-    const double order = 2.5 - 0.55 * log(scale->error);
-    scale->order = order > 22 ? 22 : order < 5 ? 5 : (size_t)order;
+    for (size_t i = 0; i < n; i++)
+        ode->modal[i] = 1 / ode->modal[i];
+    const size_t d = series->contact[0].damper;
+    const double w = series->contact[0].sign * frame->damper[d].w;
+    const double large = root_of(ode->contact[d].depth, root) + DBL_MIN;
+    *scale = (SeriesScale){.error = ode->error,
+                           .per_root = 1 / large,
+                           .per_time = 1 / (span + DBL_MIN),
+                           .per_speed = ode->speed,
+                           .per_modal = ode->modal,
+                           .order = ode->order};
     // tau over `length`, were the speed to stay.
-    const double end = root_of(fmax(pow(Y, root) + w * length, 0), root);
-    double mean = 0, power = 1;
-    for (int i = 0; i < root; i++, power *= end)
-        mean += power * pow(Y, root - 1 - i);
-    return fmin(SPAN * scale->root / ode->speed[series->contact[0].damper], 1.02 * length / mean);
+    double p = Y;
+    for (int i = 1; i < root; i++)
+        p *= Y;
+    const double end = root_of(ledger_larger(p + w * length, 0), root);
+    double mean = 0, power = 1; // the sum of Y^i end^(root - 1 - i)
+    for (int i = 0; i < root; i++, power *= Y)
+        mean = mean * end + power;
+    return fmin(SPAN * large * ode->speed[d], 1.02 * length / mean);
 }
 
 // Cuts the step where the leader leaves, for behind it t would fall. Whether it does.
@@ -374,7 +381,7 @@ static void find_loss(FrameOde *ode, size_t rule, double *loss) {
 static void take_sums(FrameOde *ode, const Slice *slice, FrameOdeStep *step) {
     const Frame *frame = ode->frame;
     const FrameSeries *series = &ode->series;
-    const size_t rule = error_of(ode) > 1e-8 ? 0 : ARC_RULES - 1, count = arc_rules[rule].count;
+    const size_t rule = ode->error > 1e-8 ? 0 : ARC_RULES - 1, count = arc_rules[rule].count;
     const size_t n = frame->storeys, m = frame->dampers, degree = series->degree;
     double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
         momentum[SERIES_NODES] = {0};

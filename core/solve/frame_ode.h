@@ -24,6 +24,8 @@ typedef struct FrameOdeContact {
 typedef struct FrameOde {
     Frame *frame;
     double tolerance; // of a contact
+    double error;     // of a step
+    size_t order;     // of its series, at most
     FrameSeries series;
     FrameOdeContact *contact; // damper after damper
     double *speed, *modal;    // scales
