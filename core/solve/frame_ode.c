@@ -218,7 +218,10 @@ static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *sc
     double mean = 0, power = 1; // the sum of Y^i end^(root - 1 - i)
     for (int i = 0; i < root; i++, power *= Y)
         mean = mean * end + power;
-    return fmin(SPAN * large * ode->speed[d], 1.02 * length / mean);
+    // As far as the step before went, or about so far by the contact's own numbers.
+    const double usual = SPAN * large * ode->speed[d];
+    const double reach = root == ode->last_root && ode->last > usual ? ode->last : usual;
+    return fmin(reach, 1.02 * length / mean);
 }
 
 // Cuts the step where the leader leaves, for behind it t would fall. Whether it does.
@@ -507,6 +510,8 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     const double Y = find_contacts(ode);
     const double span = make_scale(ode, Y, length, &scale);
     frame_series_cut(series, frame_series_make(series, frame, slice, Y, span, &scale));
+    ode->last = series->length;
+    ode->last_root = series->root;
     const bool is_leaving = cut_end(series);
     bool is_cut;
     const bool is_whole = cut_time(series, length, &is_cut);

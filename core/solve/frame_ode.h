@@ -31,6 +31,8 @@ typedef struct FrameOde {
     double *speed, *modal;    // scales
     double *row, *elastic;    // scratch
     double *nodes; // scratch: of all modes, or of all dampers, at the nodes of a quadrature
+    double last;   // length of the last step's series, in its tau
+    int last_root; // and its root
     size_t still;  // kinks in a row, without time passing
     double *block;
 } FrameOde;
