@@ -63,21 +63,6 @@ Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem
     return STATUS_OK;
 }
 
-// A part of the journey tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
-static Watch stage_watch(Stage *stage) {
-    return (Watch){stage, stage_advance};
-}
-
 // The journey's luggage: everything that must be put down again at its end.
 typedef struct Journey {
     const Simulation *simulation;
