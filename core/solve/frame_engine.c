@@ -11,6 +11,7 @@
 enum {
     STILL_EVENTS = 1000,
     STORM_EVENTS = 100,
+    IDLE_STEPS = 1000,
     FLIGHT_WORK = 8,
     PRESS_WORK = 64,
     WORK_OF_STEP = 20 // multiplications
@@ -141,9 +142,13 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     frame_ode_step(&engine->ode, slice, length, &step);
     ledger_work(&frame->ledger, step.input, step.damping);
     engine->record.base_speed += step.ground;
+    const double before = frame->offset;
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
+    // A step may be shorter than what the clock tells, or end where it began; not very many in turn.
+    engine->idle = frame->offset > before ? 0 : engine->idle + 1;
+    frame->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
         TRY(happen(frame, &step.event));
     else

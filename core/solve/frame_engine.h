@@ -22,6 +22,7 @@ typedef struct FrameEngine {
     FrameTrail trail;
     FrameRecord record;
     double work; // since the watch was asked
+    size_t idle; // steps of contact in a row that took no time
 } FrameEngine;
 
 // `tolerance` is of contacts under a power law. Cleared by frame_engine_clear, also after a failure.

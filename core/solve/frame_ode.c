@@ -538,5 +538,4 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     const double k = (double)series->degree, n = (double)frame->storeys;
     step->work = k * k / 2 * ((double)series->stride + 4 * (double)series->contacts) +
                  (frame->diagonal == NULL ? k * n * n : 0) + 12 * k * (double)series->stride;
-    frame->events += !is_end && !(step->length > 0); // a step may end where it began
 }
