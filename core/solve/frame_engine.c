@@ -7,6 +7,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 enum {
     STILL_EVENTS = 1000,
@@ -146,7 +147,8 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
-    // A step may be shorter than what the clock tells, or end where it began; not very many in turn.
+    // A step may be shorter than what the clock tells, or end where it began; not very many in
+    // turn.
     engine->idle = frame->offset > before ? 0 : engine->idle + 1;
     frame->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
@@ -317,6 +319,18 @@ void frame_engine_take_sample(FrameEngine *engine) {
     frame_record_peaks(frame);
 }
 
+// Notes the samples just passed: so many flown over, or the present one.
+static void track(FrameEngine *engine, size_t flown) {
+    const Frame *frame = &engine->frame;
+    const FrameTrail *trail = &engine->trail;
+    for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
+        const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
+        memcpy(engine->track + (sample - 1) % TRAIL_MOST * frame->padded,
+               flown > 0 ? trail->q + k * trail->padded : frame->q,
+               frame->storeys * sizeof *engine->track);
+    }
+}
+
 Status frame_engine_step(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
     const size_t flown = fly(engine, until);
@@ -328,6 +342,8 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
         frame->offset = 0;
         frame_engine_take_sample(engine);
     }
+    if (engine->track != NULL)
+        track(engine, flown);
     balance(frame);
     return STATUS_OK;
 }

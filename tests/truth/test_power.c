@@ -275,6 +275,8 @@ int main(int argc, char **argv) {
         scenes = (size_t)strtoul(argv[1], NULL, 10);
         seed = strtoull(argv[2], NULL, 10);
         is_verbose = argc > 3;
+        if (argc > 4)
+            cmocka_set_test_filter(argv[4]);
     }
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
