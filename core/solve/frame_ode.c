@@ -79,12 +79,16 @@ static double depth_at(const ContactTerms *terms, double force) {
     return pow(force / terms->stiffness, 1 / terms->exponent);
 }
 
+// Where N has slowed a mass by no more than `error` of its speed.
+static double small_depth(const FrameOdeContact *at, double error) {
+    const double n = at->terms.exponent, m = at->terms.viscous_exponent;
+    return at->depth * pow(error, 1 / ((at->terms.viscous > 0 ? fmin(n, m) : n) + 1));
+}
+
 // Below which p a contact that begins with this speed need not feel N.
 static double find_negligible(const FrameOdeContact *at, double error, double w, double mass) {
-    const double n = at->terms.exponent, m = at->terms.viscous_exponent;
-    double p = 0;
-    if (!at->law.is_whole)
-        p = at->depth * pow(error, 1 / ((at->terms.viscous > 0 ? fmin(n, m) : n) + 1));
+    const double m = at->terms.viscous_exponent;
+    double p = at->law.is_whole ? 0 : small_depth(at, error);
     // Pressed rather than thrown: p = push t^2 / 2.
     if (!(at->push > 0) || !(w * w < 1e-3 * at->push * at->depth))
         return p;
@@ -172,9 +176,13 @@ static double find_contacts(FrameOde *ode) {
         all[first] = moved;
     }
     // Another that is at 0 too has no series of its own until it is pressed.
-    for (size_t c = 1; c < series->contacts; c++)
-        if (!(penetration(&frame->damper[all[c].damper]) > 0))
-            all[c].is_felt = false;
+    for (size_t c = 1; c < series->contacts; c++) {
+        FrameOdeContact *at = &ode->contact[all[c].damper];
+        if (penetration(&frame->damper[all[c].damper]) > 0)
+            continue;
+        all[c].is_felt = false;
+        at->negligible = fmax(at->negligible, small_depth(at, ode->error));
+    }
     series->root = all[0].is_felt ? all[0].law->root : 1;
     return root_of(penetration(&frame->damper[all[0].damper]), series->root);
 }
@@ -286,7 +294,7 @@ static void find_end(const FrameOde *ode, size_t c, Found *found) {
         return;
     for (size_t k = 0; k <= series->degree; k++)
         gap[k] = -gap[k];
-    gap[0] += negligible > 0 ? negligible : ode->contact[contact->damper].depth * 1e-3;
+    gap[0] += negligible;
     if (falls(series, gap, found)) {
         found->is_stop = true;
         found->contact = c;
