@@ -24,6 +24,7 @@ static const double STEP_PART = 0.1;    // of a contact's tolerance, what a step
 static const double SPAN = 0.3;         // a step is about so long, in (root of depth) / speed
 static const double NEARLY_SMALL = 0.9; // of negligible: there it still is
 static const double ROUNDING = DBL_EPSILON / 4;
+static const double STEP_WORK = 800; // of a step without orders, in multiplications
 static const double ORDER_BASE = 2.5, ORDER_RISE = 0.55; // the cheapest order, of log(error)
 
 Status frame_ode_make(FrameOde *ode, Frame *frame, double tolerance, Problem *problem) {
@@ -129,11 +130,13 @@ static void look_at(FrameOde *ode, size_t d) {
     at->strain = at->terms.stiffness * power_of(p, n) * p / (n + 1);
 }
 
-// Which side of the law's kink the motion is on, or goes to.
+// Which side of the law's kink the motion is on. At a kink just passed rounding alone says so.
 static bool is_damped(const FrameOdeContact *at, const FrameDamper *damper) {
     const double w = frame_sign(damper->side) * damper->w, off = w - at->terms.turn;
     if (fabs(off) > 4 * DBL_EPSILON * fabs(w))
         return off > 0;
+    if (at->passed != 0)
+        return at->passed > 0;
     const double spring =
         at->terms.is_elastic_below
             ? at->terms.stiffness * power_of(penetration(damper), at->terms.exponent)
@@ -536,14 +539,17 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     if (!frame->is_shadow)
         take_rows(ode, step->length);
     ode->still = step->length > 0 ? 0 : ode->still + 1;
+    for (size_t c = 0; c < series->contacts; c++)
+        ode->contact[series->contact[c].damper].passed = 0;
     if (found.is_kink) {
         const SeriesContact *contact = &series->contact[found.contact];
         frame->damper[contact->damper].w = contact->sign * contact->terms.turn;
+        ode->contact[contact->damper].passed = contact->is_damped ? -1 : 1;
     }
     step->is_event = is_end;
     step->event = found.event;
     step->event.s = 1;
     const double k = (double)series->degree, n = (double)frame->storeys;
-    step->work = k * k / 2 * ((double)series->stride + 4 * (double)series->contacts) +
+    step->work = STEP_WORK + k * k / 2 * ((double)series->stride + 4 * (double)series->contacts) +
                  (frame->diagonal == NULL ? k * n * n : 0) + 12 * k * (double)series->stride;
 }
