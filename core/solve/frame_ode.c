@@ -193,7 +193,7 @@ static double find_contacts(FrameOde *ode) {
 // What a step of tau is about as long as, and what is large for each component.
 static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *scale) {
     const Frame *frame = ode->frame;
-    const FrameSeries *series = &ode->series;
+    FrameSeries *series = &ode->series;
     const size_t n = frame->storeys;
     const int root = series->root;
     double span = INFINITY;
@@ -208,6 +208,7 @@ static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *sc
         for (size_t i = 0; i < n; i++)
             ode->modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
         const double own = at->depth / speed;
+        series->contact[c].per_force = own / (damper->effective_mass * speed);
         span = own < span ? own : span;
     }
     for (size_t i = 0; i < n; i++)

@@ -240,6 +240,11 @@ INLINE double size_of(const FrameSeries *series, const SeriesScale *scale, size_
     for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
         const size_t d = series->contact[c].damper;
         most = ledger_larger(most, fabs(row[d]) * scale->per_speed[d]);
+        // Powers that follow from those before them spread their rounding, of which w need not
+        // tell.
+        if (c > 0 || !series->contact[c].law->is_whole)
+            most = ledger_larger(most, fabs(series->contact[c].force[k - 1]) *
+                                           series->contact[c].per_force);
     }
     for (size_t i = 0; i < n; i++)
         most = ledger_larger(most, fabs(row[series->at_p + i]) * scale->per_modal[i]);

@@ -35,6 +35,7 @@ typedef struct SeriesContact {
     const SeriesLaw *law;
     bool is_felt;                  // else N is left out, being too small to matter
     bool is_damped;                // p' is above its turn
+    double per_force;              // 1 / what is large for N
     Series speed, spring, viscous; // p', and powers of p
     double force[SERIES_ROW];      // N
 } SeriesContact;
