@@ -13,6 +13,7 @@ enum { SERIES_DEGREE = 26, SERIES_ROW = 28, SERIES_POWERS = 20, SERIES_NODES = 8
 // SERIES_ROW, with zeros behind.
 typedef struct Series {
     double up[SERIES_ROW + 4], down[SERIES_ROW + 4];
+    double now; // of the order that is being computed
 } Series;
 
 // How N follows from Y = p^(1/root), where all of its exponents times root are whole numbers, and
