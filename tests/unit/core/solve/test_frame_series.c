@@ -179,7 +179,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
                 last = steps;
                 pair_clear(&pair);
             }
-            assert_true(last <= 9);
+            assert_true(last <= 12);
         }
     print_message("worst error over tolerance %.2f\n", worst);
 }
@@ -248,6 +248,7 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
         damper->row.impact.approach_speed = 0;
         damper->contact.speed = 1e-6;
         damper->lean = 1e-3; // r'' = 1e-3 a_g, with a_g = 1
+        pair.frame.ground = 1;
         const Slice push = {1, 0, 0};
         FrameOdeStep step;
         double time = 0, deepest = 0;
@@ -261,7 +262,8 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
             // It swings about where k p^n / m_e is the push: energy is kept.
             const double p = damper->r, n = exponents[i];
             const double held = damper->w * damper->w / 2 + 2 * pow(p, n + 1) / (n + 1);
-            assert_true(fabs(held - 1e-3 * p) < 1e-13 * fmax(held, 1e-3 * p) + 1e-22);
+            const double most = 1e-3 * pow(1e-3 / 2 * (n + 1), 1 / n);
+            assert_true(fabs(held - 1e-3 * p) < 1e-13 * held + 1e-14 * most);
         }
         const double n = exponents[i];
         assert_true(deepest > 0.5 * pow(1e-3 / 2 * (n + 1), 1 / n));
