@@ -7,7 +7,7 @@
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
-#include "core/solve/exact.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
 

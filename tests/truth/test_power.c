@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "core/math/fourier.h"
-#include "core/solve/exact.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/frame.h"
 #include "tests/support/scenes.h"
 #include "tests/truth/drawn.h"

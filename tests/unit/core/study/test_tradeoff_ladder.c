@@ -11,7 +11,7 @@
 #include "core/excite/random.h"
 #include "core/math/fourier.h"
 #include "core/simulation/compare.h"
-#include "core/solve/exact.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/study/tradeoff_ladder.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
