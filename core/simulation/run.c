@@ -7,6 +7,7 @@
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
 
@@ -300,10 +301,15 @@ static double steps_a_sample(const Scene *scene, double *planning) {
     return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
 }
 
-// Contacts under a power law: some 6000 steps' worth each, at a guess seven a second.
-static double power_steps(const Scene *scene) {
+// Contacts under a power law: at a guess seven a second, each of some 1000 steps' worth and of more
+// for each digit of its tolerance, for each mode.
+static double power_steps(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    return law->form == CONTACT_POWER ? 7 * 6000.0 * scene->duration * (double)scene->dampers.count
+    const double storeys = (double)structure_storeys(scene_structure(scene));
+    const double digits = -log10(exact_tolerance(settings(simulation)));
+    return law->form == CONTACT_POWER ? 7 * (1000 + 400 * digits * (0.5 + storeys / 2)) *
+                                            scene->duration * (double)scene->dampers.count
                                       : 0;
 }
 
@@ -319,7 +325,7 @@ static double exact_steps(const Simulation *simulation) {
     return planning +
            step *
                (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
-           power_steps(&simulation->scene);
+           power_steps(simulation);
 }
 
 // Steps of a solver that knows its own cost.
