@@ -110,6 +110,23 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                              "masses and stiffnesses are too far apart, or not positive definite");
 }
 
+// What stays moves forward in its array, never past what is still to be read.
+void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count) {
+    const size_t all = modes->count;
+    for (size_t i = 0; i < count; i++) {
+        modes->omega[i] = modes->omega[list[i]];
+        modes->participation[i] = modes->participation[list[i]];
+    }
+    for (size_t j = 0; j < storeys; j++)
+        for (size_t i = 0; i < count; i++)
+            modes->shapes[j * count + i] = modes->shapes[j * all + list[i]];
+    for (size_t k = 0; k < count; k++)
+        for (size_t i = 0; i < count; i++)
+            modes->damping[k * count + i] = modes->damping[list[k] * all + list[i]];
+    modes->count = count;
+    modes->is_classical = modes->is_classical || count == 1;
+}
+
 void modes_clear(Modes *modes) {
     if (modes == NULL)
         return;

@@ -135,6 +135,23 @@ static Status check_solver(const Simulation *simulation, Problem *problem) {
                        solver->kind.name, law->kind.name);
 }
 
+// All modes are as many as storeys, which is what none asked for means.
+static Status complete_modes(const Simulation *simulation, Problem *problem) {
+    Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (accuracy->modes == COUNT_ABSENT)
+        return STATUS_OK;
+    if (accuracy->modes > storeys)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes", (double)accuracy->modes,
+                                NULL,
+                                "must be at most %zu, the structure has one mode per storey, is "
+                                "%llu",
+                                storeys, (unsigned long long)accuracy->modes);
+    if (accuracy->modes == storeys)
+        accuracy->modes = COUNT_ABSENT;
+    return STATUS_OK;
+}
+
 // A scene that can be told beforehand to take too long is refused at once.
 static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
                          Problem *problem) {
@@ -188,6 +205,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
         status = check_values(simulation, limits, problem);
     if (status == STATUS_OK)
         status = check_solver(simulation, problem);
+    if (status == STATUS_OK)
+        status = complete_modes(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)

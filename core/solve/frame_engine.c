@@ -26,7 +26,7 @@ Status frame_engine_check(FrameEngine *engine) {
     engine->work = 0;
     const EnergyState energy = frame_energy(frame);
     double sum = energy.kinetic + energy.strain;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         sum += fabs(frame->q[i]);
     for (size_t d = 0; d < frame->dampers; d++)
         sum += fabs(frame->damper[d].r);
@@ -48,7 +48,7 @@ Status frame_engine_check(FrameEngine *engine) {
 // for each mode and damper, as simulation_cost foresees.
 static Status count_steps(FrameEngine *engine, double count, double each) {
     const Frame *frame = &engine->frame;
-    const double n = (double)frame->storeys, m = (double)frame->dampers;
+    const double n = (double)frame->mode_count, m = (double)frame->dampers;
     const double pairs = frame->diagonal != NULL ? 0 : n * n;
     frame->run->steps += count * (n * (1 + m) + pairs / 4);
     engine->work += count * each * (n * (1 + m) + pairs);

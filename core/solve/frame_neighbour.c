@@ -15,7 +15,7 @@ static double nudge_of(const Frame *frame) {
 // Some roundings more, of either sign.
 static void nudge(Frame *frame) {
     const double by = nudge_of(frame);
-    for (size_t i = 0; i < frame->storeys; i++) {
+    for (size_t i = 0; i < frame->mode_count; i++) {
         const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
         frame->q[i] *= 1 + sign * by;
         frame->p[i] *= 1 - sign * by;
@@ -23,7 +23,7 @@ static void nudge(Frame *frame) {
 }
 
 static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
         apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
@@ -33,7 +33,7 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     if (bound <= neighbour->worst)
         return;
     const double *values = frame_spread(frame, apart);
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < frame->storey_count; j++)
         difference = fmax(difference, fabs(values[j]));
     neighbour->worst = fmax(neighbour->worst, difference);
     if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))

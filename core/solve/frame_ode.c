@@ -14,7 +14,7 @@ enum { WATCHED = 3, END = 0, KINK = 1, PEAK = 2, TOTALS = 3 };
 
 // Where the parts of y begin.
 static size_t at_r(const Frame *frame) {
-    return 2 * frame->storeys;
+    return 2 * frame->mode_count;
 }
 static size_t at_impulse(const Frame *frame) {
     return at_r(frame) + 2 * frame->dampers;
@@ -38,7 +38,7 @@ static ContactForce force_at(const Frame *frame, size_t d, const double *y) {
 static void rate(const void *context, double t, const double *y, double *out) {
     const FrameOde *ode = context;
     const Frame *frame = ode->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *q = y, *p = y + n, *w = y + at_r(frame) + m;
     double *acceleration = out + n, *relative = out + at_r(frame) + m;
     double *impulse = out + at_impulse(frame), *total = out + at_totals(frame);
@@ -144,7 +144,7 @@ bool frame_ode_serves(const FrameOde *ode) {
 // What is large for each component; returns the time in which a contact goes on.
 static double make_scale(FrameOde *ode) {
     const Frame *frame = ode->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *scale = ode->scale, *relative = scale + at_r(frame), *sums = scale + at_impulse(frame);
     double square = frame_dot(frame->p, frame->p, n), time = frame->interval, fastest = 0;
     double momentum = 0, energy = 0;
@@ -183,7 +183,7 @@ static double make_scale(FrameOde *ode) {
 
 static Status start(FrameOde *ode, Problem *problem) {
     const Frame *frame = ode->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *y = ode->y, *r = y + at_r(frame);
     memset(y, 0, size_of(frame) * sizeof *y);
     memcpy(y, frame->q, n * sizeof *y);
@@ -208,7 +208,7 @@ static Status start(FrameOde *ode, Problem *problem) {
 // The frame's state becomes y; what was summed up goes where it belongs.
 static void take(FrameOde *ode, FrameOdeStep *step) {
     Frame *frame = ode->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *y = ode->y, *before = ode->before, *r = y + at_r(frame);
     const size_t sums = at_impulse(frame), totals = at_totals(frame);
     memcpy(frame->q, y, n * sizeof *y);

@@ -1,6 +1,11 @@
 #include "core/solve/solvers.h"
 
-const Field accuracy_fields[] = {FIELD_END};
+// clang-format off
+const Field accuracy_fields[] = {
+    FIELD_COUNT(Accuracy, modes, NULL, AT_LEAST(1), OPTIONAL, "natural modes of a structure with several storeys that move, the slowest; all if absent"),
+    FIELD_END
+};
+// clang-format on
 
 static const Solver solver_auto = {
     .kind = {"auto", "the solver that the plan finds best", accuracy_fields, sizeof(Accuracy)},
