@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/plan/keep.h"
+#include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
@@ -60,6 +61,8 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
     memset(report, 0, sizeof *report);
+    if (aim_is_asked(simulation))
+        return aim_plan(simulation, report, problem);
     TRY(make_plan(simulation, &plan, problem));
     *report = plan->report;
     memset(&plan->report, 0, sizeof plan->report);
@@ -254,6 +257,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem) {
     *outcome = NULL;
+    if (aim_is_asked(simulation))
+        return aim_run(simulation, limits, watch, workspace, outcome, problem);
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
@@ -367,6 +372,8 @@ static double own_steps(const Simulation *simulation) {
 }
 
 Cost simulation_cost(const Simulation *simulation) {
+    if (aim_is_asked(simulation))
+        return aim_cost(simulation);
     const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
     double steps =

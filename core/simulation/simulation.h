@@ -82,7 +82,8 @@ struct Outcome {
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
 // at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
-// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop. `workspace` may be NULL.
+// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop.
+// `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem);

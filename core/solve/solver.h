@@ -22,6 +22,13 @@ static inline size_t accuracy_modes(const Accuracy *accuracy, size_t storeys) {
     return accuracy == NULL || accuracy->modes >= storeys ? storeys : (size_t)accuracy->modes;
 }
 
+// Of "auto", which has no run of its own.
+typedef struct AccuracyAuto {
+    Accuracy accuracy;
+    double target; // NAN: none
+    int metric;    // Metric
+} AccuracyAuto;
+
 // Where the samples of one channel go.
 typedef struct RunColumn {
     ChannelId channel;
