@@ -14,6 +14,8 @@
 
 static const double TOGETHER = 2.5; // swings of many modes come to more than this times their root
                                     // of squares in few runs
+static const double ROUGH = 1.25, ROUGHER = 1.8; // displacement and rms; acceleration
+static const double TIED = 2;                    // where damping couples the modes
 static const double APART = 0.7; // the largest displacement is seldom less than this times that
 
 // At one storey, of the modes left out so far, or of all.
@@ -62,21 +64,57 @@ static Whole whole_of(const Plan *plan, const Level *levels, const Wave *wave) {
     Whole whole = {0};
     for (size_t j = 0; j < plan->storeys; j++) {
         Sum sum = {0};
-        double pull[2] = {0}, swings = 0;
+        double pull[2] = {0}, swings = 0, calm = 0;
         for (size_t k = 0; k < n; k++) {
             const double shape = modes->shapes[j * n + k],
                          stiff = modes->omega[k] * modes->omega[k];
             add(&sum, shape, &levels[k]);
             for (int i = 0; i < 2; i++)
                 pull[i] += shape * stiff * levels[k].pushed[i] * wave->rms;
-            swings += shape * shape * levels[k].accelerated * levels[k].accelerated;
+            const double own = shape * levels[k].accelerated * levels[k].sure;
+            swings += own * own;
+            calm += pow(shape * levels[k].rms * levels[k].sure, 2);
         }
+        sum.mean = calm;
         const double least = fmax(wave_of(&sum) * wave->least, APART * sqrt(sum.least));
         whole.displacement = fmax(whole.displacement, fmax(least, fabs(plan->displacement[j])));
         whole.rms = fmax(whole.rms, sqrt(mean_square(&sum, wave)));
         whole.acceleration += pull[0] * pull[0] + pull[1] * pull[1] + swings;
     }
     return whole;
+}
+
+// What coupled damping does to the modes kept by those left out, through these: it shifts their
+// frequencies, by D_jk^2 / (2 w_k^2) of them, and with time their phases.
+typedef struct Shift {
+    double part;   // of the frequency
+    double turned; // what a whole part of it would come to, times how far the mode moves [m]
+} Shift;
+
+static void start_shifts(const Plan *plan, const Level *levels, Shift *shifts) {
+    const Modes *modes = &plan->modes;
+    const size_t n = modes->count;
+    for (size_t j = 0; j < n; j++) {
+        const double slack = modes->damping[j * (n + 1)] / 2;
+        double widest = 0;
+        for (size_t i = 0; i < plan->storeys; i++)
+            widest = fmax(widest, fabs(modes->shapes[i * n + j]));
+        const double size = levels[j].peak + hypot(levels[j].pushed[0], levels[j].pushed[1]);
+        shifts[j] = (Shift){0, widest * size * modes->omega[j] *
+                                   fmin(plan->duration, 1 / fmax(slack, 1e-300))};
+    }
+}
+
+// The modes from k on are left out.
+static double shift(const Modes *modes, size_t k, Shift *shifts) {
+    const double square = modes->omega[k] * modes->omega[k];
+    double most = 0;
+    for (size_t j = 0; j < k; j++) {
+        const double tie = modes->damping[j * modes->count + k];
+        shifts[j].part += tie * tie / (2 * square);
+        most += shifts[j].part * shifts[j].turned;
+    }
+    return most;
 }
 
 // a / b, at most 1; 0 where there is nothing.
@@ -89,9 +127,15 @@ static Status predict(const Plan *plan, const Level *levels, const Wave *wave,
     const Modes *modes = &plan->modes;
     const size_t n = modes->count;
     const Whole whole = whole_of(plan, levels, wave);
+    const double tied = modes->is_classical ? 1 : TIED;
     Sum *sums = calloc(plan->storeys, sizeof *sums);
-    if (sums == NULL)
+    Shift *shifts = calloc(n, sizeof *shifts);
+    if (sums == NULL || shifts == NULL) {
+        free(sums);
+        free(shifts);
         return STATUS_NO_MEMORY;
+    }
+    start_shifts(plan, levels, shifts);
     double swings = 0;
     errors[n - 1] = (TruncationError){0};
     for (size_t k = n - 1; k > 0; k--) {
@@ -105,12 +149,15 @@ static Status predict(const Plan *plan, const Level *levels, const Wave *wave,
             const double moved = wave_of(&sums[j]) * wave->rms * wave->accelerated;
             pushed += moved * moved;
         }
+        const double shifted = modes->is_classical ? 0 : shift(modes, k, shifts);
         errors[k - 1] = (TruncationError){
-            .displacement = part(most, whole.displacement),
-            .mean_acceleration = part(sqrt(pushed + swings), sqrt(whole.acceleration)),
-            .rms_displacement = part(rms, whole.rms),
+            .displacement = part(ROUGH * (most + shifted), whole.displacement),
+            .mean_acceleration =
+                part(ROUGHER * tied * sqrt(pushed + swings), sqrt(whole.acceleration)),
+            .rms_displacement = part(ROUGH * rms, whole.rms),
         };
     }
+    free(shifts);
     free(sums);
     return STATUS_OK;
 }

@@ -36,10 +36,11 @@ static double square(double x) {
     return x * x;
 }
 
-// What a mean over a sample interval leaves of a wave.
+// What a mean over a sample interval leaves of a wave, which is never quite nothing: waves begin,
+// and die away.
 static double mean_of(double omega, double interval) {
     const double half = omega * interval / 2;
-    return half > 1e-6 ? fmin(fabs(sin(half) / half), 1) : 1;
+    return half > 1e-6 ? fmin(fmax(fabs(sin(half)), 0.5) / half, 1) : 1;
 }
 
 // Mean of exp(-2 s t) over a time.
@@ -179,7 +180,10 @@ static void random_level(Level *level, Wave *wave, const Mode *mode, const Excit
     const double least = sqrt(-2 * log1p(-pow(RARE, 1 / draws)));
     const double wave_most = sqrt(2 * log(cycles / RARE));
     const double behind = sqrt(share * follows) * base->rms; // rms of what follows
-    const double rms = sqrt(mean + (is_beyond ? 0 : square(behind)));
+    // A short run has an rms of its own.
+    const double chance = 0.7 / sqrt(draws);
+    const double rms = (1 + chance) * sqrt(mean + (is_beyond ? 0 : square(behind)));
+    level->sure = fmin(level->sure, (1 - chance) / (1 + chance));
     wave->rms = 1 / wave_most;
     wave->least = sqrt(-2 * log1p(-pow(RARE, 1 / cycles))) / wave_most;
     wave->accelerated = sqrt(fourth);
@@ -207,6 +211,7 @@ static void chirp(Level *level, Wave *wave, const Mode *mode, const ExcitationCh
     wave->accelerated = square(2 * pi * high) * mean_of(2 * pi * high, mode->interval);
     if (f <= high * 1.1 + edge && f >= low / 1.1 - edge) {
         swing(level, mode, still * fmax(grown, 2), mode->time);
+        level->sure = 0.25; // it passes at some time
         level->least = fmax(level->least, 0.5 * still * fmin(grown, 2));
         return;
     }
@@ -290,7 +295,10 @@ static void record_level(Level *level, const Mode *mode, const Integrated *at, d
         level->pushed[0] = -mode->share * wave * highest;
     level->peak += share * (is_stiff ? at->stray : at->peak);
     level->rms = hypot(level->rms, share * (is_stiff ? at->stray_rms : at->rms));
-    level->accelerated = hypot(level->accelerated, share * at->accelerated);
+    level->accelerated =
+        hypot(level->accelerated,
+              share * fmax(at->accelerated, mean_of(mode->omega, mode->interval) / wave *
+                                                (is_stiff ? at->stray_rms : at->rms)));
     level->least = fmax(level->least, share * at->peak);
 }
 
@@ -371,6 +379,39 @@ static double modal(const Plan *plan, size_t k, const double *carried) {
     return (double)sum;
 }
 
+// What coupled damping makes of a mode: it follows the others' speeds, about as it would follow one
+// of them alone. `room` holds a number for each mode.
+static void couple(const Plan *plan, const Wave *wave, Level *levels, double *room) {
+    const Modes *modes = &plan->modes;
+    const size_t n = modes->count;
+    const double turning = sqrt(wave->accelerated);
+    for (size_t j = 0; j < n; j++) {
+        const double omega = fmax(modes->omega[j], 1 / plan->duration);
+        room[j] =
+            levels[j].peak * omega + hypot(levels[j].pushed[0], levels[j].pushed[1]) * turning;
+        room[n + j] = levels[j].peak > 0 ? levels[j].rms / levels[j].peak : wave->rms;
+    }
+    for (size_t k = 0; k < n; k++) {
+        const double own = fmax(modes->omega[k], 1 / plan->duration);
+        double peaks = 0, squares = 0, pulls = 0;
+        for (size_t j = 0; j < n; j++) {
+            const double other = fmax(modes->omega[j], 1 / plan->duration);
+            const double away = fabs(own - other) * (own + other) +
+                                fmax(modes->damping[k * (n + 1)], 1 / plan->duration) * other;
+            const double peak = fabs(modes->damping[k * n + j]) * room[j] / away;
+            if (j == k)
+                continue;
+            peaks += peak * peak;
+            squares += pow(peak * room[n + j], 2);
+            pulls +=
+                pow(peak * room[n + j] * square(other) * mean_of(other, 1 / plan->sample_rate), 2);
+        }
+        levels[k].peak += 2 * sqrt(peaks);
+        levels[k].rms = hypot(levels[k].rms, sqrt(squares));
+        levels[k].accelerated = hypot(levels[k].accelerated, sqrt(pulls));
+    }
+}
+
 Status levels_make(const Plan *plan, const Scene *scene, Level *levels, Wave *wave) {
     const size_t n = plan->storeys;
     const bool is_still = levels_is_still(scene);
@@ -385,13 +426,15 @@ Status levels_make(const Plan *plan, const Scene *scene, Level *levels, Wave *wa
     *wave = (Wave){0};
     for (size_t k = 0; k < plan->modes.count; k++) {
         const Mode mode = mode_of(plan, k);
-        levels[k] = (Level){0};
+        levels[k] = (Level){.sure = 1};
         start(&levels[k], &mode, modal(plan, k, carried), modal(plan, k, carried + n));
         if (!is_still)
             base_level(&levels[k], wave, &mode, scene->excitation);
     }
-    free(carried);
     if (scene->excitation->kind == &excitation_record.kind)
         records(levels, wave, plan, (const void *)scene->excitation);
+    if (!plan->modes.is_classical)
+        couple(plan, wave, levels, carried);
+    free(carried);
     return STATUS_OK;
 }

@@ -13,6 +13,7 @@ typedef struct Level {
     double accelerated; // rms of the rest's mean q'' over sample intervals
     double start;       // q at t = 0
     double least;       // a peak of all of it that is seldom missed
+    double sure;        // likewise of rms and acceleration, over these
 } Level;
 
 // What the waves have in common.
