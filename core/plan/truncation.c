@@ -10,11 +10,12 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "core/plan/truncation_blows.h"
 #include "core/plan/truncation_levels.h"
 
 static const double TOGETHER = 2.5; // swings of many modes come to more than this times their root
                                     // of squares in few runs
-static const double ROUGH = 1.25, ROUGHER = 1.8; // displacement and rms; acceleration
+static const double ROUGH = 1.25, ROUGHER = 2.3; // displacement and rms; acceleration
 static const double TIED = 2;                    // where damping couples the modes
 static const double APART = 0.7; // the largest displacement is seldom less than this times that
 
@@ -24,16 +25,18 @@ typedef struct Sum {
     double start;          // at t = 0
     double peaks, squares; // of the rest: sum of peaks, and of their squares
     double mean;           // mean square of the rest
+    double like;           // of that which goes like the motion's largest part for the run's time
     double least;          // sum of squares of what is seldom missed
 } Sum;
 
-static void add(Sum *sum, double shape, const Level *level) {
+static void add(Sum *sum, double shape, const Level *level, double like) {
     sum->pushed[0] += shape * level->pushed[0];
     sum->pushed[1] += shape * level->pushed[1];
     sum->start += shape * level->start;
     sum->peaks += fabs(shape) * level->peak;
     sum->squares += shape * shape * level->peak * level->peak;
     sum->mean += shape * shape * level->rms * level->rms;
+    sum->like += pow(shape * level->rms * like, 2);
     sum->least += shape * shape * level->least * level->least;
 }
 
@@ -68,7 +71,7 @@ static Whole whole_of(const Plan *plan, const Level *levels, const Wave *wave) {
         for (size_t k = 0; k < n; k++) {
             const double shape = modes->shapes[j * n + k],
                          stiff = modes->omega[k] * modes->omega[k];
-            add(&sum, shape, &levels[k]);
+            add(&sum, shape, &levels[k], 0);
             for (int i = 0; i < 2; i++)
                 pull[i] += shape * stiff * levels[k].pushed[i] * wave->rms;
             const double own = shape * levels[k].accelerated * levels[k].sure;
@@ -117,6 +120,33 @@ static double shift(const Modes *modes, size_t k, Shift *shifts) {
     return most;
 }
 
+// The mode with most of the motion.
+static size_t find_largest(const Plan *plan, const Level *levels) {
+    const Modes *modes = &plan->modes;
+    size_t largest = 0;
+    double most = 0;
+    for (size_t k = 0; k < modes->count; k++) {
+        double widest = 0;
+        for (size_t j = 0; j < plan->storeys; j++)
+            widest = fmax(widest, fabs(modes->shapes[j * modes->count + k]));
+        if (widest * levels[k].rms > most) {
+            most = widest * levels[k].rms;
+            largest = k;
+        }
+    }
+    return largest;
+}
+
+// How alike two modes swing on the whole: hardly, where their frequencies part in the time there
+// is.
+static double alike(const Plan *plan, size_t k, size_t of) {
+    const Modes *modes = &plan->modes;
+    const size_t next = modes->count + 1;
+    const double slack = (modes->damping[k * next] + modes->damping[of * next]) / 2;
+    const double time = fmin(plan->duration, 1 / fmax(slack, 1e-300));
+    return fmin(1, 3 / fmax(fabs(modes->omega[k] - modes->omega[of]) * time, 1e-300));
+}
+
 // a / b, at most 1; 0 where there is nothing.
 static double part(double a, double b) {
     return a > 0 ? (b > 0 && a < b ? a / b : 1) : 0;
@@ -130,33 +160,50 @@ static Status predict(const Plan *plan, const Level *levels, const Wave *wave,
     const double tied = modes->is_classical ? 1 : TIED;
     Sum *sums = calloc(plan->storeys, sizeof *sums);
     Shift *shifts = calloc(n, sizeof *shifts);
-    if (sums == NULL || shifts == NULL) {
+    Blows *blows = calloc(plan->damper_count + 1, sizeof *blows);
+    if (sums == NULL || shifts == NULL || blows == NULL) {
         free(sums);
         free(shifts);
+        free(blows);
         return STATUS_NO_MEMORY;
     }
     start_shifts(plan, levels, shifts);
+    size_t struck = 0; // dampers
+    for (size_t d = 0; d < plan->damper_count; d++)
+        struck += blows_start(&blows[struck], plan, d, levels, wave);
+    const size_t largest = find_largest(plan, levels);
     double swings = 0;
     errors[n - 1] = (TruncationError){0};
     for (size_t k = n - 1; k > 0; k--) {
         double most = 0, rms = 0, pushed = 0;
+        const double like = alike(plan, k, largest);
         for (size_t j = 0; j < plan->storeys; j++) {
             const double shape = modes->shapes[j * n + k];
-            add(&sums[j], shape, &levels[k]);
+            add(&sums[j], shape, &levels[k], like);
             swings += shape * shape * levels[k].accelerated * levels[k].accelerated;
             most = fmax(most, most_of(&sums[j]));
-            rms = fmax(rms, sqrt(mean_square(&sums[j], wave)));
+            // What goes like the rest adds to its rms; what does not, to its square.
+            rms = fmax(rms, hypot(wave_of(&sums[j]) * wave->rms, sqrt(sums[j].like)) +
+                                sums[j].mean / (2 * whole.rms));
             const double moved = wave_of(&sums[j]) * wave->rms * wave->accelerated;
             pushed += moved * moved;
         }
+        Blow blow = {0};
+        for (size_t d = 0; d < struck; d++) {
+            const Blow one = blows_leave(&blows[d], k);
+            blow.displacement += one.displacement;
+            blow.acceleration = hypot(blow.acceleration, one.acceleration);
+            blow.rms += one.rms;
+        }
         const double shifted = modes->is_classical ? 0 : shift(modes, k, shifts);
         errors[k - 1] = (TruncationError){
-            .displacement = part(ROUGH * (most + shifted), whole.displacement),
-            .mean_acceleration =
-                part(ROUGHER * tied * sqrt(pushed + swings), sqrt(whole.acceleration)),
-            .rms_displacement = part(ROUGH * rms, whole.rms),
+            .displacement = part(ROUGH * (most + shifted) + blow.displacement, whole.displacement),
+            .mean_acceleration = part(ROUGHER * tied * sqrt(pushed + swings) + blow.acceleration,
+                                      sqrt(whole.acceleration)),
+            .rms_displacement = part(ROUGH * rms + blow.rms, whole.rms),
         };
     }
+    free(blows);
     free(shifts);
     free(sums);
     return STATUS_OK;
