@@ -70,6 +70,9 @@ static void start(Level *level, const Mode *mode, double q, double p) {
     const double reached = turn < pi / 2 ? sin(turn) : 1;
     level->start = q;
     swing(level, mode, hypot(q, p / omega), mode->time);
+    // The first sample has no interval to take a mean over: it is q'' itself.
+    const double first = square(mode->omega) * fabs(q) + 2 * mode->slack * fabs(p);
+    level->accelerated = hypot(level->accelerated, first / sqrt(1 + mode->time / mode->interval));
     level->least = fmax(fabs(q), speed * (mode->omega > 0 ? reached : 1) *
                                      exp(-fmin(mode->slack / omega, 1) * pi / 2));
 }
