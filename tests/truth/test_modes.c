@@ -288,10 +288,8 @@ static void judge(uint64_t number, bool has_dampers) {
         }
         tally->estimates++;
         tally->short_estimates += !(outcome->summary.error_estimate >= fmin(found.displacement, 1));
-        if (outcome->response.energy.residual > 1e-9)
-            printf("  %llu %s: %zu of %zu modes: residual %.2g, %.2g of all\n",
-                   (unsigned long long)number, kind_names[drawn.kind], kept, drawn.storeys,
-                   outcome->response.energy.residual, all->response.energy.residual);
+        // One in some 100000 contacts leaves more than rounding, with all modes as with some.
+        assert_true(outcome->response.energy.residual < 1e-6);
         outcome_drop(outcome);
     }
     outcome_drop(all);
