@@ -24,6 +24,8 @@ static void damp(Modes *modes, const double *damping, long double *work) {
         for (size_t a = 0; a < n; a++) {
             carried[a] = magnitude[a] = 0;
             for (size_t b = 0; b < n; b++) {
+                if (damping[a * n + b] == 0)
+                    continue;
                 const long double term = (long double)damping[a * n + b] * modes->shapes[b * n + j];
                 carried[a] += term;
                 magnitude[a] += fabsl(term);

@@ -199,11 +199,15 @@ static double bound(const Frame *frame, const double *modal) {
     return most;
 }
 
+// Eight at a time: behind `count` values come zeros to whole vectors.
 static double largest_of(const double *values, size_t count) {
-    double most[2] = {0, 0};
-    for (size_t j = 0; j < count; j++)
-        most[j % 2] = ledger_larger(most[j % 2], fabs(values[j]));
-    return ledger_larger(most[0], most[1]);
+    double most[FRAME_LANES] = {0};
+    for (size_t j = 0; j < count; j += FRAME_LANES)
+        for (size_t i = 0; i < FRAME_LANES; i++)
+            most[i] = ledger_larger(most[i], fabs(values[j + i]));
+    for (size_t i = 1; i < FRAME_LANES; i++)
+        most[0] = ledger_larger(most[0], most[i]);
+    return most[0];
 }
 
 // The largest of all storeys.
