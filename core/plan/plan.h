@@ -139,9 +139,9 @@ typedef struct Plan {
 // what the accuracy object said. Freed by plan_free.
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
-// A plan without modes and reasons, in a small part of the time, to tell what a run may cost. Freed
-// by plan_free.
-Status plan_sketch(const Scene *scene, Plan **plan);
+// A plan without modes and reasons, in a small part of the time, to tell what a run may cost that
+// keeps so many modes. Freed by plan_free.
+Status plan_sketch(const Scene *scene, size_t modes, Plan **plan);
 void plan_free(Plan *plan);
 
 // Whether the engine for one mass serves: one storey that moves with the base, at most one damper,

@@ -349,7 +349,9 @@ static double exact_steps(const Simulation *simulation) {
     const bool has_damper = simulation->scene.dampers.count > 0;
     // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
     StructureRates rates;
-    if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
+    const Structure *structure = scene_structure(&simulation->scene);
+    const size_t modes = accuracy_modes(common_settings(simulation), structure_storeys(structure));
+    if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
         rates.fastest = 0; // a guess without memory: the run will tell
     double planning, step = steps_a_sample(simulation, &planning);
     return planning +
@@ -362,9 +364,10 @@ static double exact_steps(const Simulation *simulation) {
 static double own_steps(const Simulation *simulation) {
     const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
     Plan *plan;
-    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
+    if (plan_sketch(&simulation->scene,
+                    accuracy_modes(common_settings(simulation), (size_t)storeys),
+                    &plan) != STATUS_OK)
         return 0; // the run will tell why
-    plan->kept = accuracy_modes(common_settings(simulation), plan->storeys);
     const double steps =
         chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);
     plan_free(plan);
