@@ -308,12 +308,30 @@ static void the_summary_is_of_the_same_motion(void **state) {
         }
 }
 
+static void fewer_modes_are_fewer_steps(void **state) {
+    (void)state;
+    double all[2];
+    for (int has_contact = 0; has_contact < 2; has_contact++)
+        for (size_t kept = N; kept > 0; kept--) {
+            char accuracy[32];
+            snprintf(accuracy, sizeof accuracy, "\"modes\": %zu", kept);
+            Outcome *outcome = run(accuracy, has_contact, 100, sine);
+            if (kept == N)
+                all[has_contact] = outcome->steps;
+            assert_true(outcome->steps > 0);
+            assert_true(fabs(outcome->steps - all[has_contact] * (double)kept / N) <=
+                        0.05 * all[has_contact]);
+            outcome_drop(outcome);
+        }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_solver_moves_the_modes_that_are_kept),
         cmocka_unit_test(a_free_mass_meets_the_storey_that_they_move),
         cmocka_unit_test(a_mass_that_meets_nothing_stays_where_it_is),
         cmocka_unit_test(the_summary_is_of_the_same_motion),
+        cmocka_unit_test(fewer_modes_are_fewer_steps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
