@@ -9,7 +9,8 @@
 #include <math.h>
 
 static const double pi = 3.14159265358979323846;
-static const double CARRIED = 0.3; // more of a wrong, from one impact to the next, as a logarithm
+static const double ROUNDING = 1e-15;
+static const double CARRIED = 0.35; // more of a wrong, from one impact to the next, as a logarithm
 
 // C of a blow that lasts: no more than a half-sine's.
 static double lasting(double omega, double time) {
@@ -76,10 +77,12 @@ Blow blows_leave(Blows *blows, size_t k) {
     blows->struck_pull = hypot(blows->struck_pull, taken * omega * often);
     blows->stiff += shape * shape / (1 + square(omega * blows->time / pi)) / blows->yield;
     blows->still = hypot(blows->still, shape * blows->levels[k].peak * omega);
-    const double wrong = blows->stiff + (blows->still + blows->struck * omega) / blows->speed;
+    // Rounding alone parts such motions, and leaving out any mode changes it.
+    const double wrong =
+        ROUNDING + blows->stiff + (blows->still + blows->struck * omega) / blows->speed;
     const double grown = wrong * exp(fmin(CARRIED * blows->count, 40));
     const double part = fmin(grown, 1) * sqrt(1 + blows->remembered);
     return (Blow){.displacement = blows->struck + blows->moved * part,
                   .acceleration = blows->struck_pull + sqrt(blows->pulled) * part,
-                  .rms = blows->struck / 2 + blows->moved * part / 2};
+                  .rms = blows->struck + blows->moved * part};
 }
