@@ -10,7 +10,9 @@
 
 static const double pi = 3.14159265358979323846;
 static const double ROUNDING = 1e-15;
-static const double CARRIED = 0.35; // more of a wrong, from one impact to the next, as a logarithm
+// More of a wrong, from one impact to the next, as a logarithm; the last impacts of a free motion
+// come at a time that hangs on all before.
+static const double CARRIED = 0.35, CARRIED_FREE = 0.7;
 
 // C of a blow that lasts: no more than a half-sine's.
 static double lasting(double omega, double time) {
@@ -49,6 +51,7 @@ bool blows_start(Blows *blows, const Plan *plan, size_t damper, const Level *lev
     const double room = of->clearance / 2 - fabs(of->position);
     if (wave->rms == 0 && 2 * blows->reach + fabs(of->velocity) * plan->duration < room)
         return false;
+    blows->carried = wave->rms == 0 ? CARRIED_FREE : CARRIED;
     blows->yield = 1 / of->effective_mass;
     blows->impulse = of->effective_mass * (1 + restitution) * blows->speed;
     const double swing = blows->reach > 0 ? blows->speed / blows->reach / (2 * pi) : 0;
@@ -80,7 +83,7 @@ Blow blows_leave(Blows *blows, size_t k) {
     // Rounding alone parts such motions, and leaving out any mode changes it.
     const double wrong =
         ROUNDING + blows->stiff + (blows->still + blows->struck * omega) / blows->speed;
-    const double grown = wrong * exp(fmin(CARRIED * blows->count, 40));
+    const double grown = wrong * exp(fmin(blows->carried * blows->count, 40));
     const double part = fmin(grown, 1) * sqrt(1 + blows->remembered);
     return (Blow){.displacement = blows->struck + blows->moved * part,
                   .acceleration = blows->struck_pull + sqrt(blows->pulled) * part,

@@ -13,6 +13,7 @@ typedef struct Blows {
     size_t storey;
     double impulse, time;     // of one impact: J [N s], T_c [s]
     double count, remembered; // impacts of the run; those that the motion still has of them
+    double carried;           // of what one impact gets wrong, by the next, as a logarithm
     double speed, reach;      // of the storey [m/s], [m]
     double yield;             // 1/m and what gives way at the storey [1/kg]
     double moved, pulled;     // what one impact does to the motion, all modes [m], [m/s^2]
