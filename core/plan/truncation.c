@@ -147,9 +147,9 @@ static double alike(const Plan *plan, size_t k, size_t of) {
     return fmin(1, 3 / fmax(fabs(modes->omega[k] - modes->omega[of]) * time, 1e-300));
 }
 
-// a / b, at most 1; 0 where there is nothing.
+// a / b, at most 1, which is also what cannot be told; 0 where there is nothing.
 static double part(double a, double b) {
-    return a > 0 ? (b > 0 && a < b ? a / b : 1) : 0;
+    return a == 0 ? 0 : b > 0 && a < b ? a / b : 1;
 }
 
 static Status predict(const Plan *plan, const Level *levels, const Wave *wave,

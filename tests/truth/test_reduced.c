@@ -11,6 +11,7 @@
 
 #include <cmocka.h>
 
+#include "core/plan/keep.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/codec/read.h"
@@ -308,6 +309,52 @@ static void the_summary_is_of_the_same_motion(void **state) {
         }
 }
 
+// Three equal masses on a line, pushed alike, with a damper in the middle: the mode (1, 0, -1) is
+// seen by none of these.
+static size_t run_line(bool is_cut, double *values, size_t *impacts) {
+    static Problem problem;
+    static const char text[] =
+        "{\"structure\": {\"kind\": \"matrices\", \"mass\": [[10, 0, 0], [0, 10, 0], [0, 0, 10]], "
+        "\"stiffness\": [[2000, -1000, 0], [-1000, 2000, -1000], [0, -1000, 2000]], \"damping\": "
+        "[[4, -1, 0], [-1, 3, -1], [0, -1, 4]]}, \"dampers\": [{\"storey\": 2, \"mass\": 1, "
+        "\"clearance\": 0.01, \"buffer\": {\"restitution\": 0.5, \"contact_time\": 0.01}}], "
+        "\"excitation\": {\"kind\": \"sine\", \"frequency\": 1.7, \"amplitude\": 1.5}, "
+        "\"duration\": 2, \"sample_rate\": 50}";
+    const Base base = {.form = BASE_SINE, .amplitude = AMPLITUDE, .omega = TURN * FREQUENCY};
+    Simulation simulation;
+    Response response = {0};
+    RunColumn columns[4];
+    Plan *plan;
+    problem_clear(&problem);
+    (void)read_json(text, strlen(text), simulation_fields, &simulation, &problem);
+    assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
+    assert_int_equal(plan_new(&simulation.scene, "exact", "exact", &plan, &problem), STATUS_OK);
+    if (is_cut)
+        assert_int_equal(plan_keep(plan, &simulation.scene, 0, &problem), STATUS_OK);
+    for (size_t i = 0; i < 4; i++)
+        columns[i] = (RunColumn){i < 3 ? CHANNEL_ACCELERATION : CHANNEL_CONTACT_FORCE,
+                                 i < 3 ? i : 0, values + i * SAMPLES};
+    Run run_of = {.plan = plan, .base = &base, .columns = columns, .column_count = 4};
+    assert_int_equal(solver_exact.run(&run_of, &response, &problem), STATUS_OK);
+    const size_t modes = plan->modes.count;
+    *impacts = response.impacts.count;
+    response_clear(&response);
+    plan_free(plan);
+    simulation_clear(&simulation);
+    return modes;
+}
+
+static void a_mode_that_nothing_sees_makes_no_difference(void **state) {
+    (void)state;
+    static double all[4 * SAMPLES], seen[4 * SAMPLES];
+    size_t impacts[2];
+    assert_int_equal(run_line(false, all, &impacts[0]), 3);
+    assert_int_equal(run_line(true, seen, &impacts[1]), 2);
+    assert_true(impacts[0] > 5 && impacts[0] == impacts[1]);
+    for (size_t i = 0; i < 4; i++)
+        assert_true(miss(seen + i * SAMPLES, all + i * SAMPLES, SAMPLES) < 1e-10);
+}
+
 static void fewer_modes_are_fewer_steps(void **state) {
     (void)state;
     double all[2];
@@ -331,6 +378,7 @@ int main(void) {
         cmocka_unit_test(a_free_mass_meets_the_storey_that_they_move),
         cmocka_unit_test(a_mass_that_meets_nothing_stays_where_it_is),
         cmocka_unit_test(the_summary_is_of_the_same_motion),
+        cmocka_unit_test(a_mode_that_nothing_sees_makes_no_difference),
         cmocka_unit_test(fewer_modes_are_fewer_steps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
