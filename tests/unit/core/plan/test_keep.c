@@ -25,6 +25,10 @@ static Problem problem;
     "-400], [-400, 800]]"
 #define SINE "\"excitation\": {\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1}"
 
+#define CHIRP                                                                                      \
+    "\"excitation\": {\"kind\": \"chirp\", \"start_frequency\": 1, \"end_frequency\": 9, "         \
+    "\"amplitude\": 1}"
+
 static Plan *plan_of(const Simulation *simulation) {
     Plan *plan;
     problem_clear(&problem);
@@ -151,8 +155,7 @@ static void a_foretold_error_falls_with_the_modes_kept_to_nothing(void **state) 
         "\"excitation\": {\"kind\": \"random\", \"band\": [1, 9], \"rms\": 1, \"rate\": 100}",
         "\"excitation\": {\"kind\": \"half_sine\", \"amplitude\": 1, \"length\": 0.1}",
         "\"excitation\": {\"kind\": \"triangular\", \"amplitude\": 1, \"length\": 0.1}",
-        "\"excitation\": {\"kind\": \"chirp\", \"start_frequency\": 1, \"end_frequency\": 9, "
-        "\"amplitude\": 1}",
+        CHIRP,
         "\"excitation\": {\"kind\": \"record\", \"samples\": [0, 1, -1, 0.5], \"interval\": 0.1}",
         "\"excitation\": {\"displacement\": [0, 0, 0, 0]}",
     };
