@@ -64,6 +64,7 @@ typedef struct Response {
     size_t statistics_count;
     bool has_trust;        // did the solver estimate what follows?
     bool is_stepped;       // it is its steps' error then, not rounding's
+    double given_up;       // foretold error of displacement of the modes left out; in the estimate
     double error_estimate; // largest error of displacement over the largest displacement, at most 1
     double trust_horizon;  // that error passes RESPONSE_PARTING here [s]; NAN: not within the run
 } Response;

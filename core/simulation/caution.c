@@ -1,6 +1,7 @@
-// Two things a run can leave: the time to which rounding, or the solver's steps, let its trajectory
-// be the scene's own, and the approach speeds at which its buffers were measured. The second is
-// counted from the ledger, which holds every impact of a run that succeeds.
+// What a run can leave: the error of modes that it left out; the time to which rounding, or the
+// solver's steps, let its trajectory be the scene's own, and the approach speeds at which its
+// buffers were measured. The second is counted from the ledger, which holds every impact of a run
+// that succeeds.
 #include "core/simulation/caution.h"
 
 #include <math.h>
@@ -8,8 +9,19 @@
 
 #include "core/base/side.h"
 
+// The scene asked for it; the number is foretold, and dampers can make more of it.
+static Status warn_of_modes(Outcome *outcome) {
+    const double error = outcome->response.given_up;
+    if (!(error > RESPONSE_PARTING))
+        return STATUS_OK;
+    return warnings_add(&outcome->warnings, "/accuracy/modes",
+                        "with the modes left out the displacement is wrong by up to %.2g of its "
+                        "largest value%s: more modes are closer",
+                        error, error > 0.1 ? ", and only statistics hold" : "");
+}
+
 static Status warn_of_horizon(Outcome *outcome) {
-    if (isnan(outcome->summary.trust_horizon))
+    if (isnan(outcome->summary.trust_horizon) || outcome->response.given_up > RESPONSE_PARTING)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/duration",
                         "the run goes on beyond t = %.6g s: there rounding has moved the "
@@ -25,14 +37,14 @@ static Status warn_of_steps(Outcome *outcome) {
         return warnings_add(&outcome->warnings, "/accuracy",
                             "the error of these steps is not known: the run beside this one that "
                             "would tell it came to no end");
-    if (summary->error_estimate <= RESPONSE_PARTING)
+    const double error = summary->error_estimate - outcome->response.given_up;
+    if (error <= RESPONSE_PARTING)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/accuracy",
                         "with these steps the displacement is wrong by about %.2g of its largest "
                         "value%s: shorter steps, a smaller tolerance, or the solver exact "
                         "without one, are closer",
-                        summary->error_estimate,
-                        summary->error_estimate > 0.1 ? ", and only statistics hold" : "");
+                        error, error > 0.1 ? ", and only statistics hold" : "");
 }
 
 // The approach speeds that one stop met.
@@ -91,6 +103,7 @@ static Status warn_of_tables(const Scene *scene, const Impacts *impacts, Warning
 }
 
 Status caution_warn(const Scene *scene, Outcome *outcome) {
+    TRY(warn_of_modes(outcome));
     TRY(outcome->response.is_stepped ? warn_of_steps(outcome) : warn_of_horizon(outcome));
     return warn_of_tables(scene, &outcome->response.impacts, &outcome->warnings);
 }

@@ -140,7 +140,25 @@ static Status complete_solver(Simulation *simulation, Problem *problem) {
                        solver->kind.name, law->kind.name);
 }
 
+// All modes are as many as storeys, which is what none asked for means.
+static Status complete_modes(const Simulation *simulation, Problem *problem) {
+    Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (accuracy->modes == COUNT_ABSENT)
+        return STATUS_OK;
+    if (accuracy->modes > storeys)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes", (double)accuracy->modes,
+                                NULL,
+                                "must be at most %zu, the structure has one mode per storey, is "
+                                "%llu",
+                                storeys, (unsigned long long)accuracy->modes);
+    if (accuracy->modes == storeys)
+        accuracy->modes = COUNT_ABSENT;
+    return STATUS_OK;
+}
+
 static Status complete_accuracy(Simulation *simulation, Problem *problem) {
+    TRY(complete_modes(simulation, problem));
     if (aim_is_asked(simulation))
         return aim_complete(simulation, problem);
     // Without a target it says nothing.

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/plan/keep.h"
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/simulation.h"
@@ -20,6 +21,11 @@ typedef struct Held {
 static const Solver *chosen_solver(const Simulation *simulation) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     return solver->run != NULL ? solver : &solver_exact;
+}
+
+// Every solver has these rows, "auto" too.
+static const Accuracy *common_settings(const Simulation *simulation) {
+    return (const Accuracy *)(const void *)simulation->accuracy;
 }
 
 // What the chosen solver is asked for; the settings of "auto" are not the chosen one's.
@@ -40,10 +46,11 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
     const Solver *solver = chosen_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
-    if (solver->decide == NULL)
-        return STATUS_OK;
-    const Status status =
-        solver->decide(settings(simulation), base_interval(simulation), *plan, problem);
+    Status status =
+        plan_keep(*plan, &simulation->scene,
+                  accuracy_modes(common_settings(simulation), (*plan)->storeys), problem);
+    if (status == STATUS_OK && solver->decide != NULL)
+        status = solver->decide(settings(simulation), base_interval(simulation), *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
@@ -147,6 +154,16 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
                           stock(journey), &journey->outcome->spectrum, problem);
 }
 
+// Modes left out are wrong from the start; by how much is only foretold.
+static void add_given_up(const Plan *plan, Response *response) {
+    response->given_up = plan->given_up;
+    if (!plan->is_truncated || !response->has_trust)
+        return;
+    response->error_estimate = fmin(response->error_estimate + plan->given_up, 1);
+    if (plan->given_up > RESPONSE_PARTING)
+        response->trust_horizon = 0;
+}
+
 static void summarize(Outcome *outcome) {
     const Response *response = &outcome->response;
     const double count = (double)response->statistics_count;
@@ -211,6 +228,7 @@ static Status travel(Journey *journey, Problem *problem) {
     run.column_count = journey->wanted_count;
     TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
     outcome->steps = run.steps;
+    add_given_up(journey->plan, &outcome->response);
     summarize(outcome);
     TRY(check_finite(outcome, problem));
     if (caution_warn(scene, outcome) != STATUS_OK)
@@ -290,15 +308,18 @@ static double flight_arcs(const Scene *scene, double fastest) {
 
 // A frame's sample is a step for each mode and each damper, or a product with a matrix where
 // damping couples the modes; and finding the modes comes before.
-static double steps_a_sample(const Scene *scene, double *planning) {
+static double steps_a_sample(const Simulation *simulation, double *planning) {
+    const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
     const double storeys = (double)structure_storeys(structure);
     *planning = 0;
     if (storeys == 1 && scene->dampers.count <= 1)
         return 1;
     *planning = 2 * storeys * storeys * storeys;
-    const bool may_couple = storeys > 1 && isnan(structure->damping_ratio);
-    return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
+    const double modes =
+        (double)accuracy_modes(common_settings(simulation), structure_storeys(structure));
+    const bool may_couple = modes > 1 && isnan(structure->damping_ratio);
+    return (double)(1 + scene->dampers.count) * modes + (may_couple ? modes * modes / 4 : 0);
 }
 
 // Contacts under a power law: at a guess seven a second, each of some 1000 steps' worth and of more
@@ -319,9 +340,11 @@ static double exact_steps(const Simulation *simulation) {
     const bool has_damper = simulation->scene.dampers.count > 0;
     // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
     StructureRates rates;
-    if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
+    const Structure *structure = scene_structure(&simulation->scene);
+    const size_t modes = accuracy_modes(common_settings(simulation), structure_storeys(structure));
+    if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
         rates.fastest = 0; // a guess without memory: the run will tell
-    double planning, step = steps_a_sample(&simulation->scene, &planning);
+    double planning, step = steps_a_sample(simulation, &planning);
     return planning +
            step *
                (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
@@ -332,7 +355,9 @@ static double exact_steps(const Simulation *simulation) {
 static double own_steps(const Simulation *simulation) {
     const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
     Plan *plan;
-    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
+    if (plan_sketch(&simulation->scene,
+                    accuracy_modes(common_settings(simulation), (size_t)storeys),
+                    &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
         chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);

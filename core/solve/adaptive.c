@@ -88,8 +88,8 @@ static Status happen(Frame *frame, const FrameEvent *event) {
     return ledger_status(&frame->ledger, frame->problem);
 }
 
-static double adaptive_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
-    const double n = (double)storeys, m = (double)dampers;
+static double adaptive_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+    const double n = (double)modes, m = (double)dampers;
     *making = 0;
     return 100 + 3 * n * (1 + m) + (is_coupled ? 0.1 * n * n : 0);
 }
@@ -121,7 +121,7 @@ static Status advance(Adaptive *own, double length) {
     if (taken > frame_clock(frame))
         frame->still_events = 0;
     TRY(steps_note(
-        steps, adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making)));
+        steps, adaptive_cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making)));
     if (root != ODE_NO_ROOT) {
         const size_t d = (size_t)root / ADAPTIVE_WATCHED;
         const bool is_peak = root % ADAPTIVE_WATCHED == ADAPTIVE_PEAK;
@@ -209,7 +209,7 @@ static double cost(const Accuracy *accuracy, double base_interval, const Plan *p
     steps = fmax(steps, each / steps_mode_time(plan)) +
             7 * 10 * each * sqrt((double)plan->damper_count);
     const double one =
-        adaptive_cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
+        adaptive_cost(plan_mode_count(plan), plan->damper_count, steps_may_couple(plan), &making);
     return 3 * one * steps * plan->duration; // the neighbour takes twice as many
 }
 

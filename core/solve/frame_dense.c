@@ -318,8 +318,8 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
     for (; is_whole; left--) {
         if (left < levels) {
             if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
-                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                                   frame->storeys);
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                                   frame->mode_count);
             fill(&dense[left], work);
         }
         if (left == 0)
@@ -331,16 +331,16 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
 
 Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
                         const FrameDamper *contact, Problem *problem) {
-    const size_t n = frame->storeys + (contact != NULL), size = 2 * n + 2, square = size * size;
+    const size_t n = frame->mode_count + (contact != NULL), size = 2 * n + 2, square = size * size;
     memset(dense, 0, levels * sizeof *dense);
     Real *room =
         malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
     if (room == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                           frame->storeys);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                           frame->mode_count);
     Work work = {.frame = frame,
                  .contact = contact,
-                 .modes = frame->storeys,
+                 .modes = frame->mode_count,
                  .n = n,
                  .size = size,
                  .is_sine = frame->turning > 0,
@@ -356,11 +356,11 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
     const double mass = contact == NULL ? 0 : contact->plan->mass;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         work.share[i] =
             frame->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
     if (contact != NULL)
-        work.share[frame->storeys] = mass;
+        work.share[frame->mode_count] = mass;
     const Status status = make(dense, levels, &work, problem);
     free(room);
     return status;

@@ -30,7 +30,7 @@ Status frame_engine_check(FrameEngine *engine) {
     engine->work = 0;
     const EnergyState energy = frame_energy(frame);
     double sum = energy.kinetic + energy.strain;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         sum += fabs(frame->q[i]);
     for (size_t d = 0; d < frame->dampers; d++)
         sum += fabs(frame->damper[d].r);
@@ -52,7 +52,7 @@ Status frame_engine_check(FrameEngine *engine) {
 // for each mode and damper, as simulation_cost foresees.
 static Status count_steps(FrameEngine *engine, double count, double each) {
     const Frame *frame = &engine->frame;
-    const double n = (double)frame->storeys, m = (double)frame->dampers;
+    const double n = (double)frame->mode_count, m = (double)frame->dampers;
     const double pairs = frame->diagonal != NULL ? 0 : n * n;
     frame->run->steps += count * (n * (1 + m) + pairs / 4);
     engine->work += count * each * (n * (1 + m) + pairs);
@@ -327,7 +327,7 @@ static void track(FrameEngine *engine, size_t flown) {
         const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
         memcpy(engine->track + (sample - 1) % TRAIL_MOST * frame->padded,
                flown > 0 ? trail->q + k * trail->padded : frame->q,
-               frame->storeys * sizeof *engine->track);
+               frame->mode_count * sizeof *engine->track);
     }
 }
 

@@ -18,7 +18,7 @@ static bool is_loose(const FrameEngine *engine) {
 // Some roundings more, of either sign.
 static void nudge(Frame *frame) {
     const double by = NUDGE;
-    for (size_t i = 0; i < frame->storeys; i++) {
+    for (size_t i = 0; i < frame->mode_count; i++) {
         const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
         frame->q[i] *= 1 + sign * by;
         frame->p[i] *= 1 - sign * by;
@@ -33,7 +33,7 @@ static double part_of(const FrameNeighbour *neighbour) {
 // Of the modes' displacements at one sample.
 static void look(FrameNeighbour *neighbour, const Frame *frame, const double *run,
                  const double *near) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
         apart[i] = run[i] - near[i];
@@ -42,7 +42,7 @@ static void look(FrameNeighbour *neighbour, const Frame *frame, const double *ru
     if (bound <= neighbour->worst)
         return;
     const double *values = frame_spread(frame, apart);
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < frame->storey_count; j++)
         difference = fmax(difference, fabs(values[j]));
     neighbour->worst = fmax(neighbour->worst, difference);
 }

@@ -33,7 +33,7 @@ Status frame_ode_make(FrameOde *ode, Frame *frame, double tolerance, Problem *pr
     ode->order = order > ORDER_MOST ? ORDER_MOST : (size_t)order;
     if (frame->plan->form != CONTACT_POWER || frame->dampers == 0)
         return STATUS_OK;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     TRY(frame_series_room(&ode->series, frame, problem));
     ode->contact = calloc(m, sizeof *ode->contact);
     ode->block = calloc(m + n + frame->padded + ode->series.stride + SERIES_NODES * (m + n),
@@ -105,7 +105,7 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     step->is_event = is_end;
     step->event = found.event;
     step->event.s = 1;
-    const double k = (double)series->degree, n = (double)frame->storeys;
+    const double k = (double)series->degree, n = (double)frame->mode_count;
     step->work = STEP_WORK + k * k / 2 * ((double)series->stride + 4 * (double)series->contacts) +
                  (frame->diagonal == NULL ? k * n * n : 0) + 12 * k * (double)series->stride;
 }

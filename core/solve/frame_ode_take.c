@@ -15,8 +15,8 @@ void frame_ode_state(FrameOde *ode, const Slice *slice, double s, bool is_ended)
         frame_series_at(series, s, ode->row);
     else
         frame_series_end(series, ode->row);
-    memcpy(frame->q, row + series->at_q, frame->storeys * sizeof *frame->q);
-    memcpy(frame->p, row + series->at_p, frame->storeys * sizeof *frame->p);
+    memcpy(frame->q, row + series->at_q, frame->mode_count * sizeof *frame->q);
+    memcpy(frame->p, row + series->at_p, frame->mode_count * sizeof *frame->p);
     for (size_t d = 0; d < frame->dampers; d++) {
         frame->damper[d].w = row[d];
         if (frame->dampers > 1)
@@ -35,7 +35,7 @@ void frame_ode_state(FrameOde *ode, const Slice *slice, double s, bool is_ended)
 static void find_loss(FrameOde *ode, size_t rule, double *loss) {
     const Frame *frame = ode->frame;
     const FrameSeries *series = &ode->series;
-    const size_t n = frame->storeys, count = arc_rules[rule].count;
+    const size_t n = frame->mode_count, count = arc_rules[rule].count;
     memset(loss, 0, SERIES_NODES * sizeof *loss);
     for (size_t i = 0; i < n; i++) {
         double *p = ode->nodes + i * SERIES_NODES;
@@ -57,7 +57,7 @@ void frame_ode_sums(FrameOde *ode, const Slice *slice, FrameOdeStep *step) {
     const Frame *frame = ode->frame;
     const FrameSeries *series = &ode->series;
     const size_t rule = ode->error > 1e-8 ? 0 : ARC_RULES - 1, count = arc_rules[rule].count;
-    const size_t n = frame->storeys, m = frame->dampers, degree = series->degree;
+    const size_t n = frame->mode_count, m = frame->dampers, degree = series->degree;
     double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
         momentum[SERIES_NODES] = {0};
     frame_series_nodes(series, rule, frame_series_root(series), 1, degree, Y);

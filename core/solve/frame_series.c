@@ -24,7 +24,7 @@ enum { GAP_LEAST = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
 Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memset(series, 0, sizeof *series);
     series->modes = n;
     series->dampers = m;

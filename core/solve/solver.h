@@ -13,8 +13,14 @@
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {
     Variant variant; // kind is a Solver's
+    uint64_t modes;  // of a structure with several storeys, the lowest; COUNT_ABSENT: all
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
+
+// How many modes a run keeps of a structure with so many storeys.
+static inline size_t accuracy_modes(const Accuracy *accuracy, size_t storeys) {
+    return accuracy == NULL || accuracy->modes >= storeys ? storeys : (size_t)accuracy->modes;
+}
 
 // Of "auto", which has no run of its own.
 typedef struct AccuracyAuto {

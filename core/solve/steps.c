@@ -15,7 +15,7 @@ static const double WATCH_WORK = 1e6; // multiplications, about, between looks a
 static const double GROWN = 1e6;
 
 void steps_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     for (size_t i = 0; i < n; i++)
         out[i] = frame->omega2[i] * q[i];
     if (frame->diagonal != NULL) {
@@ -30,7 +30,7 @@ void steps_elastic(const Frame *frame, const double *q, const double *p, double 
 void steps_rate(Steps *steps, const double *y, double ground, const double *force,
                 double *restrict out) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *p1 = out + n, *w1 = out + 2 * n + m;
     steps_elastic(frame, y, y + n, steps->elastic);
     memcpy(out, y + n, n * sizeof *y);
@@ -71,7 +71,7 @@ typedef struct End {
 static End look(Steps *steps, const double *y, double ground, double slope, double *forces,
                 double *rates) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *p = y + n, *r = y + 2 * n, *w = r + m;
     for (size_t d = 0; d < m; d++)
         forces[d] =
@@ -97,7 +97,7 @@ static End look(Steps *steps, const double *y, double ground, double slope, doub
 void steps_sum(Steps *steps, const double *from, const double *to, double length,
                bool is_corrected) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double slope = (steps->ground[2] - steps->ground[0]) / length;
     const double half = length / 2, twelfth = is_corrected ? length * length / 12 : 0;
     const double *const states[2] = {from, to};
@@ -189,7 +189,7 @@ Status steps_note(Steps *steps, double cost) {
 }
 
 static void gather(const Frame *frame, double *y) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memcpy(y, frame->q, n * sizeof *y);
     memcpy(y + n, frame->p, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
@@ -199,7 +199,7 @@ static void gather(const Frame *frame, double *y) {
 }
 
 static void scatter(Frame *frame, const double *y) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memcpy(frame->q, y, n * sizeof *y);
     memcpy(frame->p, y + n, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
@@ -213,7 +213,8 @@ static Status step(Steps *steps, double length, double offset) {
     Frame *frame = &steps->frame;
     const size_t m = frame->dampers;
     double making;
-    const double cost = steps->stepper->cost(frame->storeys, m, frame->diagonal == NULL, &making);
+    const double cost =
+        steps->stepper->cost(frame->mode_count, m, frame->diagonal == NULL, &making);
     StepSums *sums = &steps->sums;
     read_base(steps, length);
     gather(frame, steps->y);
@@ -309,13 +310,13 @@ static Status check_reach(const Steps *steps) {
 }
 
 static Status make_room(Steps *steps) {
-    const size_t n = steps->frame.storeys, m = steps->frame.dampers;
+    const size_t n = steps->frame.mode_count, m = steps->frame.dampers;
     steps->size = 2 * (n + m);
     // y; impulse and work; before; force and rates behind it; elastic
     steps->block = calloc(2 * steps->size + 4 * m + n + 1, sizeof *steps->block);
     if (steps->block == NULL)
         return problem_set(steps->frame.problem, STATUS_NO_MEMORY,
-                           "no memory for a run of %zu storeys", n);
+                           "no memory for a run of %zu modes", n);
     steps->y = steps->block;
     steps->sums.impulse = steps->y + steps->size;
     steps->sums.work = steps->sums.impulse + m;
@@ -344,7 +345,7 @@ Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, 
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     double making = 0;
-    (void)stepper->cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making);
+    (void)stepper->cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making);
     run->steps += making;
     return stepper->make != NULL ? stepper->make(steps) : STATUS_OK;
 }

@@ -135,7 +135,7 @@ double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_
                   const Plan *plan) {
     double making;
     const double each =
-        stepper->cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
+        stepper->cost(plan_mode_count(plan), plan->damper_count, steps_may_couple(plan), &making);
     const double steps =
         choose(plan, accuracy, base_interval).share * plan->duration * plan->sample_rate;
     return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
@@ -170,7 +170,7 @@ static double part_of(const Pair *pair) {
 
 static void compare(Pair *pair) {
     const Frame *frame = &pair->run.frame, *near = &pair->near.frame;
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     double difference = 0, bound = 0;
     pair->compared++;
     for (size_t i = 0; i < n; i++) {
@@ -180,7 +180,7 @@ static void compare(Pair *pair) {
     pair->largest = fmax(pair->largest, frame->ledger.response->peaks.displacement);
     if (bound <= pair->worst)
         return;
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < frame->storey_count; j++)
         difference =
             fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, pair->apart, n)));
     pair->worst = fmax(pair->worst, difference);
@@ -218,7 +218,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
     pair->near_run = (Run){
         .plan = &pair->plan, .base = frame->run->base, .impacts_most = frame->run->impacts_most};
-    pair->apart = malloc(frame->storeys * sizeof *pair->apart);
+    pair->apart = malloc(frame->mode_count * sizeof *pair->apart);
     pair->is_known = pair->apart != NULL &&
                      steps_make(&pair->near, stepper, &pair->near_run, share,
                                 fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0), true,

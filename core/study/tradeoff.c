@@ -34,6 +34,7 @@ const Field tradeoff_point_fields[] = {
     FIELD_REAL(TradeoffPoint, sample_rate, "Hz", ANY, OPTIONAL, "sample rate in place of the scene's; the base keeps its own"),
     FIELD_REAL(TradeoffPoint, duration, "s", ANY, OPTIONAL, "duration in place of the scene's"),
     FIELD_COUNT(TradeoffPoint, segment, "samples", AT_LEAST(1), OPTIONAL, "segment of the spectra in place of the scene's"),
+    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_LEAST(1), OPTIONAL, "modes that it keeps; all if absent"),
     FIELD_CHOICE(TradeoffPoint, status, tradeoff_status_names, TRADEOFF_MEASURED, "whether it was run"),
     FIELD_TEXT(TradeoffPoint, why, 0, PRESENCE_OPTIONAL, 0, "why it was not measured"),
     FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, another time will differ"),

@@ -131,9 +131,9 @@ const Command command_tradeoff = {
         "  impactd tradeoff - < scene.json                      from standard input\n"
         "\n"
         "Every solver is run at steps or tolerances a decade or two apart, and the exact one also\n"
-        "with less: impulses for contacts, fewer samples, shorter segments. Errors are the same "
-        "at\n"
-        "each time; CPU times are measured and differ a little. Ctrl-C stops at once.\n"
+        "with less: impulses for contacts, fewer modes or samples, shorter segments. Errors are "
+        "the\n"
+        "same each time; CPU times are measured and differ a little. Ctrl-C stops at once.\n"
         "Exit code 3 if the scene has faults, 1 if its exact run failed.\n",
     .options = tradeoff_fields,
     .run = tradeoff_run,

@@ -48,6 +48,7 @@ typedef struct Chart {
 static const char *group_name(const TradeoffPoint *point) {
     return point->contact_model != NULL     ? point->contact_model
            : !isnan(point->sample_rate)     ? "fewer samples"
+           : point->modes != COUNT_ABSENT   ? "fewer modes"
            : point->segment != COUNT_ABSENT ? "shorter segments"
            : !isnan(point->duration)        ? "shorter run"
                                             : point->solver;
