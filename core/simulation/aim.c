@@ -20,22 +20,23 @@ static const double ROUNDING = 1e-15; // of a contact at its exactest, about
 
 // By how much the metric's relative error may be larger than the displacement's. An impact that
 // comes a little late falls into another sample interval; of the rms, see metric_error.
-static const double gains[METRICS] = {1, 100, 30, 10, 100, 5};
+static const double gains[METRICS] = {1, 200, 30, 10, 5000, 5};
 
 // By how much lines of a spectrum may be more wrong than the motion's rms.
 static const double spectrum_gain = 10;
 
 // Tolerances worth their own run: below, rounding's edge costs hardly more.
-static const double tolerance_most = 1e-2, tolerance_least = 1e-12;
-static const double contact_share = 1; // error of displacement per error of a contact
+static const double tolerance_most = 0.1, tolerance_least = 1e-12;
+static const double contact_share = 0.05; // error of displacement per error of a contact
 static const double impacts_a_period = 2;
 static const double growth_a_period = 0.2; // natural logarithm, where a base drives the mass
 static const double growth_most = 40;
 static const double margin = 0.3; // of what an estimate says a second run may take
 
-// What is foretold of modes left out is seldom less than they do: with this share of the error
-// asked for it hardly ever is.
-static const double modes_margin = 0.3;
+// Of the error asked for, what may be foretold of modes left out: without dampers that is seldom
+// less than they do, with them it may be many times less.
+static const double modes_margin = 0.7, dampers_margin = 0.1;
+static const double modes_worth = 0.75; // keeping more than this part is not worth while
 
 // One way to run the scene: what it gives up.
 typedef struct Way {
@@ -172,13 +173,17 @@ static double choose_tolerance(const Aim *aim, double error) {
     return tolerance >= tolerance_least * (1 - 1e-9) ? tolerance : (double)NAN;
 }
 
+static double modes_share(const Aim *aim) {
+    return aim->plan->damper_count > 0 ? dampers_margin : modes_margin;
+}
+
 // The fewest modes that keep `error`; COUNT_ABSENT: it takes all.
 static uint64_t choose_modes(const Aim *aim, double error) {
     const size_t n = aim->plan->storeys;
     size_t kept = 1;
-    while (kept < n && aim->modes_error[kept - 1] > modes_margin * error)
+    while (kept < n && aim->modes_error[kept - 1] > modes_share(aim) * error)
         kept++;
-    return kept < n ? kept : COUNT_ABSENT;
+    return (double)kept <= modes_worth * (double)n ? kept : COUNT_ABSENT;
 }
 
 // The error of modes left out, of the metric.
@@ -353,8 +358,8 @@ static double estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
         aim->asked->metric == METRIC_DISPLACEMENT || aim->asked->metric == METRIC_MEAN_ACCELERATION;
     if (isnan(own) || (own >= 1 && !is_path))
         return (double)NAN;
-    return fmin(metric_error(aim, own, &outcome->summary) + modes_error(aim, way) / modes_margin,
-                1);
+    return fmin(
+        metric_error(aim, own, &outcome->summary) + modes_error(aim, way) / modes_share(aim), 1);
 }
 
 // Runs one way. A cheap one that fails leaves no outcome; `estimated` is 1 then.
