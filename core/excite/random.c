@@ -180,6 +180,8 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
                           Base *base, Problem *problem) {
     const ExcitationRandom *random = random_of(excitation);
     *base = (Base){0};
+    if (random->rms == 0)
+        return STATUS_OK; // still
     const double wanted = sample_count(random, span);
     if (!(wanted >= 2 && wanted <= SAMPLES_MOST + 1))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d samples, not %.0f",

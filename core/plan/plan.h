@@ -118,6 +118,8 @@ void plan_free(Plan *plan);
 // Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
 // and a law whose contact phases are linear or instantaneous.
 bool plan_is_single(const Plan *plan);
+// The same where no stop is ever reached: then the law does not matter.
+bool plan_is_single_in_flight(const Plan *plan);
 
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.

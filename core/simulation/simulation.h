@@ -7,6 +7,7 @@
 #include "core/plan/plan.h"
 #include "core/result/response.h"
 #include "core/result/spectrum.h"
+#include "core/result/work.h"
 #include "core/scene/scene.h"
 #include "core/solve/workspace.h"
 
@@ -26,6 +27,7 @@ typedef struct SpectrumRequest {
 typedef struct Output {
     Texts channels;
     SpectrumRequest psd;
+    bool impacts;           // the ledger is kept
     double statistics_from; // [s]
 } Output;
 
@@ -78,11 +80,13 @@ struct Outcome {
     Summary summary;
     Warnings warnings; // what only the run could tell
     double steps;      // solver steps, counted
+    Work work;         // what was done, kind by kind
 };
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
 // at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
-// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop. `workspace` may be NULL.
+// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop.
+// `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem);

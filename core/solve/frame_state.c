@@ -339,6 +339,7 @@ Status frame_make(Frame *frame, Run *run, Problem *problem) {
     const size_t n = plan->storeys;
     memset(frame, 0, sizeof *frame);
     frame->run = run;
+    frame->has_stops = run->plan->damper_count > 0 && !run->is_clear;
     frame->plan = plan;
     frame->problem = problem;
     frame->storeys = n;

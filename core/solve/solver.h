@@ -8,6 +8,7 @@
 #include "core/excite/base.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
+#include "core/result/work.h"
 #include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
@@ -35,7 +36,9 @@ typedef struct Run {
     double statistics_from; // [s]
     size_t impacts_most;    // ledger rows; 0: no limit
     double steps_most;      // solver steps; 0: no limit
+    bool is_clear;          // no mass comes to a stop: none has to be searched for
     double steps;           // out: work counted, in solver steps
+    Work work;              // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
 typedef struct Solver {
@@ -48,7 +51,8 @@ typedef struct Solver {
     Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
     // What a run costs, in steps of the single engine. NULL: as the exact solver's.
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
-    bool is_linear_only; // serves no contact under a power law
+    bool leaves_contacts; // runs without looking for stops where Run says that it is clear
+    bool is_linear_only;  // serves no contact under a power law
 } Solver;
 
 extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;

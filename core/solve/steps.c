@@ -183,6 +183,7 @@ static Status note(Steps *steps) {
 
 Status steps_note(Steps *steps, double cost) {
     TRY(note(steps));
+    steps->frame.run->work.steps++;
     steps->frame.run->steps += cost;
     steps->watched += 20 * cost;
     return steps->watched > WATCH_WORK ? steps_check(steps) : STATUS_OK;
@@ -224,6 +225,7 @@ static Status step(Steps *steps, double length, double offset) {
                                ? steps_contact(frame, d, frame->damper[d].r, 0).strain
                                : 0;
     TRY(steps->stepper->step(steps, length));
+    frame->run->work.stop_searches += m > 0;
     scatter(frame, steps->y);
     frame->offset = offset;
     frame->ground = steps->ground[2];
@@ -255,6 +257,7 @@ Status steps_interval(Steps *steps) {
         TRY(step(steps, steps->length, (double)k * steps->length));
     frame->sample++;
     frame->offset = 0;
+    frame->run->work.mode_samples += frame->storeys;
     steps_take_sample(steps);
     return STATUS_OK;
 }
