@@ -20,3 +20,9 @@ const Field work_fields[] = {
     FIELD_END
 };
 // clang-format on
+
+void work_add(Work *work, const Work *other) {
+    for (const Field *field = work_fields; field->kind != FIELD_KIND_END; field++)
+        *(uint64_t *)(void *)((char *)work + field->offset) +=
+            *(const uint64_t *)(const void *)((const char *)other + field->offset);
+}

@@ -25,4 +25,7 @@ typedef struct Work {
 
 extern const Field work_fields[];
 
+// Adds what another run did.
+void work_add(Work *work, const Work *other);
+
 #endif

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/aim.h"
 #include "core/simulation/plausible.h"
 #include "core/simulation/request_channels.h"
 #include "core/simulation/simulation.h"
@@ -136,6 +137,15 @@ static Status check_solver(const Simulation *simulation, Problem *problem) {
                        solver->kind.name, law->kind.name);
 }
 
+static Status complete_accuracy(Simulation *simulation, Problem *problem) {
+    if (aim_is_asked(simulation))
+        return aim_complete(simulation, problem);
+    // Without a target it says nothing.
+    if (simulation->accuracy->kind == &solvers[0]->kind)
+        ((AccuracyAuto *)(void *)simulation->accuracy)->metric = CHOICE_ABSENT;
+    return STATUS_OK;
+}
+
 // A scene that can be told beforehand to take too long is refused at once.
 static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
                          Problem *problem) {
@@ -189,6 +199,8 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
         status = check_values(simulation, limits, problem);
     if (status == STATUS_OK)
         status = check_solver(simulation, problem);
+    if (status == STATUS_OK)
+        status = complete_accuracy(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)

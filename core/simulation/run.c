@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"
@@ -87,6 +88,8 @@ static Status foretell(const Simulation *simulation, Plan *plan, Problem *proble
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
     memset(report, 0, sizeof *report);
+    if (aim_is_asked(simulation))
+        return aim_plan(simulation, report, problem);
     TRY(make_plan(simulation, &plan, problem));
     const Status status = foretell(simulation, plan, problem);
     if (status == STATUS_OK) {
@@ -315,6 +318,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem) {
     *outcome = NULL;
+    if (aim_is_asked(simulation))
+        return aim_run(simulation, limits, watch, workspace, outcome, problem);
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
@@ -424,6 +429,8 @@ static double own_steps(const Simulation *simulation) {
 }
 
 Cost simulation_cost(const Simulation *simulation) {
+    if (aim_is_asked(simulation))
+        return aim_cost(simulation);
     const SpectrumRequest *psd = &simulation->output.psd;
     const double samples = (double)scene_sample_count(&simulation->scene);
     double steps =

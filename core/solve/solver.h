@@ -17,6 +17,13 @@ typedef struct Accuracy {
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
 
+// Of "auto", which has no run of its own.
+typedef struct AccuracyAuto {
+    Accuracy accuracy;
+    double target; // NAN: none
+    int metric;    // Metric
+} AccuracyAuto;
+
 // Where the samples of one channel go.
 typedef struct RunColumn {
     ChannelId channel;

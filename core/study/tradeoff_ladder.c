@@ -252,6 +252,7 @@ static void apply_output(const TradeoffPoint *point, Simulation *target) {
         if (psd->overlap >= psd->segment)
             psd->overlap = psd->segment - 1;
     }
+    target->output.impacts = true; // errors are counted from ledgers
     const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
                         target->scene.sample_rate;
     target->output.statistics_from = fmin(target->output.statistics_from, last);
@@ -286,30 +287,4 @@ double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
     const double steps = simulation_cost(&view).steps;
     variant_free(view.accuracy);
     return steps;
-}
-
-Status ladder_watch(Simulation *simulation, Problem *problem) {
-    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    const bool are_numbered = storeys > 1 || simulation->scene.dampers.count > 1;
-    static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
-    Texts names = {calloc(COUNT(wanted) * storeys, sizeof *names.at), 0};
-    bool is_whole = names.at != NULL;
-    for (size_t i = 0; i < COUNT(wanted) * storeys && is_whole; i++) {
-        char name[64];
-        if (are_numbered)
-            snprintf(name, sizeof name, "%s_%zu", channels[wanted[i / storeys]].name,
-                     i % storeys + 1);
-        else
-            snprintf(name, sizeof name, "%s", channels[wanted[i / storeys]].name);
-        names.at[i] = strdup(name);
-        is_whole = names.at[i] != NULL;
-        names.count += is_whole;
-    }
-    Texts *asked = &simulation->output.channels;
-    for (size_t i = 0; i < asked->count; i++)
-        free(asked->at[i]);
-    free(asked->at);
-    *asked = names;
-    return is_whole ? STATUS_OK
-                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
 }
