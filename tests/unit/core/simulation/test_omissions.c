@@ -107,7 +107,7 @@ static void assert_as_with_contacts(const char *members, const Outcome *outcome)
         fail_msg("%s", problem.detail);
     assert_true(run.work.stop_searches > 0);
     for (size_t i = 0; i < series->count; i++) {
-        double largest = 1e-3, apart = 0; // what should be 0 is a rounding
+        double largest = 0.01, apart = 0; // what should be 0 is a rounding
         for (size_t j = 0; j < series->rows; j++) {
             largest = fmax(largest, fabs(columns[i].values[j]));
             apart = fmax(apart, fabs(columns[i].values[j] - series->at[i].values[j]));
