@@ -140,12 +140,10 @@ static void make_block(const ExcitationRandom *random, const RandomBlocks *block
     // Half, because the transform of a real sequence adds bin k and its mirror.
     const double scale = random->rms / sqrt((double)blocks->bins) / 2;
     memset(bin, 0, 2 * blocks->first_bin * sizeof *bin);
-    for (size_t k = blocks->first_bin; k < blocks->first_bin + blocks->bins; k++) {
-        double normal[2];
-        noise_normal_pair(random->seed, m, k, normal);
-        bin[2 * k] = scale * normal[0];
-        bin[2 * k + 1] = scale * normal[1];
-    }
+    double *inside = bin + 2 * blocks->first_bin;
+    noise_normal_pairs(random->seed, m, blocks->first_bin, blocks->bins, inside);
+    for (size_t k = 0; k < 2 * blocks->bins; k++)
+        inside[k] *= scale;
     synthesis_run(synthesis);
 }
 
