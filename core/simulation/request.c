@@ -125,11 +125,15 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
-static Status check_solver(const Simulation *simulation, Problem *problem) {
+// What the solver has no use for is left out.
+static Status complete_solver(Simulation *simulation, Problem *problem) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    if (!solver->is_linear_only || scene->dampers.count == 0 || law->form != CONTACT_POWER)
+    const bool has_power_law = scene->dampers.count > 0 && law->form == CONTACT_POWER;
+    if (solver->forget_unused != NULL)
+        solver->forget_unused((Accuracy *)(void *)simulation->accuracy, has_power_law);
+    if (!solver->is_linear_only || !has_power_law)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/accuracy/solver",
                        "%s serves linear contact and impulses, not the power law of %s: take "
@@ -198,7 +202,7 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     if (status == STATUS_OK)
         status = check_values(simulation, limits, problem);
     if (status == STATUS_OK)
-        status = check_solver(simulation, problem);
+        status = complete_solver(simulation, problem);
     if (status == STATUS_OK)
         status = complete_accuracy(simulation, problem);
     if (status == STATUS_OK)

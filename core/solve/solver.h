@@ -58,6 +58,8 @@ typedef struct Solver {
     Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
     // What a run costs, in steps of the single engine. NULL: as the exact solver's.
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
+    // Erases the settings that a scene without a power law has no use for. NULL: there are none.
+    void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
     bool leaves_contacts; // runs without looking for stops where Run says that it is clear
     bool is_linear_only;  // serves no contact under a power law
 } Solver;
