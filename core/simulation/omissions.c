@@ -60,9 +60,9 @@ static double contact_steps(const Simulation *simulation) {
     return fmax(simulation_cost(simulation).steps - simulation_cost(&bare).steps, 0);
 }
 
-static Status tell_contacts(const Simulation *simulation, const Solver *solver, const Plan *plan,
-                            const Regime *regime, Decisions *decisions) {
-    if (plan->damper_count == 0 || !solver->leaves_contacts)
+static Status tell_contacts(const Simulation *simulation, const Plan *plan, const Regime *regime,
+                            Decisions *decisions) {
+    if (plan->damper_count == 0)
         return STATUS_OK;
     if (regime == NULL)
         return decisions_add(
@@ -84,10 +84,12 @@ Status omissions_tell(const Simulation *simulation, const Solver *solver, const 
     if (regime != NULL && regime->is_at_rest)
         return decisions_omit(decisions, "motion", 0, "J", moving_share(simulation),
                               "nothing moves and nothing sets it moving");
-    TRY(tell_contacts(simulation, solver, plan, regime, decisions));
-    const bool is_single = plan_is_single(plan) ||
-                           (regime != NULL && regime->is_clear && plan_is_single_in_flight(plan));
-    if (regime == NULL || !regime->is_unforced || !solver->leaves_contacts || !is_single)
+    TRY(tell_contacts(simulation, plan, regime, decisions));
+    // Others step all the same.
+    const bool has_closed_form =
+        solver == &solver_exact && (plan_is_single(plan) || (regime != NULL && regime->is_clear &&
+                                                             plan_is_single_in_flight(plan)));
+    if (regime == NULL || !regime->is_unforced || !has_closed_form)
         return STATUS_OK;
     const double samples = (double)plan->count;
     return decisions_omit(

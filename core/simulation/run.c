@@ -251,7 +251,7 @@ static Status make_approaches(const Scene *scene, Response *response, Problem *p
 static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *problem) {
     const Solver *solver = chosen_solver(journey->simulation);
     Outcome *outcome = journey->outcome;
-    run->is_clear = regime->is_clear && solver->leaves_contacts;
+    run->is_clear = regime->is_clear;
     if (regime->is_at_rest)
         rest_run(run, &outcome->response);
     else

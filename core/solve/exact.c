@@ -426,5 +426,4 @@ const Solver solver_exact = {
     .run = exact_run,
     .decide = decide,
     .forget_unused = forget_unused,
-    .leaves_contacts = true,
 };

@@ -60,8 +60,7 @@ typedef struct Solver {
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
     // Erases the settings that a scene without a power law has no use for. NULL: there are none.
     void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
-    bool leaves_contacts; // runs without looking for stops where Run says that it is clear
-    bool is_linear_only;  // serves no contact under a power law
+    bool is_linear_only; // serves no contact under a power law
 } Solver;
 
 extern const Solver solver_exact, solver_precise, solver_rk4, solver_newmark, solver_adaptive;

@@ -220,19 +220,21 @@ static Status step(Steps *steps, double length, double offset) {
     gather(frame, steps->y);
     sums->input = sums->damping = 0;
     memset(sums->impulse, 0, 2 * m * sizeof *sums->impulse);
-    for (size_t d = 0; d < m; d++)
+    for (size_t d = 0; d < m && frame->has_stops; d++)
         steps->before[d] = frame->damper[d].phase == FRAME_CONTACT
                                ? steps_contact(frame, d, frame->damper[d].r, 0).strain
                                : 0;
     TRY(steps->stepper->step(steps, length));
-    frame->run->work.stop_searches += m > 0;
     scatter(frame, steps->y);
     frame->offset = offset;
     frame->ground = steps->ground[2];
     ledger_work(&frame->ledger, sums->input, sums->damping);
     steps->record.base_speed +=
         length / 6 * (steps->ground[0] + 4 * steps->ground[1] + steps->ground[2]);
-    steps_turn(steps, length);
+    if (frame->has_stops) {
+        frame->run->work.stop_searches++;
+        steps_turn(steps, length);
+    }
     return steps_note(steps, cost);
 }
 
@@ -291,7 +293,8 @@ static Status check_reach(const Steps *steps) {
                            steps->stepper->name, steps->length, frame->rate,
                            steps->stepper->reach / frame->rate);
     double rate = 0;
-    for (size_t d = 0; d < frame->dampers && frame->plan->form == CONTACT_LINEAR; d++)
+    for (size_t d = 0;
+         d < frame->dampers && frame->has_stops && frame->plan->form == CONTACT_LINEAR; d++)
         for (int side = 0; side < 2; side++) {
             const double mass = frame->damper[d].effective_mass;
             const PlanStop *stop = &frame->damper[d].plan->stops[side];

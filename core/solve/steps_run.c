@@ -217,7 +217,8 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->plan = *frame->plan;
     pair->plan.sample_rate /= (double)pair->stride;
     pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
-    pair->near_run = (Run){.plan = &pair->plan, .base = frame->run->base};
+    pair->near_run =
+        (Run){.plan = &pair->plan, .base = frame->run->base, .is_clear = frame->run->is_clear};
     pair->near_response.is_unlisted = true;
     pair->apart = malloc(frame->storeys * sizeof *pair->apart);
     pair->is_known = pair->apart != NULL &&

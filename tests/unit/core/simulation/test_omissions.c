@@ -162,6 +162,41 @@ static void where_no_stop_is_reached_none_is_looked_for(void **state) {
     }
 }
 
+// Neither steps nor roots; and a contact too stiff for the step is none's concern.
+static void solvers_that_step_look_for_no_stops_either(void **state) {
+    (void)state;
+    static const char *const settings[] = {
+        "\"solver\": \"precise\", \"step\": 1e-3", "\"solver\": \"rk4\", \"step\": 1e-3",
+        "\"solver\": \"newmark\", \"step\": 1e-3", "\"solver\": \"adaptive\", \"tolerance\": 1e-9",
+        "\"solver\": \"exact\""};
+    double peaks[COUNT(settings)];
+    for (size_t i = 0; i < COUNT(settings); i++)
+        for (int is_far = 0; is_far < 2; is_far++) {
+            char members[800];
+            snprintf(members, sizeof members,
+                     STRUCTURE ", \"dampers\": [{\"mass\": 0.1107, \"clearance\": %s, "
+                               "\"buffer\": " BUFFER "}], " RELEASE ", " TIME
+                               ", \"accuracy\": {%s}",
+                     is_far ? "0.1" : "0.015", settings[i]);
+            Outcome *outcome = outcome_of(members);
+            const Work *work = &outcome->work;
+            assert_int_equal(work->stop_searches == 0, is_far);
+            assert_int_equal(left_out(&outcome->plan, "contacts") != NULL, is_far);
+            assert_int_equal(work->contacts > 0, !is_far);
+            assert_true(i + 1 == COUNT(settings) || work->steps > 100);
+            peaks[i] = outcome->summary.rms_displacement;
+            outcome_drop(outcome);
+        }
+    for (size_t i = 0; i + 1 < COUNT(settings); i++)
+        assert_true(fabs(peaks[i] - peaks[COUNT(settings) - 1]) < 1e-3 * peaks[i]);
+    Outcome *stiff = outcome_of(STRUCTURE ", \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.1, "
+                                          "\"buffer\": {\"restitution\": 0.46, \"contact_time\": "
+                                          "1e-5}}], " RELEASE ", " TIME
+                                          ", \"accuracy\": {\"solver\": \"rk4\", \"step\": 1e-3}");
+    assert_true(stiff->summary.impacts == 0);
+    outcome_drop(stiff);
+}
+
 static void where_one_may_be_reached_all_of_it_runs(void **state) {
     (void)state;
     static const char *const scenes[] = {
@@ -375,6 +410,7 @@ int main(void) {
     fourier_start();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(where_no_stop_is_reached_none_is_looked_for),
+        cmocka_unit_test(solvers_that_step_look_for_no_stops_either),
         cmocka_unit_test(where_one_may_be_reached_all_of_it_runs),
         cmocka_unit_test(bounces_and_rests_are_counted_apart),
         cmocka_unit_test(a_still_base_is_flown_over_in_closed_form),
