@@ -9,7 +9,8 @@
 #include "core/simulation/request_channels.h"
 
 static const double VALUE_STEPS = 0.1, ROW_STEPS = 10, FORCED_SHARE = 2.0 / 3;
-static const double ROWS_A_SECOND = 7; // of a damper, at a guess
+static const double SEARCH_SHARE = 0.1; // of a stepping solver's work: what step ends ask of stops
+static const double ROWS_A_SECOND = 7;  // of a damper, at a guess
 enum { SEGMENT = 4096 };
 
 static double part(double left_out, double remaining) {
@@ -53,15 +54,17 @@ static double moving_share(const Simulation *simulation) {
     return asked > 0 ? steps / asked : 0;
 }
 
-// What contacts are foretold to cost.
-static double contact_steps(const Simulation *simulation) {
+// What contacts are foretold to cost; a solver that steps takes its steps all the same.
+static double contact_steps(const Simulation *simulation, const Solver *solver) {
+    if (solver->cost != NULL)
+        return SEARCH_SHARE * simulation_cost(simulation).steps;
     Simulation bare = *simulation; // a borrowed view: nothing is cleared
     bare.scene.dampers.count = 0;
     return fmax(simulation_cost(simulation).steps - simulation_cost(&bare).steps, 0);
 }
 
-static Status tell_contacts(const Simulation *simulation, const Plan *plan, const Regime *regime,
-                            Decisions *decisions) {
+static Status tell_contacts(const Simulation *simulation, const Solver *solver, const Plan *plan,
+                            const Regime *regime, Decisions *decisions) {
     if (plan->damper_count == 0)
         return STATUS_OK;
     if (regime == NULL)
@@ -71,11 +74,12 @@ static Status tell_contacts(const Simulation *simulation, const Plan *plan, cons
             "is made");
     if (!regime->is_clear)
         return STATUS_OK;
-    return decisions_omit(
-        decisions, "contacts", regime->reach, NULL,
-        part(contact_steps(simulation), asked_steps(simulation) - contact_steps(simulation)),
-        "%s at most %.3g of the way to a stop",
-        plan->damper_count == 1 ? "the mass comes" : "the masses come", regime->reach);
+    return decisions_omit(decisions, "contacts", regime->reach, NULL,
+                          part(contact_steps(simulation, solver),
+                               asked_steps(simulation) - contact_steps(simulation, solver)),
+                          "%s at most %.3g of the way to a stop",
+                          plan->damper_count == 1 ? "the mass comes" : "the masses come",
+                          regime->reach);
 }
 
 Status omissions_tell(const Simulation *simulation, const Solver *solver, const Plan *plan,
@@ -84,7 +88,7 @@ Status omissions_tell(const Simulation *simulation, const Solver *solver, const 
     if (regime != NULL && regime->is_at_rest)
         return decisions_omit(decisions, "motion", 0, "J", moving_share(simulation),
                               "nothing moves and nothing sets it moving");
-    TRY(tell_contacts(simulation, plan, regime, decisions));
+    TRY(tell_contacts(simulation, solver, plan, regime, decisions));
     // Others step all the same.
     const bool has_closed_form =
         solver == &solver_exact && (plan_is_single(plan) || (regime != NULL && regime->is_clear &&
