@@ -30,11 +30,20 @@ static double part_of(const FrameNeighbour *neighbour) {
     return neighbour->is_stepped ? CAUTION : 1;
 }
 
+// What a mode's difference comes to until it is looked at again: as far as it swings.
+static double swing(const FrameNeighbour *neighbour, const Frame *frame, size_t i, double apart) {
+    const double omega = sqrt(frame->omega2[i]), since = NEIGHBOUR_SAMPLES * frame->interval;
+    const double speed = frame->p[i] - neighbour->engine.frame.p[i];
+    return hypot(apart, speed * (omega * since > 1 ? 1 / omega : since));
+}
+
 static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
     const size_t n = frame->storeys;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
         apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
+        if (neighbour->is_stepped)
+            apart[i] = swing(neighbour, frame, i, apart[i]);
         bound += frame->widest[i] * fabs(apart[i]);
     }
     neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
@@ -43,6 +52,8 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     const double *values = frame_spread(frame, apart);
     for (size_t j = 0; j < n; j++)
         difference = fmax(difference, fabs(values[j]));
+    if (neighbour->is_stepped)
+        difference = bound; // swings need not be in step
     neighbour->worst = fmax(neighbour->worst, difference);
     const double error = part_of(neighbour) * difference;
     if (isnan(neighbour->horizon) && !(error <= RESPONSE_PARTING * neighbour->largest))
@@ -78,7 +89,8 @@ void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine)
     Frame *own = &neighbour->engine.frame;
     neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
     neighbour->is_known =
-        neighbour->apart != NULL && frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
+        neighbour->apart != NULL &&
+        frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
                             fmax(engine->ode.tolerance / FINER, FRAME_ODE_TOLERANCE),
                             &neighbour->response) == STATUS_OK;
     neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);

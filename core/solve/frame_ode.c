@@ -18,31 +18,35 @@
 #include "core/contact/power.h"
 #include "core/solve/frame_record.h"
 
-enum { ROW = SERIES_ROW, STILL_KINKS = 8 };
+enum { ROW = SERIES_ROW, STILL_KINKS = 8, ORDER_MOST = 22 };
 
-static const double STEP_PART = 0.1;     // of a contact's tolerance, what a step may be wrong by
-static const double SPAN = 0.3;          // a step is about so long, in (root of depth) / speed
-static const double NEARLY_SMALL = 0.9;  // of negligible: there it still is
+static const double STEP_PART = 0.1;    // of a contact's tolerance, what a step may be wrong by
+static const double SPAN = 0.3;         // a step is about so long, in (root of depth) / speed
+static const double NEARLY_SMALL = 0.9; // of negligible: there it still is
 static const double ROUNDING = DBL_EPSILON / 4;
+static const double ORDER_BASE = 2.5, ORDER_RISE = 0.55; // the cheapest order, of log(error)
 
 Status frame_ode_make(FrameOde *ode, Frame *frame, double tolerance, Problem *problem) {
     memset(ode, 0, sizeof *ode);
     ode->frame = frame;
     ode->tolerance = tolerance;
+    ode->error = fmax(STEP_PART * tolerance, ROUNDING);
+    const double order = ORDER_BASE - ORDER_RISE * log(ode->error);
+    ode->order = order > ORDER_MOST ? ORDER_MOST : (size_t)order;
     if (frame->plan->form != CONTACT_POWER || frame->dampers == 0)
         return STATUS_OK;
     const size_t n = frame->storeys, m = frame->dampers;
     TRY(frame_series_room(&ode->series, frame, problem));
     ode->contact = calloc(m, sizeof *ode->contact);
-    ode->block = calloc(m + n + 3 * frame->padded + ode->series.stride, sizeof *ode->block);
+    ode->block = calloc(m + n + frame->padded + ode->series.stride + SERIES_NODES * (m + n),
+                        sizeof *ode->block);
     if (ode->contact == NULL || ode->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
     ode->row = ode->block;
     ode->elastic = ode->row + ode->series.stride;
-    ode->q = ode->elastic + frame->padded;
-    ode->p = ode->q + frame->padded;
-    ode->modal = ode->p + frame->padded;
+    ode->modal = ode->elastic + frame->padded;
     ode->speed = ode->modal + n;
+    ode->nodes = ode->speed + m;
     return STATUS_OK;
 }
 
@@ -57,10 +61,6 @@ bool frame_ode_serves(const FrameOde *ode) {
         if (ode->frame->damper[d].phase == FRAME_CONTACT)
             return true;
     return false;
-}
-
-static double error_of(const FrameOde *ode) {
-    return fmax(STEP_PART * ode->tolerance, ROUNDING);
 }
 
 static double root_of(double value, int root) {
@@ -107,9 +107,8 @@ static void look_at(FrameOde *ode, size_t d) {
         series_law_make(&at->law, &at->terms);
         at->speed = 0;
     }
-    at->push = frame_sign(damper->side) *
-               (damper->lean * frame->ground + frame_dot(damper->shape, ode->elastic,
-                                                         frame->storeys));
+    at->push = frame_sign(damper->side) * (damper->lean * frame->ground +
+                                           frame_dot(damper->shape, ode->elastic, frame->storeys));
     const double n = at->terms.exponent, p = penetration(damper);
     double speed = fmax(fabs(w), damper->row.impact.approach_speed);
     if (!(speed <= at->speed) || !(speed >= at->speed / 4) || !(at->speed > 0)) {
@@ -122,7 +121,7 @@ static void look_at(FrameOde *ode, size_t d) {
         at->speed = fmax(speed, sqrt(2 * fabs(at->push) * at->depth));
     }
     at->depth = fmax(at->depth, p);
-    at->negligible = find_negligible(at, error_of(ode), w, mass);
+    at->negligible = find_negligible(at, ode->error, w, mass);
     at->strain = at->terms.stiffness * power_of(p, n) * p / (n + 1);
 }
 
@@ -131,9 +130,10 @@ static bool is_damped(const FrameOdeContact *at, const FrameDamper *damper) {
     const double w = frame_sign(damper->side) * damper->w, off = w - at->terms.turn;
     if (fabs(off) > 4 * DBL_EPSILON * fabs(w))
         return off > 0;
-    const double spring = at->terms.is_elastic_below
-                              ? at->terms.stiffness * power_of(penetration(damper), at->terms.exponent)
-                              : 0;
+    const double spring =
+        at->terms.is_elastic_below
+            ? at->terms.stiffness * power_of(penetration(damper), at->terms.exponent)
+            : 0;
     return at->push - spring / damper->effective_mass > 0;
 }
 
@@ -166,15 +166,17 @@ static double find_contacts(FrameOde *ode) {
         series->contacts++;
     }
     SeriesContact *const all = series->contact;
-    const SeriesContact leader = all[first];
-    all[first] = all[0];
-    all[0] = leader;
+    if (first > 0) {
+        const SeriesContact moved = all[0];
+        all[0] = all[first];
+        all[first] = moved;
+    }
     // Another that is at 0 too has no series of its own until it is pressed.
     for (size_t c = 1; c < series->contacts; c++)
         if (!(penetration(&frame->damper[all[c].damper]) > 0))
             all[c].is_felt = false;
-    series->root = leader.is_felt ? leader.law->root : 1;
-    return root_of(penetration(&frame->damper[leader.damper]), series->root);
+    series->root = all[0].is_felt ? all[0].law->root : 1;
+    return root_of(penetration(&frame->damper[all[0].damper]), series->root);
 }
 
 // What a step of tau is about as long as, and what is large for each component.
@@ -190,41 +192,61 @@ static double make_scale(FrameOde *ode, double Y, double length, SeriesScale *sc
         const size_t d = series->contact[c].damper;
         const FrameDamper *damper = &frame->damper[d];
         const FrameOdeContact *at = &ode->contact[d];
-        ode->speed[d] = at->speed + DBL_MIN;
+        const double speed = at->speed + DBL_MIN;
+        ode->speed[d] = 1 / speed;
         for (size_t i = 0; i < n; i++)
-            ode->modal[i] += fabs(damper->shape[i]) * damper->effective_mass * at->speed;
-        span = fmin(span, at->depth / ode->speed[d]);
+            ode->modal[i] += fabs(damper->shape[i]) * damper->effective_mass * speed;
+        const double own = at->depth / speed;
+        span = own < span ? own : span;
     }
-    const FrameOdeContact *leader = &ode->contact[series->contact[0].damper];
-    const double w = series->contact[0].sign * frame->damper[series->contact[0].damper].w;
-    *scale = (SeriesScale){.error = error_of(ode),
-                           .root = root_of(leader->depth, root) + DBL_MIN,
-                           .time = span + DBL_MIN,
-                           .speed = ode->speed,
-                           .modal = ode->modal};
-    const double order = 2.5 - 0.55 * log(scale->error);
-    scale->order = order > 22 ? 22 : order < 5 ? 5 : (size_t)order;
+    for (size_t i = 0; i < n; i++)
+        ode->modal[i] = 1 / ode->modal[i];
+    const size_t d = series->contact[0].damper;
+    const double w = series->contact[0].sign * frame->damper[d].w;
+    const double large = root_of(ode->contact[d].depth, root) + DBL_MIN;
+    *scale = (SeriesScale){.error = ode->error,
+                           .per_root = 1 / large,
+                           .per_time = 1 / (span + DBL_MIN),
+                           .per_speed = ode->speed,
+                           .per_modal = ode->modal,
+                           .order = ode->order};
     // tau over `length`, were the speed to stay.
-    const double end = root_of(fmax(pow(Y, root) + w * length, 0), root);
-    double mean = 0, power = 1;
-    for (int i = 0; i < root; i++, power *= end)
-        mean += power * pow(Y, root - 1 - i);
-    return fmin(SPAN * scale->root / ode->speed[series->contact[0].damper], 1.02 * length / mean);
+    double p = Y;
+    for (int i = 1; i < root; i++)
+        p *= Y;
+    const double end = root_of(ledger_larger(p + w * length, 0), root);
+    double mean = 0, power = 1; // the sum of Y^i end^(root - 1 - i)
+    for (int i = 0; i < root; i++, power *= Y)
+        mean = mean * end + power;
+    // As far as the step before went, or about so far by the contact's own numbers.
+    const double usual = SPAN * large * ode->speed[d];
+    const double reach = root == ode->last_root && ode->last > usual ? ode->last : usual;
+    return fmin(reach, 1.02 * length / mean);
 }
 
-// Cuts the step where t is `length`. Whether it is.
-static bool cut_time(FrameOde *ode, double length) {
-    FrameSeries *series = &ode->series;
+// Cuts the step where the leader leaves, for behind it t would fall. Whether it does.
+static bool cut_end(FrameSeries *series) {
+    double s;
+    if (!root_first_crossing(frame_series_root(series), series->degree, &s))
+        return false;
+    frame_series_cut(series, s);
+    return true;
+}
+
+// Cuts the step where t is `length`. Whether it comes that far, *is_cut whether it came further.
+static bool cut_time(FrameSeries *series, double length, bool *is_cut) {
     double left[ROW], s, t = 0;
     frame_series_of(series, series->at_t, left);
     for (size_t k = series->degree; k > 0; k--) {
         t += left[k];
         left[k] = -left[k];
     }
+    *is_cut = false;
     if (t <= length)
         return t >= length * (1 - 4 * DBL_EPSILON);
     left[0] = length;
-    if (root_first_crossing(left, series->degree, &s))
+    *is_cut = root_first_crossing(left, series->degree, &s);
+    if (*is_cut)
         frame_series_cut(series, s);
     return true;
 }
@@ -250,15 +272,13 @@ static void find_end(const FrameOde *ode, size_t c, Found *found) {
     const FrameDamper *damper = &ode->frame->damper[contact->damper];
     const double negligible = ode->contact[contact->damper].negligible;
     double gap[ROW];
-    if (c == 0) {
+    if (c == 0)
         memcpy(gap, frame_series_root(series), (series->degree + 1) * sizeof *gap);
-    } else {
+    else
         frame_series_of(series, series->at_r + contact->damper, gap);
-        for (size_t k = 0; k <= series->degree; k++)
-            gap[k] *= contact->sign;
-    }
-    if (falls(series, gap, found)) {
-        found->contact = c;
+    for (size_t k = 0; k <= series->degree && c > 0; k++)
+        gap[k] *= contact->sign;
+    if (c > 0 && falls(series, gap, found)) {
         found->event.damper = contact->damper;
         found->event.side = damper->side;
     }
@@ -302,7 +322,8 @@ static void find_touch(const FrameOde *ode, size_t d, Found *found) {
     for (size_t k = 0; k <= series->degree; k++)
         reach += fabs(r[k]);
     for (int side = 0; side < 2; side++) {
-        const double sign = frame_sign((Side)side), room = frame_room(&frame->damper[d], (Side)side);
+        const double sign = frame_sign((Side)side),
+                     room = frame_room(&frame->damper[d], (Side)side);
         if (reach < room)
             continue;
         for (size_t k = 0; k <= series->degree; k++)
@@ -318,7 +339,10 @@ static void take_state(FrameOde *ode, const Slice *slice, double s, bool is_ende
     Frame *frame = ode->frame;
     const FrameSeries *series = &ode->series;
     const double *row = ode->row;
-    frame_series_at(series, s, ode->row);
+    if (s < 1)
+        frame_series_at(series, s, ode->row);
+    else
+        frame_series_end(series, ode->row);
     memcpy(frame->q, row + series->at_q, frame->storeys * sizeof *frame->q);
     memcpy(frame->p, row + series->at_p, frame->storeys * sizeof *frame->p);
     for (size_t d = 0; d < frame->dampers; d++) {
@@ -335,58 +359,70 @@ static void take_state(FrameOde *ode, const Slice *slice, double s, bool is_ende
     frame->ground = slice_at(slice, row[series->at_t]);
 }
 
-// p' D p of a row.
-static double loss_of(FrameOde *ode, const double *q, const double *p) {
+// p' D p of all nodes, into `loss`.
+static void find_loss(FrameOde *ode, size_t rule, double *loss) {
     const Frame *frame = ode->frame;
-    const size_t n = frame->storeys;
-    double loss = 0;
-    if (frame->diagonal != NULL) {
-        for (size_t i = 0; i < n; i++)
-            loss += frame->diagonal[i] * p[i] * p[i];
-        return loss;
+    const FrameSeries *series = &ode->series;
+    const size_t n = frame->storeys, count = arc_rules[rule].count;
+    memset(loss, 0, SERIES_NODES * sizeof *loss);
+    for (size_t i = 0; i < n; i++) {
+        double *p = ode->nodes + i * SERIES_NODES;
+        frame_series_nodes(series, rule, series->z + series->at_p + i, series->stride,
+                           series->degree, p);
+        for (size_t k = 0; k < count && frame->diagonal != NULL; k++)
+            loss[k] += frame->diagonal[i] * p[k] * p[k];
     }
-    memcpy(ode->q, q, n * sizeof *q); // whole vectors
-    memcpy(ode->p, p, n * sizeof *p);
-    frame_elastic(frame, ode->q, ode->p, ode->elastic);
-    loss = frame_dot(ode->elastic, p, n);
-    for (size_t i = 0; i < n; i++)
-        loss -= frame->omega2[i] * q[i] * p[i];
-    return loss;
+    for (size_t i = 0; i < n && frame->diagonal == NULL; i++)
+        for (size_t j = 0; j < n; j++) {
+            const double *a = ode->nodes + i * SERIES_NODES, *b = ode->nodes + j * SERIES_NODES;
+            for (size_t k = 0; k < count; k++)
+                loss[k] += frame->damping[i * n + j] * a[k] * b[k];
+        }
 }
 
 // Integrals over the step.
 static void take_sums(FrameOde *ode, const Slice *slice, FrameOdeStep *step) {
     const Frame *frame = ode->frame;
     const FrameSeries *series = &ode->series;
-    const Quadrature *rule = &arc_rules[error_of(ode) > 1e-8 ? 0 : ARC_RULES - 1];
-    const double *q = ode->row + series->at_q, *p = ode->row + series->at_p;
-    for (size_t c = 0; c < series->contacts; c++)
-        ode->contact[series->contact[c].damper].impulse =
-            ode->contact[series->contact[c].damper].work = 0;
-    for (size_t node = 0; node < rule->count; node++) {
-        const double s = rule->node[node];
-        frame_series_at(series, s, ode->row);
-        const double Y = root_value(frame_series_root(series), series->degree, s);
-        double weight = rule->weight[node] * series->length * series->root;
+    const size_t rule = ode->error > 1e-8 ? 0 : ARC_RULES - 1, count = arc_rules[rule].count;
+    const size_t n = frame->storeys, m = frame->dampers, degree = series->degree;
+    double weight[SERIES_NODES], Y[SERIES_NODES], ground[SERIES_NODES], loss[SERIES_NODES],
+        momentum[SERIES_NODES] = {0};
+    frame_series_nodes(series, rule, frame_series_root(series), 1, degree, Y);
+    frame_series_nodes(series, rule, series->z + (series->is_sine ? series->at_a : series->at_t),
+                       series->stride, degree, ground);
+    find_loss(ode, rule, loss);
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < count; k++)
+            momentum[k] += frame->carry[i] * ode->nodes[i * SERIES_NODES + k];
+    for (size_t d = 0; d < m; d++) {
+        double *w = ode->nodes + d * SERIES_NODES; // the modes' are no longer wanted
+        frame_series_nodes(series, rule, series->z + d, series->stride, degree, w);
+        for (size_t k = 0; k < count; k++)
+            momentum[k] += frame->damper[d].plan->mass * w[k];
+    }
+    for (size_t k = 0; k < count; k++) {
+        weight[k] = arc_rules[rule].weight[k] * series->length * series->root;
         for (int i = 1; i < series->root; i++)
-            weight *= Y;
-        const double ground = series->is_sine ? ode->row[series->at_a]
-                                              : slice_at(slice, ode->row[series->at_t]);
-        double momentum = frame_dot(frame->carry, p, frame->storeys);
-        for (size_t d = 0; d < frame->dampers; d++)
-            momentum += frame->damper[d].plan->mass * ode->row[d];
-        step->input -= weight * ground * momentum;
-        step->damping += weight * loss_of(ode, q, p);
-        step->ground += weight * ground;
-        for (size_t c = 0; c < series->contacts; c++) {
-            const SeriesContact *contact = &series->contact[c];
-            FrameOdeContact *at = &ode->contact[contact->damper];
-            if (!contact->is_felt)
-                continue;
-            const double impulse =
-                weight * contact->sign * root_value(contact->force, series->degree - 1, s);
+            weight[k] *= Y[k];
+        ground[k] = series->is_sine ? ground[k] : slice_at(slice, ground[k]);
+        step->input -= weight[k] * ground[k] * momentum[k];
+        step->damping += weight[k] * loss[k];
+        step->ground += weight[k] * ground[k];
+    }
+    for (size_t c = 0; c < series->contacts; c++) {
+        const SeriesContact *contact = &series->contact[c];
+        FrameOdeContact *at = &ode->contact[contact->damper];
+        const double *w = ode->nodes + contact->damper * SERIES_NODES;
+        double force[SERIES_NODES];
+        at->impulse = at->work = 0;
+        if (!contact->is_felt)
+            continue;
+        frame_series_nodes(series, rule, contact->force, 1, degree - 1, force);
+        for (size_t k = 0; k < count; k++) {
+            const double impulse = weight[k] * contact->sign * force[k];
             at->impulse += impulse;
-            at->work += impulse * ode->row[contact->damper];
+            at->work += impulse * w[k];
         }
     }
 }
@@ -441,9 +477,15 @@ static bool find_open(const FrameOde *ode, FrameOdeStep *step) {
     return false;
 }
 
-static void find_first(const FrameOde *ode, Found *found) {
+// `is_end`: at its end the leader leaves.
+static void find_first(const FrameOde *ode, bool is_end, Found *found) {
     const FrameSeries *series = &ode->series;
     *found = (Found){0};
+    if (is_end) {
+        const size_t d = series->contact[0].damper;
+        found->is_found = true;
+        found->event = (FrameEvent){.damper = d, .s = 1, .side = ode->frame->damper[d].side};
+    }
     for (size_t c = 0; c < series->contacts; c++) {
         find_end(ode, c, found);
         find_kink(ode, c, found);
@@ -468,17 +510,20 @@ void frame_ode_step(FrameOde *ode, const Slice *slice, double length, FrameOdeSt
     const double Y = find_contacts(ode);
     const double span = make_scale(ode, Y, length, &scale);
     frame_series_cut(series, frame_series_make(series, frame, slice, Y, span, &scale));
-    const bool is_whole = cut_time(ode, length);
-    find_first(ode, &found);
-    if (found.is_found)
+    ode->last = series->length;
+    ode->last_root = series->root;
+    const bool is_leaving = cut_end(series);
+    bool is_cut;
+    const bool is_whole = cut_time(series, length, &is_cut);
+    find_first(ode, is_leaving && !is_cut, &found);
+    if (found.is_found && found.event.s < 1)
         frame_series_cut(series, found.event.s);
     const bool is_end = found.is_found && !found.is_kink && !found.is_stop;
     if (!frame->is_shadow) {
         take_sums(ode, slice, step);
         take_peaks(ode, slice);
     }
-    take_state(ode, slice, 1,
-               is_end && found.event.damper == series->contact[0].damper);
+    take_state(ode, slice, 1, is_end && found.event.damper == series->contact[0].damper);
     step->length = is_whole && !found.is_found ? length : ode->row[series->at_t];
     if (!frame->is_shadow)
         take_rows(ode, step->length);

@@ -13,22 +13,27 @@ typedef struct FrameOdeContact {
     ContactParameters parameters; // of the contact that the rest is of
     ContactTerms terms;
     SeriesLaw law;
-    double speed;      // of the motion in it, about [m/s]
-    double depth;      // p that such a speed comes to [m]
-    double push;       // p'' without N [m/s^2]
-    double negligible; // N is, below this p [m]
-    double strain;     // at the start of a step [J]
+    double speed;         // of the motion in it, about [m/s]
+    double depth;         // p that such a speed comes to [m]
+    double push;          // p'' without N [m/s^2]
+    double negligible;    // N is, below this p [m]
+    double strain;        // at the start of a step [J]
     double impulse, work; // of N over it [N s], [J]
 } FrameOdeContact;
 
 typedef struct FrameOde {
     Frame *frame;
     double tolerance; // of a contact
+    double error;     // of a step
+    size_t order;     // of its series, at most
     FrameSeries series;
     FrameOdeContact *contact; // damper after damper
     double *speed, *modal;    // scales
-    double *row, *elastic, *q, *p; // scratch
-    size_t still;             // kinks in a row, without time passing
+    double *row, *elastic;    // scratch
+    double *nodes; // scratch: of all modes, or of all dampers, at the nodes of a quadrature
+    double last;   // length of the last step's series, in its tau
+    int last_root; // and its root
+    size_t still;  // kinks in a row, without time passing
     double *block;
 } FrameOde;
 

@@ -15,6 +15,11 @@
 
 #include "core/solve/wide.h"
 
+// Pairs fill the registers that every processor has.
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
+#define TWO(values) (*(const Two *)(values))
+#define PUT_TWO(values, two) (*(Two *)(values) = (two))
+
 enum { ROOTS = 4, POWER_MOST = 18, GAP_LEAST = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
@@ -63,14 +68,19 @@ Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *probl
     series->at_a = series->at_p + n;
     series->at_r = series->at_a + (series->is_sine ? 2 : 0);
     series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
-    series->block = calloc(frame_lanes_room(2 * SERIES_ROW * series->stride + n + 8),
-                           sizeof *series->block);
+    series->block =
+        calloc(frame_lanes_room(2 * SERIES_ROW * series->stride + n + 8), sizeof *series->block);
     series->contact = calloc(m, sizeof *series->contact);
     if (series->block == NULL || series->contact == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
     series->z = frame_lanes_start(series->block);
     series->rate = series->z + SERIES_ROW * series->stride;
     series->elastic = series->rate + SERIES_ROW * series->stride;
+    for (size_t i = 0; i < ARC_RULES; i++)
+        for (size_t node = 0; node < arc_rules[i].count; node++)
+            for (size_t k = 0; k < SERIES_ROW; k++)
+                series->node_power[i][k * SERIES_NODES + node] =
+                    pow(arc_rules[i].node[node], (double)k);
     return STATUS_OK;
 }
 
@@ -79,16 +89,21 @@ void frame_series_clear(FrameSeries *series) {
     free(series->block);
 }
 
+INLINE void put(Series *series, size_t k, double value) {
+    series->up[k] = value;
+    series->down[SERIES_ROW - 1 - k] = value;
+}
+
 // Order k of a product.
-INLINE double product(const double *a, const double *b, size_t k) {
-    double sum[4] = {0, 0, 0, 0};
-    size_t j = 0;
-    for (; j + 4 <= k + 1; j += 4)
-        for (size_t i = 0; i < 4; i++)
-            sum[i] += a[j + i] * b[k - j - i];
-    for (; j <= k; j++)
-        sum[0] += a[j] * b[k - j];
-    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+INLINE double product(const Series *a, const Series *b, size_t k) {
+    const double *up = a->up, *down = b->down + SERIES_ROW - 1 - k;
+    Two sum[2] = {{0}};
+    for (size_t j = 0; j <= k; j += 4) {
+        sum[0] += TWO(up + j) * TWO(down + j);
+        sum[1] += TWO(up + j + 2) * TWO(down + j + 2);
+    }
+    sum[0] += sum[1];
+    return sum[0][0] + sum[0][1];
 }
 
 // Order k of b^exponent, b[0] > 0, from the orders before.
@@ -107,37 +122,27 @@ INLINE void contact_order(FrameSeries *series, SeriesContact *contact, size_t k,
         contact->force[k] = 0;
         return;
     }
-    const double *spring = contact->spring, *viscous = contact->viscous;
+    const double *row = series->z + k * series->stride;
+    const Series *spring = &contact->spring, *viscous = &contact->viscous;
     if (is_leader && law->is_whole) {
-        spring = series->powers[law->spring];
-        viscous = series->powers[law->viscous];
+        spring = &series->powers[law->spring];
+        viscous = &series->powers[law->viscous];
     } else {
         double own[SERIES_ROW];
-        const double *of = series->powers[1];
         const double root = is_leader ? law->root : 1;
         for (size_t j = 0; j <= k && !is_leader; j++)
             own[j] = contact->sign * series->z[j * series->stride + series->at_r + contact->damper];
-        of = is_leader ? of : own;
-        contact->spring[k] = power_order(of, root * law->exponents[0], contact->spring, k);
+        const double *of = is_leader ? series->powers[1].up : own;
+        put(&contact->spring, k, power_order(of, root * law->exponents[0], spring->up, k));
         if (law->exponents[1] == law->exponents[0])
-            viscous = contact->spring;
+            viscous = spring;
         else
-            contact->viscous[k] = power_order(of, root * law->exponents[1], contact->viscous, k);
+            put(&contact->viscous, k, power_order(of, root * law->exponents[1], viscous->up, k));
     }
-    double force = contact->terms.stiffness * spring[k];
+    double force = contact->terms.stiffness * spring->up[k];
     if (contact->is_damped && contact->terms.viscous > 0) {
-        double sum = 0;
-        const double *w = series->z + contact->damper;
-        const size_t stride = series->stride;
-        size_t j = 0;
-        double more = 0;
-        for (; j + 2 <= k + 1; j += 2) {
-            sum += viscous[j] * w[(k - j) * stride];
-            more += viscous[j + 1] * w[(k - j - 1) * stride];
-        }
-        if (j <= k)
-            sum += viscous[j] * w[(k - j) * stride];
-        force += contact->terms.viscous * contact->sign * (sum + more);
+        put(&contact->speed, k, contact->sign * row[contact->damper]);
+        force += contact->terms.viscous * product(&contact->speed, viscous, k);
     } else if (!contact->is_damped && !contact->terms.is_elastic_below) {
         force = 0;
     }
@@ -150,8 +155,8 @@ INLINE void elastic_order(FrameSeries *series, const Frame *frame, const double 
     double *restrict out = series->elastic;
     if (n == 1 || frame->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
-            out[i] = (n == 1 ? frame->damping[0] : frame->diagonal[i]) * p[i] +
-                     frame->omega2[i] * q[i];
+            out[i] =
+                (n == 1 ? frame->damping[0] : frame->diagonal[i]) * p[i] + frame->omega2[i] * q[i];
         return;
     }
     for (size_t i = 0; i < n; i++)
@@ -203,32 +208,26 @@ INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *sli
 }
 
 // Order k + 1 of the state: what is between is times Y^(root - 1).
-INLINE void state_order(FrameSeries *series, const double *pace, size_t k, size_t stride) {
+INLINE void state_order(FrameSeries *series, const Series *pace, size_t k, size_t stride) {
     const double scale = series->length * series->root / (double)(k + 1);
     double *restrict next = series->z + (k + 1) * stride;
-    const double *rate = series->rate;
+    const double *rate = series->rate, *down = pace->down + SERIES_ROW - 1 - k;
     if (series->root == 1) {
         for (size_t i = 0; i < stride; i++)
             next[i] = scale * rate[k * stride + i];
         return;
     }
     for (size_t i = 0; i < stride; i += 4) {
-        Four sum = {0}, more = {0};
-        size_t j = 0;
-        for (; j + 2 <= k + 1; j += 2) {
-            Four first, second;
-            memcpy(&first, rate + (k - j) * stride + i, sizeof first);
-            memcpy(&second, rate + (k - j - 1) * stride + i, sizeof second);
-            sum += pace[j] * first;
-            more += pace[j + 1] * second;
+        Two sum[4] = {{0}};
+        const double *at = rate + i;
+        for (size_t j = 0; j <= k; j += 2, at += 2 * stride) {
+            sum[0] += down[j] * TWO(at);
+            sum[1] += down[j] * TWO(at + 2);
+            sum[2] += down[j + 1] * TWO(at + stride);
+            sum[3] += down[j + 1] * TWO(at + stride + 2);
         }
-        if (j <= k) {
-            Four first;
-            memcpy(&first, rate + (k - j) * stride + i, sizeof first);
-            sum += pace[j] * first;
-        }
-        sum = scale * (sum + more);
-        memcpy(next + i, &sum, sizeof sum);
+        PUT_TWO(next + i, scale * (sum[0] + sum[2]));
+        PUT_TWO(next + i + 2, scale * (sum[1] + sum[3]));
     }
 }
 
@@ -236,14 +235,14 @@ INLINE void state_order(FrameSeries *series, const double *pace, size_t k, size_
 INLINE double size_of(const FrameSeries *series, const SeriesScale *scale, size_t k, size_t n,
                       size_t m) {
     const double *row = series->z + k * series->stride;
-    double most = fabs(series->powers[1][k]) / scale->root;
-    most = ledger_larger(most, fabs(row[series->at_t]) / scale->time);
+    double most = ledger_larger(fabs(series->powers[1].up[k]) * scale->per_root,
+                                fabs(row[series->at_t]) * scale->per_time);
     for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
         const size_t d = series->contact[c].damper;
-        most = ledger_larger(most, fabs(row[d]) / scale->speed[d]);
+        most = ledger_larger(most, fabs(row[d]) * scale->per_speed[d]);
     }
     for (size_t i = 0; i < n; i++)
-        most = ledger_larger(most, fabs(row[series->at_p + i]) / scale->modal[i]);
+        most = ledger_larger(most, fabs(row[series->at_p + i]) * scale->per_modal[i]);
     return most;
 }
 
@@ -251,28 +250,29 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
                    const SeriesScale *scale, size_t n, size_t m, size_t stride) {
     const SeriesContact *leader = &series->contact[0];
     const SeriesLaw *law = leader->law;
-    const double *pace = series->powers[series->root == 1 ? 0 : law->pace];
+    const Series *pace = &series->powers[series->root == 1 ? 0 : law->pace];
     // From Y = 0 only each so-manieth order has anything in it.
     const size_t gap = leader->is_felt && law->is_whole
                            ? (size_t)(law->power[law->spring] + law->root)
                            : GAP_LEAST;
     const size_t window =
-        series->powers[1][0] > NEAR * scale->root || gap < GAP_LEAST ? GAP_LEAST : gap;
+        series->powers[1].up[0] * scale->per_root > NEAR || gap < GAP_LEAST ? GAP_LEAST : gap;
     const size_t order = scale->order > window ? scale->order : window + 1;
     size_t small = 0; // orders in a row
     double size[SERIES_ROW];
     size_t k = 0;
     for (; k < order; k++) {
         for (int i = 2; i < law->count && leader->is_felt; i++)
-            series->powers[i][k] =
-                product(series->powers[law->left[i]], series->powers[law->right[i]], k);
+            put(&series->powers[i], k,
+                product(&series->powers[law->left[i]], &series->powers[law->right[i]], k));
         for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++)
             contact_order(series, &series->contact[c], k, c == 0);
         rate_order(series, frame, slice, k, n, m);
         state_order(series, pace, k, stride);
-        series->powers[0][k + 1] = 0;
-        series->powers[1][k + 1] =
-            series->length / (double)(k + 1) * leader->sign * series->z[k * stride + leader->damper];
+        put(&series->powers[0], k + 1, 0);
+        put(&series->powers[1], k + 1,
+            series->length / (double)(k + 1) * leader->sign *
+                series->z[k * stride + leader->damper]);
         size[k + 1] = size_of(series, scale, k + 1, n, m);
         small = size[k + 1] <= scale->error ? small + 1 : 0;
         if (small >= window) {
@@ -281,10 +281,11 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
         }
     }
     series->degree = k;
-    double shrink = 1;
+    // Coefficients fall as powers of 1 / R; the first one left out is to be small enough.
+    double wide = INFINITY;
     for (size_t j = k - window + 1; j <= k; j++)
-        shrink = fmin(shrink, log(scale->error / size[j]) / (double)j);
-    return exp(shrink);
+        wide = fmin(wide, -log(size[j]) / (double)j);
+    return exp(fmin(wide + log(scale->error) / (double)(k + 1), 1));
 }
 
 double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *slice, double Y,
@@ -304,8 +305,8 @@ double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *s
         row[series->at_a] = slice->value;
         row[series->at_a + 1] = slice->slope;
     }
-    series->powers[0][0] = 1;
-    series->powers[1][0] = Y;
+    put(&series->powers[0], 0, 1);
+    put(&series->powers[1], 0, Y);
     // The usual case is made for its own numbers.
     if (n == 1 && m == 1 && series->stride == 4)
         return make(series, frame, slice, scale, 1, 1, 4);
@@ -321,7 +322,7 @@ void frame_series_cut(FrameSeries *series, double s) {
         double *row = series->z + k * series->stride;
         for (size_t i = 0; i < series->stride; i++)
             row[i] *= power;
-        series->powers[1][k] *= power;
+        series->powers[1].up[k] *= power;
         for (size_t c = 0; c < series->contacts && k < series->degree; c++)
             series->contact[c].force[k] *= power;
     }
@@ -332,15 +333,47 @@ void frame_series_of(const FrameSeries *series, size_t place, double *out) {
         out[k] = series->z[k * series->stride + place];
 }
 
-// Horner's scheme; of s = 1 too, where small terms come first.
 void frame_series_at(const FrameSeries *series, double s, double *row) {
     const size_t stride = series->stride;
     for (size_t i = 0; i < stride; i += 4) {
-        Four sum = {0}, c;
-        for (size_t k = series->degree + 1; k-- > 0;) {
-            memcpy(&c, series->z + k * stride + i, sizeof c);
-            sum = sum * s + c;
+        const double *at = series->z + series->degree * stride + i;
+        Two sum[2] = {TWO(at), TWO(at + 2)};
+        for (size_t k = series->degree; k > 0; k--) {
+            at -= stride;
+            sum[0] = sum[0] * s + TWO(at);
+            sum[1] = sum[1] * s + TWO(at + 2);
         }
-        memcpy(row + i, &sum, sizeof sum);
+        PUT_TWO(row + i, sum[0]);
+        PUT_TWO(row + i + 2, sum[1]);
     }
+}
+
+void frame_series_end(const FrameSeries *series, double *row) {
+    const size_t stride = series->stride;
+    for (size_t i = 0; i < stride; i += 4) {
+        const double *at = series->z + series->degree * stride + i;
+        Two sum[2] = {TWO(at), TWO(at + 2)};
+        for (size_t k = series->degree; k > 0; k--) { // small terms first
+            at -= stride;
+            sum[0] += TWO(at);
+            sum[1] += TWO(at + 2);
+        }
+        PUT_TWO(row + i, sum[0]);
+        PUT_TWO(row + i + 2, sum[1]);
+    }
+}
+
+void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+                        size_t degree, double *out) {
+    const double *power = series->node_power[rule];
+    Two sum[SERIES_NODES / 2] = {{0}};
+    for (size_t k = 0; k <= degree; k++, power += SERIES_NODES) {
+        const double of = c[k * stride];
+        sum[0] += of * TWO(power);
+        sum[1] += of * TWO(power + 2);
+        sum[2] += of * TWO(power + 4);
+        sum[3] += of * TWO(power + 6);
+    }
+    for (size_t i = 0; i < SERIES_NODES / 2; i++)
+        PUT_TWO(out + 2 * i, sum[i]);
 }

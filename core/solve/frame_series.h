@@ -7,7 +7,13 @@
 #include "core/contact/contact.h"
 #include "core/solve/frame_state.h"
 
-enum { SERIES_DEGREE = 26, SERIES_ROW = SERIES_DEGREE + 2, SERIES_POWERS = 20 };
+enum { SERIES_DEGREE = 26, SERIES_ROW = 28, SERIES_POWERS = 20, SERIES_NODES = 8 };
+
+// A series from order 0 on and, for products, from its last order back to 0 at the end of
+// SERIES_ROW, with zeros behind.
+typedef struct Series {
+    double up[SERIES_ROW + 4], down[SERIES_ROW + 4];
+} Series;
 
 // How N follows from Y = p^(1/root), where all of its exponents times root are whole numbers, and
 // else only as far as Y > 0.
@@ -27,10 +33,10 @@ typedef struct SeriesContact {
     double sign;
     ContactTerms terms;
     const SeriesLaw *law;
-    bool is_felt;   // else N is left out, being too small to matter
-    bool is_damped; // p' is above its turn
-    double spring[SERIES_ROW], viscous[SERIES_ROW]; // powers of p
-    double force[SERIES_ROW];                       // N
+    bool is_felt;                  // else N is left out, being too small to matter
+    bool is_damped;                // p' is above its turn
+    Series speed, spring, viscous; // p', and powers of p
+    double force[SERIES_ROW];      // N
 } SeriesContact;
 
 // Coefficients in s = tau / length, where dt = root Y^(root - 1) dtau and Y = p^(1/root) is that of
@@ -47,8 +53,9 @@ typedef struct FrameSeries {
     double *elastic;
     SeriesContact *contact; // those in contact, the leader first
     size_t contacts;
-    int root;                                 // of the leader; 1: tau is time
-    double powers[SERIES_POWERS][SERIES_ROW]; // of Y
+    int root;                                                // of the leader; 1: tau is time
+    Series powers[SERIES_POWERS];                            // of Y
+    double node_power[ARC_RULES][SERIES_ROW * SERIES_NODES]; // of the nodes of arc_rules
     double *block;
 } FrameSeries;
 
@@ -58,10 +65,10 @@ void frame_series_clear(FrameSeries *series);
 // What is large for each, and the error that is allowed relative to that.
 typedef struct SeriesScale {
     double error;
-    double root, time;   // of the leader's Y, of t
-    const double *speed; // of the dampers' w
-    const double *modal; // of p
-    size_t order;        // at most
+    double per_root, per_time; // 1 / what is large for the leader's Y and for t
+    const double *per_speed;   // of the dampers' w
+    const double *per_modal;   // of p
+    size_t order;              // at most
 } SeriesScale;
 
 // From the present state, Y being the leader's: as many orders as the error needs over `length`, or
@@ -73,12 +80,16 @@ double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *s
 void frame_series_cut(FrameSeries *series, double s);
 
 static inline const double *frame_series_root(const FrameSeries *series) {
-    return series->powers[1];
+    return series->powers[1].up;
 }
 
 // One component's coefficients.
 void frame_series_of(const FrameSeries *series, size_t place, double *out);
-// The whole row at s.
+// The whole row at s, and at s = 1.
 void frame_series_at(const FrameSeries *series, double s, double *row);
+void frame_series_end(const FrameSeries *series, double *row);
+// A polynomial's values at the nodes of one of arc_rules; its coefficients are `stride` apart.
+void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+                        size_t degree, double *out);
 
 #endif
