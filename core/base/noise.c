@@ -14,25 +14,6 @@
 
 enum { ROW = 32 };
 
-void noise_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]) {
-    uint32_t c0 = counter[0], c1 = counter[1], c2 = counter[2], c3 = counter[3];
-    uint32_t k0 = key[0], k1 = key[1];
-    for (int round = 0; round < 10; round++) {
-        const uint64_t a = UINT64_C(0xD2511F53) * c0;
-        const uint64_t b = UINT64_C(0xCD9E8D57) * c2;
-        c0 = (uint32_t)(b >> 32) ^ c1 ^ k0;
-        c1 = (uint32_t)b;
-        c2 = (uint32_t)(a >> 32) ^ c3 ^ k1;
-        c3 = (uint32_t)a;
-        k0 += 0x9E3779B9u;
-        k1 += 0xBB67AE85u;
-    }
-    out[0] = c0;
-    out[1] = c1;
-    out[2] = c2;
-    out[3] = c3;
-}
-
 INLINE double double_of(uint64_t bits) {
     double value;
     memcpy(&value, &bits, sizeof value);
@@ -45,7 +26,7 @@ INLINE uint64_t bits_of(double value) {
     return bits;
 }
 
-// Of an integer below 2^52, or a little less than 0: in the last digits of 1.5 * 2^52.
+// Of an integer below 2^51: in the last digits of 1.5 * 2^52.
 INLINE double double_from(uint64_t integer) {
     return double_of(UINT64_C(0x4338000000000000) + integer) - 0x1.8p52;
 }
@@ -56,7 +37,7 @@ INLINE double bits53(uint64_t high, uint64_t low) {
     return 4 * double_from(bits >> 2) + double_from(bits & 3);
 }
 
-// As noise_philox, in words of 64 bits of which the lower 32 count.
+// Ten rounds, in words of 64 bits of which the lower 32 count.
 INLINE void make_words(uint64_t seed, uint64_t stream, uint64_t index, uint64_t *word0,
                        uint64_t *word1, uint64_t *word2, uint64_t *word3) {
     const uint64_t low = 0xffffffff;
@@ -76,6 +57,14 @@ INLINE void make_words(uint64_t seed, uint64_t stream, uint64_t index, uint64_t 
     *word1 = c1;
     *word2 = c2;
     *word3 = c3;
+}
+
+void noise_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]) {
+    uint64_t word[4];
+    make_words((uint64_t)key[1] << 32 | key[0], (uint64_t)counter[3] << 32 | counter[2],
+               (uint64_t)counter[1] << 32 | counter[0], &word[0], &word[1], &word[2], &word[3]);
+    for (int i = 0; i < 4; i++)
+        out[i] = (uint32_t)word[i];
 }
 
 // -2 log(u), 2^-53 <= u <= 1. u = 2^e z with z within sqrt(1/2) and sqrt(2), and log z = 2 atanh s,
