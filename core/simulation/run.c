@@ -435,6 +435,8 @@ Cost simulation_cost(const Simulation *simulation) {
     const double samples = (double)scene_sample_count(&simulation->scene);
     double steps =
         chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
+    // A value written costs about a tenth of a step.
+    steps += samples * (double)simulation->output.channels.count / 10;
     // A transformed sample costs about a third of a step, and overlap transforms it several times.
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /
