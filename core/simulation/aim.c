@@ -253,17 +253,6 @@ Cost aim_cost(const Simulation *simulation) {
     return cost;
 }
 
-// A run tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
 // What is at hand while one way after the other is run.
 typedef struct Session {
     Aim aim;
@@ -308,7 +297,7 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
     Simulation view;
     const double left = 1 - session->done;
     Stage stage = {session->watch, session->done, is_whole(way) ? left : left / 2};
-    const Watch watch = {&stage, stage_advance};
+    const Watch watch = stage_watch(&stage);
     outcome_drop(session->outcome);
     session->outcome = NULL;
     if (view_make(session->aim.simulation, way, &view) != STATUS_OK)

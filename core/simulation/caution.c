@@ -29,7 +29,8 @@ static Status warn_of_steps(Outcome *outcome) {
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/accuracy",
                         "with these steps the displacement is wrong by about %.2g of its largest "
-                        "value%s: shorter steps, or the solver exact, are closer",
+                        "value%s: shorter steps, a smaller tolerance, or the solver exact "
+                        "without one, are closer",
                         summary->error_estimate,
                         summary->error_estimate > 0.1 ? ", and only statistics hold" : "");
 }

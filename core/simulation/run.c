@@ -8,6 +8,7 @@
 #include "core/simulation/caution.h"
 #include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/rest.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
@@ -98,21 +99,6 @@ Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem
     }
     plan_free(plan);
     return status;
-}
-
-// A part of the journey tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
-static Watch stage_watch(Stage *stage) {
-    return (Watch){stage, stage_advance};
 }
 
 // The journey's luggage: everything that must be put down again at its end.
@@ -394,10 +380,15 @@ static double steps_a_sample(const Scene *scene, double *planning) {
     return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
 }
 
-// Contacts under a power law: some 6000 steps' worth each, at a guess seven a second.
-static double power_steps(const Scene *scene) {
+// Contacts under a power law: at a guess seven a second, each of some 1000 steps' worth and of more
+// for each digit of its tolerance, for each mode.
+static double power_steps(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    return law->form == CONTACT_POWER ? 7 * 6000.0 * scene->duration * (double)scene->dampers.count
+    const double storeys = (double)structure_storeys(scene_structure(scene));
+    const double digits = -log10(exact_tolerance(settings(simulation)));
+    return law->form == CONTACT_POWER ? 7 * (1000 + 400 * digits * (0.5 + storeys / 2)) *
+                                            scene->duration * (double)scene->dampers.count
                                       : 0;
 }
 
@@ -413,7 +404,7 @@ static double exact_steps(const Simulation *simulation) {
     return planning +
            step *
                (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
-           power_steps(&simulation->scene);
+           power_steps(simulation);
 }
 
 // Steps of a solver that knows its own cost.

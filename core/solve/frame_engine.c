@@ -7,10 +7,12 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 enum {
     STILL_EVENTS = 1000,
     STORM_EVENTS = 100,
+    IDLE_STEPS = 1000,
     FLIGHT_WORK = 8,
     PRESS_WORK = 64,
     WORK_OF_STEP = 20 // multiplications
@@ -141,9 +143,14 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     frame_ode_step(&engine->ode, slice, length, &step);
     ledger_work(&frame->ledger, step.input, step.damping);
     engine->record.base_speed += step.ground;
+    const double before = frame->offset;
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
+    // A step may be shorter than what the clock tells, or end where it began; not very many in
+    // turn.
+    engine->idle = frame->offset > before ? 0 : engine->idle + 1;
+    frame->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
         TRY(happen(frame, &step.event));
     else
@@ -319,6 +326,18 @@ void frame_engine_take_sample(FrameEngine *engine) {
     frame_record_peaks(frame);
 }
 
+// Notes the samples just passed: so many flown over, or the present one.
+static void track(FrameEngine *engine, size_t flown) {
+    const Frame *frame = &engine->frame;
+    const FrameTrail *trail = &engine->trail;
+    for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
+        const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
+        memcpy(engine->track + (sample - 1) % TRAIL_MOST * frame->padded,
+               flown > 0 ? trail->q + k * trail->padded : frame->q,
+               frame->storeys * sizeof *engine->track);
+    }
+}
+
 Status frame_engine_step(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
     const size_t flown = fly(engine, until);
@@ -331,6 +350,8 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
         frame->offset = 0;
         frame_engine_take_sample(engine);
     }
+    if (engine->track != NULL)
+        track(engine, flown);
     balance(frame);
     return STATUS_OK;
 }

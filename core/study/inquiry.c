@@ -22,9 +22,8 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
     if (cost.steps <= study_runs * limits->steps)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
-                       "would take about %.2g solver steps in all, must be at most %.2g: ask for "
-                       "fewer solvers or repeats, or lower point_steps",
-                       cost.steps, study_runs * limits->steps);
+                       "would take about %.2g solver steps in all, must be at most %.2g: %s",
+                       cost.steps, study_runs * limits->steps, study_kind(inquiry->study)->lessen);
 }
 
 Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,

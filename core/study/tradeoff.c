@@ -167,6 +167,8 @@ const StudyKind study_tradeoff = {
              "error against CPU time over solvers, steps and what else may be traded for speed",
              study_fields, sizeof(TradeoffStudy)},
     .answer = &tradeoff_answer,
+    .lessen = "ask for fewer solvers or repeats, or lower point_steps",
+    .is_measured = true,
     .complete = study_complete,
     .cost = study_cost,
     .run = study_measure,

@@ -11,6 +11,7 @@
 #include "server/base/clock.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
+#include "server/encode/answer.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
@@ -74,8 +75,11 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
     }
     if (answer->study != NULL) {
         const char *name = answer->study->kind->name;
+        const AnswerFormat *format = answer_formats(answer->study->kind);
         bytes_format(bytes, ", \"%s\": \"/v1/results/%s/%s.json\"", name, id, name);
-        bytes_format(bytes, ", \"%s.svg\": \"/v1/results/%s/%s.svg\"", name, id, name);
+        while ((++format)->extension != NULL)
+            bytes_format(bytes, ", \"%s.%s\": \"/v1/results/%s/%s.%s\"", name, format->extension,
+                         id, name, format->extension);
     }
     bytes_text(bytes, "}");
 }
@@ -209,7 +213,7 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
                    "\"why\": \"the same "
                    "scene and engine give the same id and the same bytes");
         // It is measured once and then kept; elsewhere it comes out a little differently.
-        if (row.study != NULL)
+        if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
             bytes_text(&bytes, ", but for the CPU time that a study measures and what follows of "
                                "it");
         bytes_text(&bytes, "\"}}\n");
