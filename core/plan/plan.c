@@ -73,9 +73,12 @@ static void start(const Reals *given, double *start) {
         start[i] = given->at[i];
 }
 
+bool plan_is_single_in_flight(const Plan *plan) {
+    return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1;
+}
+
 bool plan_is_single(const Plan *plan) {
-    return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1 &&
-           plan->separation == SEPARATION_ZERO_PENETRATION &&
+    return plan_is_single_in_flight(plan) && plan->separation == SEPARATION_ZERO_PENETRATION &&
            (plan->damper_count == 0 || !stops_vary(&plan->dampers[0]));
 }
 

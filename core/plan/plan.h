@@ -147,6 +147,8 @@ void plan_free(Plan *plan);
 // Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
 // and a law whose contact phases are linear or instantaneous.
 bool plan_is_single(const Plan *plan);
+// The same where no stop is ever reached: then the law does not matter.
+bool plan_is_single_in_flight(const Plan *plan);
 
 // Of a run.
 static inline size_t plan_mode_count(const Plan *plan) {

@@ -330,6 +330,7 @@ typedef struct Session {
     Workspace *workspace;
     double done;      // of the whole
     double steps;     // of all runs
+    Work work;        // of all runs
     Outcome *outcome; // of the last run; NULL: it failed
     PlanAttempts attempts;
 } Session;
@@ -380,6 +381,7 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
     if (status == STATUS_OK) {
         *estimated = estimate(&session->aim, way, session->outcome);
         session->steps += session->outcome->steps;
+        work_add(&session->work, &session->outcome->work);
         if (add_attempt(session, way, *estimated, session->outcome->steps) != STATUS_OK)
             status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
     } else if (!is_whole(way) && status != STATUS_CANCELLED && status != STATUS_NO_MEMORY) {
@@ -437,6 +439,7 @@ static Status finish(Session *session, const Way *way, double estimated, Problem
     target->attempts = session->attempts;
     session->attempts = (PlanAttempts){NULL, 0};
     outcome->steps = session->steps;
+    outcome->work = session->work;
     return warn(session, estimated) == STATUS_OK
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");

@@ -7,8 +7,10 @@
 #include "core/plan/keep.h"
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
+#include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/exact_accuracy.h"
+#include "core/solve/rest.h"
 #include "core/solve/solver.h"
 #include "core/solve/solvers.h"
 
@@ -59,16 +61,51 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
                                       : status;
 }
 
+// A base that never moves is a still one, however it is given.
+static void still(Base *base) {
+    bool moves = base->form == BASE_SINE && base->amplitude != 0;
+    for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED && !moves; i++)
+        moves = base->values[i] != 0;
+    for (size_t i = 0; i < base->piece_count && base->form == BASE_PIECES && !moves; i++)
+        moves = base->pieces[i].value != 0 || base->pieces[i].slope != 0;
+    if (!moves)
+        base_clear(base);
+}
+
+// Tells what a plan leaves out as far as it is known before the run: a base in closed form costs
+// nothing to make.
+static Status foretell(const Simulation *simulation, Plan *plan, Problem *problem) {
+    const Scene *scene = &simulation->scene;
+    const Excitation *excitation = scene_excitation(scene);
+    const bool is_known = excitation_kind(excitation)->interval == NULL;
+    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
+    Base base = {0};
+    Regime regime = {0};
+    if (is_known) {
+        TRY(excitation_kind(excitation)->make(excitation, &span, NULL, &base, problem));
+        still(&base);
+        regime = regime_find(plan, &base);
+        base_clear(&base);
+    }
+    if (omissions_tell(simulation, chosen_solver(simulation), plan, is_known ? &regime : NULL,
+                       &plan->report.decisions) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
+    return STATUS_OK;
+}
+
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
     memset(report, 0, sizeof *report);
     if (aim_is_asked(simulation))
         return aim_plan(simulation, report, problem);
     TRY(make_plan(simulation, &plan, problem));
-    *report = plan->report;
-    memset(&plan->report, 0, sizeof plan->report);
+    const Status status = foretell(simulation, plan, problem);
+    if (status == STATUS_OK) {
+        *report = plan->report;
+        memset(&plan->report, 0, sizeof plan->report);
+    }
     plan_free(plan);
-    return STATUS_OK;
+    return status;
 }
 
 // The journey's luggage: everything that must be put down again at its end.
@@ -167,15 +204,12 @@ static void add_given_up(const Plan *plan, Response *response) {
 static void summarize(Outcome *outcome) {
     const Response *response = &outcome->response;
     const double count = (double)response->statistics_count;
-    uint64_t impacts = 0;
-    for (size_t i = 0; i < response->impacts.count; i++)
-        impacts += response->impacts.at[i].kind == IMPACT_IMPACT;
     outcome->summary =
         (Summary){.peak_displacement = response->peaks.displacement,
                   .rms_displacement = sqrt(response->sum_squares_displacement / count),
                   .peak_acceleration = response->peaks.acceleration,
                   .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
-                  .impacts = impacts,
+                  .impacts = response->impact_count,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
                   .error_estimate = response->has_trust ? response->error_estimate : NAN,
@@ -195,6 +229,43 @@ static Status check_finite(const Outcome *outcome, Problem *problem) {
                        "precision can hold");
 }
 
+// Where the speeds that meet a table's stops are counted.
+static Status make_approaches(const Scene *scene, Response *response, Problem *problem) {
+    bool has_table = false;
+    for (size_t i = 0; i < 2 * scene->dampers.count; i++)
+        has_table =
+            has_table || damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table.count > 0;
+    if (!has_table)
+        return STATUS_OK;
+    response->approaches = calloc(2 * scene->dampers.count, sizeof *response->approaches);
+    if (response->approaches == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
+    for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
+        const ContactRows *rows = &damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table;
+        if (rows->count > 0)
+            response->approaches[i] = (Approaches){.has_table = true,
+                                                   .from = rows->at[0].approach_speed,
+                                                   .to = rows->at[rows->count - 1].approach_speed};
+    }
+    return STATUS_OK;
+}
+
+// By the solver, or without it where nothing moves.
+static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *problem) {
+    const Solver *solver = chosen_solver(journey->simulation);
+    Outcome *outcome = journey->outcome;
+    run->is_clear = regime->is_clear;
+    if (regime->is_at_rest)
+        rest_run(run, &outcome->response);
+    else
+        TRY(solver->run(run, &outcome->response, problem));
+    outcome->steps = run->steps;
+    outcome->work = run->work;
+    outcome->work.base_samples = journey->base.count;
+    outcome->work.channel_values = run->column_count * journey->plan->count;
+    return STATUS_OK;
+}
+
 static Status travel(Journey *journey, Problem *problem) {
     const Simulation *simulation = journey->simulation;
     const Scene *scene = &simulation->scene;
@@ -209,6 +280,8 @@ static Status travel(Journey *journey, Problem *problem) {
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
     TRY(excitation_kind(excitation)
             ->make(excitation, &span, &making_watch, &journey->base, problem));
+    still(&journey->base);
+    const Regime regime = regime_find(journey->plan, &journey->base);
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
@@ -226,14 +299,20 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
     run.columns = journey->wanted;
     run.column_count = journey->wanted_count;
-    TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
-    outcome->steps = run.steps;
+    outcome->response.is_unlisted = !simulation->output.impacts;
+    TRY(make_approaches(scene, &outcome->response, problem));
+    TRY(solve(journey, &run, &regime, problem));
     add_given_up(journey->plan, &outcome->response);
     summarize(outcome);
     TRY(check_finite(outcome, problem));
     if (caution_warn(scene, outcome) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(make_spectrum(journey, problem));
+    outcome->work.spectrum_segments =
+        outcome->spectrum.segments * outcome->spectrum.densities.count;
+    if (omissions_tell(simulation, chosen_solver(simulation), journey->plan, &regime,
+                       &journey->plan->report.decisions) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
     return STATUS_OK;
@@ -372,6 +451,8 @@ Cost simulation_cost(const Simulation *simulation) {
     const double samples = (double)scene_sample_count(&simulation->scene);
     double steps =
         chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
+    // A value written costs about a tenth of a step.
+    steps += samples * (double)simulation->output.channels.count / 10;
     // A transformed sample costs about a third of a step, and overlap transforms it several times.
     if (psd->channels.count > 0 && psd->segment > psd->overlap)
         steps += samples * (double)psd->channels.count * (double)psd->segment /

@@ -26,7 +26,7 @@ static FrameEvent event_of(const Frame *frame, size_t d, int which) {
 // having been pressed, a stop that rounding or a miss has put behind the mass, a rest without a
 // push. A force may still be rounding's before the motion `has_moved`.
 static bool find_beyond(Frame *frame, bool has_moved, FrameEvent *event) {
-    for (size_t d = 0; d < frame->dampers; d++) {
+    for (size_t d = 0; d < frame->dampers && frame->has_stops; d++) {
         FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         if (damper->phase == FRAME_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
@@ -112,6 +112,7 @@ static Status advance(Adaptive *own, double length) {
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
+    frame->run->work.stop_searches += frame->has_stops;
     TRY(ode_step(own->ode, from + length, &to, own->y, &root, frame->problem));
     const double taken = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     own->at = to;

@@ -77,7 +77,7 @@ static void watch(const void *context, double t, const double *y, double *value,
     const size_t m = frame->dampers;
     const double *r = y + at_r(frame), *w = r + m;
     rate(context, t, y, own->rates);
-    for (size_t d = 0; d < m; d++) {
+    for (size_t d = 0; d < m && frame->has_stops; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         double *is = value + ADAPTIVE_WATCHED * d, *goes = slope + ADAPTIVE_WATCHED * d;
@@ -218,7 +218,7 @@ Status adaptive_motion_make(Adaptive *own, Steps *steps) {
     own->block = calloc(4 * own->size + 2 * m, sizeof *own->block);
     const OdeSystem system = {.context = own,
                               .size = own->size,
-                              .roots = ADAPTIVE_WATCHED * m,
+                              .roots = frame->has_stops ? ADAPTIVE_WATCHED * m : 0,
                               .tolerance = steps->tolerance,
                               .rate = rate,
                               .watch = watch};

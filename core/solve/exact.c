@@ -115,6 +115,7 @@ static Status advance(Exact *exact, double length) {
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
     exact->run->steps++;
+    exact->run->work.arcs++;
     if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
         hold(exact, &slice, length))
         return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
@@ -161,7 +162,8 @@ static bool fly(Exact *exact) {
     ArcIntegrals integrals;
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
-    if (exact->plan->damper_count > 0) {
+    if (exact->has_stops) {
+        exact->run->work.stop_searches++;
         const double first = fabs(slice.value),
                      last = fabs(slice.value + slice.slope * exact->interval);
         const double most = slice.omega > 0 ? first + fabs(slice.slope)
@@ -178,6 +180,7 @@ static bool fly(Exact *exact) {
     take_integrals(exact, &integrals);
     exact->state = end;
     exact->run->steps++;
+    exact_count_flight(exact, 1);
     return true;
 }
 
@@ -228,6 +231,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->damper = plan->dampers;
     exact->problem = problem;
     exact->interval = 1 / plan->sample_rate;
+    exact->has_stops = plan->damper_count > 0 && !run->is_clear;
     const double total = plan->mass[0] + exact->damper->mass;
     const double share = exact->damper->mass / total, mass = plan->mass[0] * share;
     Motion flying = {.omega2 = plan->stiffness[0] / plan->mass[0],
@@ -237,7 +241,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     flying.rate = fmax(own, 1e-300);
     exact->flying = exact->resting = flying;
     exact->resting.is_resting = true;
-    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->damper_count > 0; side++) {
+    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && exact->has_stops; side++) {
         Motion *touching = &exact->touching[side];
         *touching = flying;
         touching->contact_omega2 = exact->damper->stops[side].stiffness / mass;
@@ -322,7 +326,9 @@ static Status solve(Exact *exact) {
     trust_tell(&exact->trust, exact->ledger.response);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
-    return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
+    const Status status = ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
+    ledger_count(&exact->ledger, &exact->run->work);
+    return status;
 }
 
 static Status start(Exact *exact, Run *run, Response *response, Problem *problem) {
@@ -357,7 +363,7 @@ static Status run_on_grid(Run *run, Response *response, Problem *problem) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
-    if (!plan_is_single(run->plan))
+    if (!plan_is_single(run->plan) && !(run->is_clear && plan_is_single_in_flight(run->plan)))
         return frame_run(run, response, problem);
     // A base whose samples are further apart than the output's goes by strides once it has them.
     const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
@@ -370,6 +376,7 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     own.base = &refined;
     const Status status = run_on_grid(&own, response, problem);
     run->steps = own.steps;
+    run->work = own.work;
     workspace_tidy(workspace);
     workspace_clear(&none);
     return status;

@@ -155,6 +155,7 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
         TRY(happen(frame, &step.event));
     else
         frame_record_note(frame);
+    frame->run->work.steps++;
     frame->run->steps += step.work / WORK_OF_STEP;
     engine->work += step.work;
     return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
@@ -205,6 +206,7 @@ static Status advance(FrameEngine *engine, double length) {
     const bool stays = is_stalled(frame);
     const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
     frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
+    frame->run->work.arcs++;
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event) &&
                           !(stays && event.s * arc->length <= frame_clock(frame));
@@ -267,12 +269,17 @@ static size_t fly(FrameEngine *engine, size_t until) {
         frame->sample + count >= record->statistics_start)
         count = record->statistics_start - 1 - frame->sample;
     count = engine->flight.length == 0 ? 0 : find_slices(frame, count, slices);
+    frame->run->work.stop_searches += count > 0 && frame->has_stops;
     if (count > 0)
         count = frame_flight_run(&engine->flight, &engine->trail, frame, slices, count,
                                  frame->is_shadow ? NULL : &work);
     frame->sample += count;
     if (count == 0 || frame->is_shadow)
         return count;
+    Work *done = &frame->run->work;
+    *(frame->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
+        count;
+    done->mode_samples += count * frame->mode_count;
     frame->ground = base_cursor_at(&frame->base, frame->sample);
     ledger_work(&frame->ledger, work.input, work.damping);
     FrameTrail *trail = &engine->trail;
@@ -338,6 +345,7 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
         TRY(count_steps(engine, (double)flown, FLIGHT_WORK));
     } else {
         TRY(frame_engine_cross(engine, frame->interval));
+        frame->run->work.mode_samples += frame->mode_count;
         frame->sample++;
         frame->offset = 0;
         frame_engine_take_sample(engine);

@@ -274,17 +274,19 @@ size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, co
                         size_t count, FrameWork *work) {
     const size_t n = frame->mode_count;
     double shaken = 0;
-    count = guess(flight, frame, count);
+    if (frame->has_stops)
+        count = guess(flight, frame, count);
     fly(flight, trail, frame, slices, count);
     for (size_t k = 0; k < count; k++)
         shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
     const double most =
-        frame->dampers > 0 ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
+        frame->has_stops ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double bend = damper->reach * most + fabs(damper->lean) * shaken;
         follow(flight, trail, frame, d, count, slices);
-        count = count_clear(flight, trail, frame, d, bend, slices, count);
+        if (frame->has_stops)
+            count = count_clear(flight, trail, frame, d, bend, slices, count);
     }
     if (count == 0)
         return 0;

@@ -72,6 +72,7 @@ void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     nudge(own);
     while (own->sample < frame->sample && neighbour->is_known)
         neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
+    frame->run->work.neighbour_samples += own->sample - from;
     if (frame->plan->form == CONTACT_POWER)
         frame->run->steps += neighbour->run.steps - steps;
     if (neighbour->is_known)
@@ -85,12 +86,11 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     memset(neighbour, 0, sizeof *neighbour);
     neighbour->horizon = NAN;
     neighbour->is_known = neighbour->is_spent = true;
-    if (frame->dampers == 0)
+    if (!frame->has_stops)
         return;
-    neighbour->run = (Run){.plan = frame->plan,
-                           .base = frame->run->base,
-                           .impacts_most = frame->run->impacts_most,
-                           .steps_most = frame->run->steps_most};
+    neighbour->run =
+        (Run){.plan = frame->plan, .base = frame->run->base, .steps_most = frame->run->steps_most};
+    neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;
     neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
     const size_t tracked = neighbour->is_stepped ? NEIGHBOUR_SAMPLES * frame->padded : 0;

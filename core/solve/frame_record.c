@@ -319,6 +319,7 @@ Status frame_record_ledger(Frame *frame) {
     const EnergyState energy = frame_energy(frame);
     const Status status =
         ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
+    ledger_count(&frame->ledger, &frame->run->work);
     free(rows);
     return status;
 }

@@ -387,6 +387,7 @@ static void frame_of(Frame *frame, Run *run, Problem *problem) {
     const Plan *plan = run->plan;
     memset(frame, 0, sizeof *frame);
     frame->run = run;
+    frame->has_stops = run->plan->damper_count > 0 && !run->is_clear;
     frame->plan = plan;
     frame->problem = problem;
     frame->modes = plan->modes.count == 0 ? &frame->own_modes : &plan->modes;

@@ -64,6 +64,7 @@ typedef struct Frame {
     Modes own_modes; // where the plan has none
     Problem *problem;
 
+    bool has_stops; // that a mass may reach
     bool is_shadow; // only the motion is wanted: no peaks, no energies
 
     size_t storey_count, mode_count;

@@ -8,6 +8,7 @@
 #include "core/excite/base.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
+#include "core/result/work.h"
 #include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
@@ -48,7 +49,9 @@ typedef struct Run {
     double statistics_from; // [s]
     size_t impacts_most;    // ledger rows; 0: no limit
     double steps_most;      // solver steps; 0: no limit
+    bool is_clear;          // no mass comes to a stop: none has to be searched for
     double steps;           // out: work counted, in solver steps
+    Work work;              // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
 typedef struct Solver {

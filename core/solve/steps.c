@@ -183,6 +183,7 @@ static Status note(Steps *steps) {
 
 Status steps_note(Steps *steps, double cost) {
     TRY(note(steps));
+    steps->frame.run->work.steps++;
     steps->frame.run->steps += cost;
     steps->watched += 20 * cost;
     return steps->watched > WATCH_WORK ? steps_check(steps) : STATUS_OK;
@@ -220,7 +221,7 @@ static Status step(Steps *steps, double length, double offset) {
     gather(frame, steps->y);
     sums->input = sums->damping = 0;
     memset(sums->impulse, 0, 2 * m * sizeof *sums->impulse);
-    for (size_t d = 0; d < m; d++)
+    for (size_t d = 0; d < m && frame->has_stops; d++)
         steps->before[d] = frame->damper[d].phase == FRAME_CONTACT
                                ? steps_contact(frame, d, frame->damper[d].r, 0).strain
                                : 0;
@@ -231,7 +232,10 @@ static Status step(Steps *steps, double length, double offset) {
     ledger_work(&frame->ledger, sums->input, sums->damping);
     steps->record.base_speed +=
         length / 6 * (steps->ground[0] + 4 * steps->ground[1] + steps->ground[2]);
-    steps_turn(steps, length);
+    if (frame->has_stops) {
+        frame->run->work.stop_searches++;
+        steps_turn(steps, length);
+    }
     return steps_note(steps, cost);
 }
 
@@ -256,6 +260,7 @@ Status steps_interval(Steps *steps) {
         TRY(step(steps, steps->length, (double)k * steps->length));
     frame->sample++;
     frame->offset = 0;
+    frame->run->work.mode_samples += frame->mode_count;
     steps_take_sample(steps);
     return STATUS_OK;
 }
@@ -289,7 +294,8 @@ static Status check_reach(const Steps *steps) {
                            steps->stepper->name, steps->length, frame->rate,
                            steps->stepper->reach / frame->rate);
     double rate = 0;
-    for (size_t d = 0; d < frame->dampers && frame->plan->form == CONTACT_LINEAR; d++)
+    for (size_t d = 0;
+         d < frame->dampers && frame->has_stops && frame->plan->form == CONTACT_LINEAR; d++)
         for (int side = 0; side < 2; side++) {
             const double mass = frame->damper[d].effective_mass;
             const PlanStop *stop = &frame->damper[d].plan->stops[side];

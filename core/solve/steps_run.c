@@ -160,7 +160,7 @@ typedef struct Pair {
 // How much of the difference is the run's error.
 static double part_of(const Pair *pair) {
     const Ledger *ledger = &pair->run.frame.ledger;
-    bool is_touched = ledger->response->impacts.count > 0;
+    bool is_touched = ledger->response->impact_count + ledger->response->resting_count > 0;
     for (size_t d = 0; d < pair->run.frame.dampers; d++)
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
     if (pair->run.tolerance > 0)
@@ -196,6 +196,7 @@ static Status follow(Pair *pair) {
     pair->near_run.steps = run->steps;
     const Status status = steps_interval(&pair->near);
     run->steps = pair->near_run.steps;
+    run->work.neighbour_samples += pair->stride;
     if (status == STATUS_OK) {
         compare(pair);
         return STATUS_OK;
@@ -216,8 +217,9 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->plan = *frame->plan;
     pair->plan.sample_rate /= (double)pair->stride;
     pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
-    pair->near_run = (Run){
-        .plan = &pair->plan, .base = frame->run->base, .impacts_most = frame->run->impacts_most};
+    pair->near_run =
+        (Run){.plan = &pair->plan, .base = frame->run->base, .is_clear = frame->run->is_clear};
+    pair->near_response.is_unlisted = true;
     pair->apart = malloc(frame->mode_count * sizeof *pair->apart);
     pair->is_known = pair->apart != NULL &&
                      steps_make(&pair->near, stepper, &pair->near_run, share,
@@ -230,10 +232,9 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
 // runs may be as late by chance.
 static double largest_jolt(const Pair *pair) {
     const Frame *frame = &pair->run.frame;
-    const Impacts *impacts = &frame->ledger.response->impacts;
     double most = 0;
-    for (size_t i = 0; i < impacts->count; i++)
-        most = fmax(most, impacts->at[i].impulse * frame->damper[impacts->at[i].damper - 1].thrust);
+    for (size_t d = 0; d < frame->dampers; d++)
+        most = fmax(most, frame->ledger.impulse[d] * frame->damper[d].thrust);
     return pair->run.tolerance > 0 ? 0 : most * pair->run.length / 2;
 }
 

@@ -289,6 +289,7 @@ static void apply_output(const TradeoffPoint *point, Simulation *target) {
         if (psd->overlap >= psd->segment)
             psd->overlap = psd->segment - 1;
     }
+    target->output.impacts = true; // errors are counted from ledgers
     const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
                         target->scene.sample_rate;
     target->output.statistics_from = fmin(target->output.statistics_from, last);

@@ -15,6 +15,10 @@
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
+const char no_impacts[] =
+    "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
+    "energy.json; with \"output\": {\"impacts\": true} they are listed";
+
 // The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
 // case.
 static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *problem) {
@@ -94,6 +98,8 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_text(bytes, json_or(row->plan, "null"));
     bytes_text(bytes, ", \"summary\": ");
     bytes_text(bytes, json_or(row->summary, "null"));
+    bytes_text(bytes, ", \"work\": ");
+    bytes_text(bytes, json_or(row->work, "null"));
     bytes_text(bytes, ", \"units\": ");
     write_units(bytes, simulation);
     bytes_text(bytes, ", \"channels\": [");
@@ -232,7 +238,9 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     const char *const texts[] = {row.psd, row.impacts, row.energy};
     const char *text = texts[document];
     Status answered = STATUS_OK;
-    if (text == NULL || strcmp(text, "null") == 0) {
+    if (document == DOCUMENT_IMPACTS && text != NULL && strcmp(text, "null") == 0) {
+        answered = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
+    } else if (text == NULL || strcmp(text, "null") == 0) {
         answered =
             problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no %s", names[document]);
     } else if (!reply_immutable(reply, request, tag)) {
