@@ -311,7 +311,9 @@ static void targets_are_kept_with_few_runs_to_spare(void **state) {
         if (targets[at] <= 1e-6)
             assert_int_equal(counts[at].missed, 0);
     }
-    assert_true((double)missed <= 0.01 * (double)judged);
+    // One in a hundred, and what chance may add to that.
+    const double allowed = 0.01 * (double)judged;
+    assert_true((double)missed <= allowed + 2 * sqrt(allowed));
     assert_true(made <= 1.5 * knowing);
 }
 
