@@ -219,5 +219,6 @@ const ExcitationKind excitation_random = {
              .size = sizeof(ExcitationRandom)},
     .complete = random_complete,
     .interval = random_interval,
+    .effort = 0.25,
     .make = random_make,
 };

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "core/simulation/caution.h"
+#include "core/simulation/choice.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
-#include "core/solve/solvers.h"
 
 // The part nobody outside sees: how many hold it.
 typedef struct Held {
@@ -15,33 +15,14 @@ typedef struct Held {
     atomic_size_t holds;
 } Held;
 
-static const Solver *chosen_solver(const Simulation *simulation) {
-    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
-    return solver->run != NULL ? solver : &solver_exact;
-}
-
-// What the chosen solver is asked for; the settings of "auto" are not the chosen one's.
-static const Accuracy *settings(const Simulation *simulation) {
-    const Variant *accuracy = simulation->accuracy;
-    return accuracy->kind == &chosen_solver(simulation)->kind
-               ? (const Accuracy *)(const void *)accuracy
-               : NULL;
-}
-
-static double base_interval(const Simulation *simulation) {
-    const Excitation *excitation = scene_excitation(&simulation->scene);
-    const ExcitationKind *kind = excitation_kind(excitation);
-    return kind->interval == NULL ? 0 : kind->interval(excitation);
-}
-
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
-    const Solver *solver = chosen_solver(simulation);
+    const Solver *solver = choice_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
     if (solver->decide == NULL)
         return STATUS_OK;
-    const Status status =
-        solver->decide(settings(simulation), base_interval(simulation), *plan, problem);
+    const Status status = solver->decide(choice_settings(simulation),
+                                         choice_base_interval(simulation), *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
@@ -206,11 +187,12 @@ static Status travel(Journey *journey, Problem *problem) {
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
-               .accuracy = settings(simulation),
+               .accuracy = choice_settings(simulation),
                .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
-               .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
+               .steps_most =
+                   journey->limits == NULL ? 0 : SIMULATION_PATIENCE * journey->limits->steps};
     journey->wanted =
         calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,
                sizeof *journey->wanted);
@@ -220,7 +202,7 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
     run.columns = journey->wanted;
     run.column_count = journey->wanted_count;
-    TRY(chosen_solver(simulation)->run(&run, &outcome->response, problem));
+    TRY(choice_solver(simulation)->run(&run, &outcome->response, problem));
     outcome->steps = run.steps;
     summarize(outcome);
     TRY(check_finite(outcome, problem));
@@ -281,79 +263,4 @@ size_t outcome_bytes(const Outcome *outcome) {
            sizeof(double) *
                (series->count * series->rows + (densities->count + 1) * densities->rows) +
            outcome->response.impacts.count * sizeof(Impact);
-}
-
-// Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
-// shows that the stops are out of reach, and coupled modes have no closed form for a whole
-// interval.
-static double flight_arcs(const Scene *scene, double fastest) {
-    const Excitation *excitation = scene_excitation(scene);
-    double rate = fastest;
-    if (excitation_kind(excitation)->fastest != NULL)
-        rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    const Structure *structure = scene_structure(scene);
-    const bool is_by_arcs = scene->dampers.count > 0 ||
-                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
-    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
-}
-
-// A frame's sample is a step for each mode and each damper, or a product with a matrix where
-// damping couples the modes; and finding the modes comes before.
-static double steps_a_sample(const Scene *scene, double *planning) {
-    const Structure *structure = scene_structure(scene);
-    const double storeys = (double)structure_storeys(structure);
-    *planning = 0;
-    if (storeys == 1 && scene->dampers.count <= 1)
-        return 1;
-    *planning = 2 * storeys * storeys * storeys;
-    const bool may_couple = storeys > 1 && isnan(structure->damping_ratio);
-    return (double)(1 + scene->dampers.count) * storeys + (may_couple ? storeys * storeys / 4 : 0);
-}
-
-// Contacts under a power law: some 6000 steps' worth each, at a guess seven a second.
-static double power_steps(const Scene *scene) {
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    return law->form == CONTACT_POWER ? 7 * 6000.0 * scene->duration * (double)scene->dampers.count
-                                      : 0;
-}
-
-// Steps of the exact solver.
-static double exact_steps(const Simulation *simulation) {
-    const double samples = (double)scene_sample_count(&simulation->scene);
-    const bool has_damper = simulation->scene.dampers.count > 0;
-    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
-    StructureRates rates;
-    if (structure_rates(scene_structure(&simulation->scene), &rates) != STATUS_OK)
-        rates.fastest = 0; // a guess without memory: the run will tell
-    double planning, step = steps_a_sample(&simulation->scene, &planning);
-    return planning +
-           step *
-               (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
-           power_steps(&simulation->scene);
-}
-
-// Steps of a solver that knows its own cost.
-static double own_steps(const Simulation *simulation) {
-    const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
-    Plan *plan;
-    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
-        return 0; // the run will tell why
-    const double steps =
-        chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);
-    plan_free(plan);
-    return steps + (storeys > 1 ? 2 * storeys * storeys * storeys : 0);
-}
-
-Cost simulation_cost(const Simulation *simulation) {
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double samples = (double)scene_sample_count(&simulation->scene);
-    double steps =
-        chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
-    // A transformed sample costs about a third of a step, and overlap transforms it several times.
-    if (psd->channels.count > 0 && psd->segment > psd->overlap)
-        steps += samples * (double)psd->channels.count * (double)psd->segment /
-                 (double)(psd->segment - psd->overlap) / 3;
-    return (Cost){.steps = steps,
-                  .bytes = sizeof(Outcome) +
-                           samples * (double)simulation->output.channels.count * sizeof(double)};
 }

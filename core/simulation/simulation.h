@@ -8,6 +8,7 @@
 #include "core/result/response.h"
 #include "core/result/spectrum.h"
 #include "core/scene/scene.h"
+#include "core/solve/solver.h"
 #include "core/solve/workspace.h"
 
 // The engine's name and version; part of every result's id. Changes whenever any bit of any result
@@ -44,8 +45,17 @@ extern const Field simulation_fields[];
 typedef struct SimulationLimits {
     size_t samples; // per channel; 0: none
     size_t impacts; // ledger rows; 0: none
-    double steps;   // solver steps of a run; 0: none
+    // Solver steps that a run may be foretold to take; it is refused beyond, and stopped at
+    // SIMULATION_PATIENCE times as many where it was foretold too little. 0: none.
+    double steps;
+    double bytes; // of memory that a run may be foretold to take; 0: none
 } SimulationLimits;
+
+#define SIMULATION_PATIENCE 3
+
+// What callers allow a run unless they are told otherwise.
+#define SIMULATION_CPU_SECONDS 60
+#define SIMULATION_BYTES 4e9
 
 void simulation_clear(
     Simulation *simulation); // fields_clear by another name; defaults by fields_default
@@ -82,7 +92,8 @@ struct Outcome {
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
 // at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
-// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop. `workspace` may be NULL.
+// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop.
+// `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem);
@@ -92,8 +103,12 @@ size_t outcome_bytes(const Outcome *outcome); // of memory, for caches
 
 // Expected cost of a completed simulation, before running it.
 typedef struct Cost {
-    double steps; // solver steps
-    double bytes; // of the outcome in memory
+    double steps;       // solver steps
+    double cpu_seconds; // the same as time [s]
+    double bytes;       // of memory while it runs
+    double spectra;     // steps of these, for spectra
+    double base;        // and for making the base's motion
+    bool is_fast;       // most of the rest is for motion within sample intervals
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
 

@@ -88,10 +88,29 @@ static Status happen(Frame *frame, const FrameEvent *event) {
     return ledger_status(&frame->ledger, frame->problem);
 }
 
+enum { RATES = 13 };              // of an ordinary step
+static const double ADVANCE = 10; // solver steps of an advance beside its rates
+
 static double adaptive_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
     const double n = (double)storeys, m = (double)dampers;
     *making = 0;
     return 100 + 3 * n * (1 + m) + (is_coupled ? 0.1 * n * n : 0);
+}
+
+// What has been done since the last time, which many roots may have made much of.
+static double take_cost(Adaptive *own) {
+    const Frame *frame = &own->steps->frame;
+    double making;
+    const double usual =
+        adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making);
+    const double cost = ADVANCE + *own->rated * (usual - ADVANCE) / RATES;
+    *own->rated = 0;
+    return cost;
+}
+
+static Status happen_apart(Adaptive *own, const FrameEvent *event) {
+    TRY(steps_note(own->steps, take_cost(own)));
+    return happen(&own->steps->frame, event);
 }
 
 // One step, at most `length` long, and the event at its end.
@@ -99,14 +118,14 @@ static Status advance(Adaptive *own, double length) {
     Steps *steps = own->steps;
     Frame *frame = &steps->frame;
     FrameEvent event;
-    double making, to;
+    double to;
     int root;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &own->slice);
     frame->ground = own->slice.value;
     if (own->events != frame->events) {
         frame_feel(frame);
         if (find_beyond(frame, false, &event))
-            return happen(frame, &event);
+            return happen_apart(own, &event);
         TRY(adaptive_motion_start(own));
     }
     const double from = own->at;
@@ -120,8 +139,7 @@ static Status advance(Adaptive *own, double length) {
     frame->ground = slice_at(&own->slice, taken);
     if (taken > frame_clock(frame))
         frame->still_events = 0;
-    TRY(steps_note(
-        steps, adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making)));
+    TRY(steps_note(steps, take_cost(own)));
     if (root != ODE_NO_ROOT) {
         const size_t d = (size_t)root / ADAPTIVE_WATCHED;
         const bool is_peak = root % ADAPTIVE_WATCHED == ADAPTIVE_PEAK;

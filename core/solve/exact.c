@@ -27,6 +27,9 @@
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
 
+// Solver steps of an arc, of an event, and of a long step of contact.
+static const double ARC_STEPS = 15, EVENT_STEPS = 8, HOLD_STEPS = 6;
+
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
     ledger_work(&exact->ledger,
@@ -113,10 +116,12 @@ static Status advance(Exact *exact, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
-    exact->run->steps++;
-    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
-        hold(exact, &slice, length))
-        return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER) {
+        exact->run->steps += HOLD_STEPS;
+        if (hold(exact, &slice, length))
+            return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+    }
+    exact->run->steps += ARC_STEPS;
     length = fmin(length, 1 / fmax(system->rate, slice.omega));
     Arc arc;
     arc_make(&arc, system, &exact->state, &slice, length);
@@ -138,6 +143,7 @@ static Status advance(Exact *exact, double length) {
     }
     if (is_event) {
         exact->events++;
+        exact->run->steps += EVENT_STEPS;
         if (++exact->still_events > STILL_EVENTS)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "more than %d contact events at one instant, t = %.17g s",

@@ -18,7 +18,8 @@ static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (frame->sample < until)
             TRY(frame_engine_step(engine, until));
-        frame_neighbour_step(neighbour, frame);
+        if (!frame_neighbour_step(neighbour, frame))
+            TRY(frame_engine_check(engine)); // it may have been told to stop
     }
     frame_neighbour_tell(neighbour, frame, frame->ledger.response);
     // The duration may end between samples.

@@ -41,18 +41,21 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     neighbour->is_spent = difference > PARTED * neighbour->largest;
 }
 
-void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
+bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     if (neighbour->is_spent)
-        return;
+        return true;
+    neighbour->run.steps = frame->run->steps;
     Frame *own = &neighbour->engine.frame;
     const size_t from = own->sample;
     nudge(own);
     while (own->sample < frame->sample && neighbour->is_known)
         neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
+    frame->run->steps = neighbour->run.steps;
     if (neighbour->is_known)
         compare(neighbour, frame, from);
     else
         neighbour->is_spent = true;
+    return neighbour->is_known;
 }
 
 void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine) {
@@ -64,6 +67,7 @@ void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine)
         return;
     neighbour->run = (Run){.plan = frame->plan,
                            .base = frame->run->base,
+                           .watch = frame->run->watch,
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     Frame *own = &neighbour->engine.frame;
@@ -90,7 +94,8 @@ void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, R
     const double error = size > 0 ? fmax(neighbour->worst / size, drift) : 0;
     response->has_trust = neighbour->is_known;
     response->error_estimate = error < PARTED ? error : 1;
-    response->trust_horizon = neighbour->horizon;
+    // One that is told all the same was found before the displacement had grown.
+    response->trust_horizon = error <= RESPONSE_PARTING ? (double)NAN : neighbour->horizon;
 }
 
 void frame_neighbour_clear(FrameNeighbour *neighbour) {

@@ -23,6 +23,10 @@ typedef struct RunColumn {
     double *values; // plan->count of them
 } RunColumn;
 
+// Work is foretold and counted in solver steps, whatever the solver: each stands for about this
+// much CPU time on a middling machine [s].
+#define SOLVER_STEP 3e-8
+
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {
     const Plan *plan;
@@ -35,7 +39,7 @@ typedef struct Run {
     double statistics_from; // [s]
     size_t impacts_most;    // ledger rows; 0: no limit
     double steps_most;      // solver steps; 0: no limit
-    double steps;           // out: work counted, in solver steps
+    double steps;           // out: work counted, in solver steps of SOLVER_STEP
 } Run;
 
 typedef struct Solver {
@@ -46,7 +50,7 @@ typedef struct Solver {
     // report; `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to
     // decide.
     Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
-    // What a run costs, in steps of the single engine. NULL: as the exact solver's.
+    // What a run costs, in solver steps. NULL: as the exact solver's.
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
     bool is_linear_only; // serves no contact under a power law
 } Solver;

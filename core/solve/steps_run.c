@@ -136,9 +136,10 @@ double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_
     double making;
     const double each =
         stepper->cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
-    const double steps =
-        choose(plan, accuracy, base_interval).share * plan->duration * plan->sample_rate;
-    return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
+    const Choice choice = choose(plan, accuracy, base_interval);
+    const double steps = choice.share * plan->duration * plan->sample_rate;
+    const double beside = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5; // neighbour's
+    return (1 + beside) * each * steps + 2 * making;
 }
 
 // The run, and beside it one whose error is known to be another.
@@ -165,7 +166,7 @@ static double part_of(const Pair *pair) {
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
     if (pair->run.tolerance > 0)
         return 2;
-    return is_touched ? CHANCE : 1 / (pow(pair->longer, pair->run.stepper->order) - 1);
+    return is_touched ? CHANCE : 1 / fabs(pow(pair->longer, pair->run.stepper->order) - 1);
 }
 
 static void compare(Pair *pair) {
@@ -209,15 +210,21 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
     const size_t own = pair->run.share / kinks;
-    const size_t share = tolerance > 0 ? 2 : kinks * (own > 2 ? own / 2 + 1 : 1);
+    const size_t share = tolerance > 0 ? 2
+                         : own > 1     ? kinks * (own > 2 ? own / 2 + 1 : 1)
+                         : kinks > 1   ? 2 * kinks // none is longer: a shorter one
+                                       : 1;
     pair->horizon = NAN;
     pair->stride = pair->run.share > 1 || tolerance > 0 ? 1 : 2;
     pair->longer = (double)(pair->run.share * pair->stride) / (double)share;
     pair->plan = *frame->plan;
     pair->plan.sample_rate /= (double)pair->stride;
     pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
-    pair->near_run = (Run){
-        .plan = &pair->plan, .base = frame->run->base, .impacts_most = frame->run->impacts_most};
+    pair->near_run = (Run){.plan = &pair->plan,
+                           .base = frame->run->base,
+                           .watch = frame->run->watch,
+                           .impacts_most = frame->run->impacts_most,
+                           .steps_most = frame->run->steps_most};
     pair->apart = malloc(frame->storeys * sizeof *pair->apart);
     pair->is_known = pair->apart != NULL &&
                      steps_make(&pair->near, stepper, &pair->near_run, share,
@@ -237,17 +244,33 @@ static double largest_jolt(const Pair *pair) {
     return pair->run.tolerance > 0 ? 0 : most * pair->run.length / 2;
 }
 
+// What a storey moves by at most that the steps did not see of the base [m].
+static double largest_unseen(const Pair *pair) {
+    const Frame *frame = &pair->run.frame;
+    double most = 0;
+    for (size_t i = 0; i < frame->storeys && pair->run.most_unseen > 0; i++)
+        most += frame->widest[i] * fabs(frame->modes->participation[i]) *
+                fmin(1 / sqrt(frame->omega2[i]), frame->plan->duration);
+    return most * pair->run.most_unseen;
+}
+
 static void tell(const Pair *pair, Response *response) {
-    const double size = fmax(pair->largest, response->peaks.displacement);
+    const double unseen = largest_unseen(pair);
+    const double size = fmax(fmax(pair->largest, response->peaks.displacement), unseen);
     const Ledger *ledger = &pair->run.frame.ledger;
     const double balance =
         ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
     const double error =
-        size > 0 ? fmax(part_of(pair) * pair->worst, largest_jolt(pair)) / size : 0;
+        size > 0 ? fmax(fmax(part_of(pair) * pair->worst, largest_jolt(pair)), unseen) / size : 0;
     response->has_trust = pair->is_known && pair->compared > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
-    response->trust_horizon = pair->horizon;
+    response->trust_horizon = unseen > RESPONSE_PARTING * size
+                                  ? fmin(pair->horizon, pair->run.unseen_since)
+                                  : pair->horizon;
+    // It was found before the displacement had grown.
+    if (response->error_estimate <= RESPONSE_PARTING)
+        response->trust_horizon = NAN;
 }
 
 static Status solve(Pair *pair, Response *response) {

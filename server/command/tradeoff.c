@@ -22,6 +22,7 @@ typedef struct TradeoffSettings {
     uint64_t repeats;
     Texts solver;
     double point_steps;
+    double max_cpu_seconds;
 } TradeoffSettings;
 
 enum { OUTPUTS = 8, SOLVERS = 32 };
@@ -40,11 +41,9 @@ static const Field tradeoff_fields[] = {
                 "try this solver only; may be given again"),
     FIELD_REAL(TradeoffSettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be foretold to take (5e7)"),
+    SCENE_FILE_CPU_ROW(TradeoffSettings),
     FIELD_END,
 };
-
-static const SimulationLimits limits = {
-    .samples = SCENE_FILE_SAMPLES, .impacts = SCENE_FILE_IMPACTS, .steps = SCENE_FILE_STEPS};
 
 static bool is_chart(const char *path) {
     const size_t length = strlen(path);
@@ -137,14 +136,15 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
-static Status study_make(const Inquiry *inquiry, const Texts *outputs, Problem *problem) {
+static Status study_make(const Inquiry *inquiry, const Texts *outputs,
+                         const SimulationLimits *limits, Problem *problem) {
     Bar bar;
     Workspace workspace = {0};
     Variant *answer = NULL;
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
     const StudyTools tools = {
-        .limits = &limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
+        .limits = limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
     Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &answer, problem);
     bar_stop(&bar);
     workspace_clear(&workspace);
@@ -188,6 +188,7 @@ static Status study_choose(Inquiry *inquiry, TradeoffSettings *settings, Problem
 
 static Status scene_study(const char *path, const Bytes *text, TradeoffSettings *settings,
                           Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     Store *store = NULL;
     Inquiry inquiry = {0};
     Warnings warnings = {0};
@@ -207,7 +208,7 @@ static Status scene_study(const char *path, const Bytes *text, TradeoffSettings 
         output_drop();
     }
     if (status == STATUS_OK)
-        status = study_make(&inquiry, &settings->output, problem);
+        status = study_make(&inquiry, &settings->output, &limits, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
