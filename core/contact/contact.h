@@ -46,6 +46,15 @@ typedef struct ContactForce {
     double kink;           // changes its sign where N is not smooth
 } ContactForce;
 
+// What N is made of under CONTACT_POWER: k p^n + viscous p^viscous_exponent p' while p' > turn, and
+// else k p^n or nothing.
+typedef struct ContactTerms {
+    double stiffness, exponent;        // k [N/m^n], n
+    double viscous, viscous_exponent;  // 0: no damping
+    double turn;                       // [m/s]
+    bool is_elastic_below;             // k p^n there, else nothing
+} ContactTerms;
+
 typedef struct ContactLaw {
     Kind kind;
     ContactForm form;
@@ -56,6 +65,7 @@ typedef struct ContactLaw {
     double (*reached)(double factor, double exponent);  // the restitution it really has
     double (*duration)(double factor, double exponent); // of the contact
     ContactForce (*force)(const ContactParameters *parameters, double p, double speed);
+    ContactTerms (*terms)(const ContactParameters *parameters);
 } ContactLaw;
 
 extern const ContactLaw *const contacts[]; // NULL-terminated; "auto" first

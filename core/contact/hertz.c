@@ -9,4 +9,5 @@ const ContactLaw contact_hertz = {
     .reached = power_reached,
     .duration = power_duration,
     .force = power_force,
+    .terms = power_terms,
 };

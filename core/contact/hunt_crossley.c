@@ -13,6 +13,7 @@ const ContactLaw contact_hunt_crossley = {
     .reached = power_reached,
     .duration = power_duration,
     .force = power_force,
+    .terms = power_terms,
 };
 
 static double textbook_factor(double e) {
@@ -28,4 +29,5 @@ const ContactLaw contact_hunt_crossley_textbook = {
     .reached = power_reached,
     .duration = power_duration,
     .force = power_force,
+    .terms = power_terms,
 };

@@ -62,7 +62,7 @@ static double jankowski_duration(double factor, double exponent) {
 static ContactForce jankowski_force(const ContactParameters *at, double p, double speed) {
     if (!(p > 0))
         return (ContactForce){.kink = speed};
-    const double n = at->exponent, spring = at->stiffness * pow(p, n);
+    const double n = at->exponent, spring = at->stiffness * power_of(p, n);
     ContactForce force = {.value = spring,
                           .by_penetration = n * spring / p,
                           .strain = spring * p / (n + 1),
@@ -75,6 +75,14 @@ static ContactForce jankowski_force(const ContactParameters *at, double p, doubl
     return force;
 }
 
+static ContactTerms jankowski_terms(const ContactParameters *at) {
+    return (ContactTerms){.stiffness = at->stiffness,
+                          .exponent = at->exponent,
+                          .viscous = 2 * at->factor * sqrt(at->stiffness * at->mass),
+                          .viscous_exponent = (at->exponent - 1) / 2,
+                          .is_elastic_below = true};
+}
+
 const ContactLaw contact_jankowski = {
     .kind = {"jankowski", "N = k p^n, and damping on approach only, which reaches about e",
              contact_fields, sizeof(Contact)},
@@ -84,4 +92,5 @@ const ContactLaw contact_jankowski = {
     .reached = jankowski_reached,
     .duration = jankowski_duration,
     .force = jankowski_force,
+    .terms = jankowski_terms,
 };

@@ -15,4 +15,5 @@ const ContactLaw contact_lankarani_nikravesh = {
     .reached = power_reached,
     .duration = power_duration,
     .force = power_force,
+    .terms = power_terms,
 };

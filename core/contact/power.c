@@ -153,7 +153,7 @@ ContactForce power_force(const ContactParameters *at, double p, double speed) {
     const double pull = 1 + at->factor * speed / at->speed;
     if (!(p > 0))
         return (ContactForce){.kink = pull};
-    const double spring = at->stiffness * pow(p, at->exponent);
+    const double spring = at->stiffness * power_of(p, at->exponent);
     ContactForce force = {.strain = spring * p / (at->exponent + 1), .kink = pull};
     if (pull > 0) {
         force.value = spring * pull;
@@ -161,4 +161,13 @@ ContactForce power_force(const ContactParameters *at, double p, double speed) {
         force.by_speed = spring * at->factor / at->speed;
     }
     return force;
+}
+
+ContactTerms power_terms(const ContactParameters *at) {
+    const double damping = at->factor / at->speed;
+    return (ContactTerms){.stiffness = at->stiffness,
+                          .exponent = at->exponent,
+                          .viscous = at->stiffness * damping,
+                          .viscous_exponent = at->exponent,
+                          .turn = -1 / damping};
 }

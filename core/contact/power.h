@@ -3,6 +3,8 @@
 #ifndef CORE_CONTACT_POWER_H
 #define CORE_CONTACT_POWER_H
 
+#include <math.h>
+
 #include "core/contact/contact.h"
 
 #define POWER_EXPONENT 1.5 // of Hertz's contact, where none is given
@@ -15,5 +17,11 @@ double power_factor(double restitution);
 double power_reached(double factor, double exponent);
 double power_duration(double factor, double exponent);
 ContactForce power_force(const ContactParameters *parameters, double p, double speed);
+ContactTerms power_terms(const ContactParameters *parameters);
+
+// p^n, sooner where n is one of the usual exponents.
+static inline double power_of(double p, double n) {
+    return n == POWER_EXPONENT ? p * sqrt(p) : n == 1 ? p : n == 2 ? p * p : pow(p, n);
+}
 
 #endif

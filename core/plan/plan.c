@@ -151,6 +151,7 @@ static Status plan_modes(const Structure *structure, Plan *plan, Problem *proble
 static Status plan_values(const Scene *scene, Plan *plan) {
     const Structure *structure = scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
+    TRY(fields_default(plan_report_fields, &plan->report));
     TRY(plan_room(plan, structure_storeys(structure), scene->dampers.count));
     structure_fill(structure,
                    &(const Matrices){plan->mass, plan->stiffness, plan->damping, plan->influence});

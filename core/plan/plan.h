@@ -56,17 +56,43 @@ typedef struct Warnings {
     size_t count;
 } Warnings;
 
+// One run on the way to a target.
+typedef struct PlanAttempt {
+    char *way;              // "exact, tolerance 1e-06"
+    double predicted_error; // NAN before it was run
+    double estimated_error;
+    double steps; // counted
+} PlanAttempt;
+typedef struct PlanAttempts {
+    PlanAttempt *at;
+    size_t count;
+} PlanAttempts;
+
+typedef enum PlanVerdict { VERDICT_KEPT, VERDICT_MISSED, VERDICT_UNKNOWN } PlanVerdict;
+
+// What accuracy.target came to.
+typedef struct PlanTarget {
+    double error;           // relative, wanted; NAN: no target
+    int metric;             // Metric
+    char *way;              // chosen; after a run the one whose answer this is
+    double predicted_error; // of that way
+    double estimated_error; // of the run; NAN before it, or unknown
+    int verdict;            // PlanVerdict; CHOICE_ABSENT before the run
+    PlanAttempts attempts;  // all runs that were needed
+} PlanTarget;
+
 // The readable part of a plan: the API's "plan" object.
 typedef struct PlanReport {
     char *contact_model; // "none" where there is no damper
     char *solver;
+    PlanTarget target;
     Decisions decisions;
     DerivedList derived;
     PlanModes modes;
 } PlanReport;
 
 extern const Field plan_report_fields[], derived_fields[], decision_fields[], mode_fields[],
-    warning_fields[];
+    target_fields[], warning_fields[];
 
 // One stop's contact parameters, ready for a solver. The first three are those of every impact;
 // where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)

@@ -6,6 +6,7 @@
 
 #include "core/base/side.h"
 #include "core/plan/plan.h"
+#include "core/result/metric.h"
 
 enum { REPORT_LINES = 256 }; // warnings or decisions at most; more would not be read
 
@@ -50,9 +51,31 @@ const Field warning_fields[] = {
     FIELD_END
 };
 
+static const Field attempt_fields[] = {
+    FIELD_TEXT(PlanAttempt, way, 0, PRESENCE_OPTIONAL, 0, "what was run"),
+    FIELD_REAL(PlanAttempt, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold"),
+    FIELD_REAL(PlanAttempt, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
+    FIELD_REAL(PlanAttempt, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
+    FIELD_END
+};
+
+static const char *const verdict_names[] = {"kept", "missed", "unknown", NULL};
+
+const Field target_fields[] = {
+    FIELD_REAL(PlanTarget, error, NULL, ANY, OPTIONAL, "relative error wanted"),
+    FIELD_CHOICE(PlanTarget, metric, metric_names, OPTIONAL, "what it is of"),
+    FIELD_TEXT(PlanTarget, way, 0, PRESENCE_OPTIONAL, 0, "the way chosen; after a run the one that this answer came by"),
+    FIELD_REAL(PlanTarget, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold for that way"),
+    FIELD_REAL(PlanTarget, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
+    FIELD_CHOICE(PlanTarget, verdict, verdict_names, OPTIONAL, "whether the estimated error keeps the one wanted; unknown where it could not be estimated"),
+    FIELD_LIST(PlanTarget, attempts, attempt_fields, 0, PRESENCE_OPTIONAL, "all runs that were needed"),
+    FIELD_END
+};
+
 const Field plan_report_fields[] = {
     FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "the contact model that is run"),
     FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
+    FIELD_ITEM(PlanReport, target, target_fields, NULL, PRESENCE_OPTIONAL, "what accuracy.target came to; null without one"),
     FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
     FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
     FIELD_LIST(PlanReport, modes, mode_fields, 0, PRESENCE_DEFAULT, "natural modes of the structure, the slowest first"),

@@ -1,6 +1,6 @@
 // Two things a run can leave: the time to which rounding, or the solver's steps, let its trajectory
-// be the scene's own, and the approach speeds at which its buffers were measured. The second is counted from the
-// ledger, which holds every impact of a run that succeeds.
+// be the scene's own, and the approach speeds at which its buffers were measured. The second is
+// counted from the ledger, which holds every impact of a run that succeeds.
 #include "core/simulation/caution.h"
 
 #include <math.h>

@@ -2,6 +2,7 @@
 // The parts' costs are as measured; how many contacts there will be can only be guessed.
 #include <math.h>
 
+#include "core/simulation/aim.h"
 #include "core/simulation/choice.h"
 #include "core/solve/frame_work.h"
 
@@ -158,6 +159,8 @@ static double foretell_bytes(const Simulation *simulation) {
 }
 
 Cost simulation_cost(const Simulation *simulation) {
+    if (aim_is_asked(simulation))
+        return aim_cost(simulation);
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
     const double samples = (double)scene_sample_count(scene);

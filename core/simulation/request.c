@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/aim.h"
 #include "core/simulation/plausible.h"
 #include "core/simulation/request_channels.h"
 #include "core/simulation/simulation.h"
@@ -123,16 +124,29 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
-static Status check_solver(const Simulation *simulation, Problem *problem) {
+// What the solver has no use for is left out.
+static Status complete_solver(Simulation *simulation, Problem *problem) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    if (!solver->is_linear_only || scene->dampers.count == 0 || law->form != CONTACT_POWER)
+    const bool has_power_law = scene->dampers.count > 0 && law->form == CONTACT_POWER;
+    if (solver->forget_unused != NULL)
+        solver->forget_unused((Accuracy *)(void *)simulation->accuracy, has_power_law);
+    if (!solver->is_linear_only || !has_power_law)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/accuracy/solver",
                        "%s serves linear contact and impulses, not the power law of %s: take "
                        "exact, rk4, newmark or adaptive",
                        solver->kind.name, law->kind.name);
+}
+
+static Status complete_accuracy(Simulation *simulation, Problem *problem) {
+    if (aim_is_asked(simulation))
+        return aim_complete(simulation, problem);
+    // Without a target it says nothing.
+    if (simulation->accuracy->kind == &solvers[0]->kind)
+        ((AccuracyAuto *)(void *)simulation->accuracy)->metric = CHOICE_ABSENT;
+    return STATUS_OK;
 }
 
 static Status refuse_time(const Simulation *simulation, const Cost *cost,
@@ -208,7 +222,9 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     if (status == STATUS_OK)
         status = check_values(simulation, limits, problem);
     if (status == STATUS_OK)
-        status = check_solver(simulation, problem);
+        status = complete_solver(simulation, problem);
+    if (status == STATUS_OK)
+        status = complete_accuracy(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
     if (status == STATUS_OK)

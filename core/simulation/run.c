@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/choice.h"
 #include "core/simulation/simulation.h"
@@ -34,6 +35,8 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
     memset(report, 0, sizeof *report);
+    if (aim_is_asked(simulation))
+        return aim_plan(simulation, report, problem);
     TRY(make_plan(simulation, &plan, problem));
     *report = plan->report;
     memset(&plan->report, 0, sizeof plan->report);
@@ -218,6 +221,8 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem) {
     *outcome = NULL;
+    if (aim_is_asked(simulation))
+        return aim_run(simulation, limits, watch, workspace, outcome, problem);
     Held *held = calloc(1, sizeof *held);
     if (held == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");

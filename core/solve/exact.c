@@ -11,6 +11,8 @@
 // interval is one matrix step if a bound on the gap's curvature allows it, and everything else goes
 // by arcs (arc.h), whose polynomials locate events to rounding. Time is a sample's number and an
 // offset from it, so that short contacts keep their digits late in a run.
+#include "core/solve/exact.h"
+
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -22,6 +24,7 @@
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
 #include "core/solve/frame.h"
+#include "core/solve/frame_ode.h"
 #include "core/solve/refine.h"
 #include "core/solve/solver.h"
 
@@ -380,8 +383,47 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     return status;
 }
 
+double exact_tolerance(const Accuracy *accuracy) {
+    const double asked = accuracy == NULL
+                             ? (double)NAN
+                             : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
+    return asked > FRAME_ODE_TOLERANCE ? asked : FRAME_ODE_TOLERANCE;
+}
+
+// Linear contacts and impulses have closed forms.
+static void forget_unused(Accuracy *accuracy, bool has_power_law) {
+    if (!has_power_law)
+        ((AccuracyExact *)(void *)accuracy)->tolerance = (double)NAN;
+}
+
+static Status decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
+    (void)base_interval;
+    (void)problem;
+    if (plan->form != CONTACT_POWER || plan->damper_count == 0)
+        return STATUS_OK;
+    const double tolerance = exact_tolerance(accuracy);
+    const bool is_asked = tolerance > FRAME_ODE_TOLERANCE;
+    return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
+                         tolerance, NULL,
+                         is_asked ? "relative error that a contact may end with; flight between "
+                                    "contacts is exact, and instants are found as well as these "
+                                    "contacts are known"
+                                  : "each contact as exact as rounding lets it be, for none asked "
+                                    "for less");
+}
+
+// clang-format off
+static const Field exact_fields[] = {
+    FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
+    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
+    FIELD_END
+};
+// clang-format on
+
 const Solver solver_exact = {
     .kind = {"exact", "each contact state propagated exactly, events located to rounding",
-             accuracy_fields, sizeof(Accuracy)},
+             exact_fields, sizeof(AccuracyExact)},
     .run = exact_run,
+    .decide = decide,
+    .forget_unused = forget_unused,
 };

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/solve/exact.h"
 #include "core/solve/frame_neighbour.h"
 #include "core/solve/frame_record.h"
 
@@ -35,7 +36,7 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (neighbour == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
-    Status status = frame_engine_make(&engine, run, response, problem);
+    Status status = frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
         status = solve(&engine, neighbour);
     if (engine.record.block != NULL)

@@ -15,7 +15,10 @@ enum { STILL_EVENTS = 1000, STORM_EVENTS = 100 };
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
 
+static const double GAIN_CONTACTS = 1e3;
+
 static const double WATCH_STEPS = 3e4; // between looks at the watch
+static const double WORK_OF_STEP = 60; // multiplications
 
 Status frame_engine_check(FrameEngine *engine) {
     const Frame *frame = &engine->frame;
@@ -132,16 +135,17 @@ static double arc_most(const Frame *frame, const Slice *slice) {
 static Status press(FrameEngine *engine, const Slice *slice, double length) {
     Frame *frame = &engine->frame;
     FrameOdeStep step;
-    TRY(frame_ode_step(&engine->ode, slice, length, &step, frame->problem));
+    frame_ode_step(&engine->ode, slice, length, &step);
     ledger_work(&frame->ledger, step.input, step.damping);
     engine->record.base_speed += step.ground;
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
-    frame_record_note(frame);
     if (step.is_event)
         TRY(happen(frame, &step.event));
-    return count_steps(engine, each(engine, FRAME_WORK_ODE));
+    else
+        frame_record_note(frame);
+    return count_steps(engine, step.work / WORK_OF_STEP);
 }
 
 // A long step of contact. False: it must go by arcs.
@@ -319,26 +323,29 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
     return STATUS_OK;
 }
 
-Status frame_engine_make(FrameEngine *engine, Run *run, Response *response, Problem *problem) {
+Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Response *response,
+                         Problem *problem) {
     Frame *frame = &engine->frame;
     TRY(frame_make(frame, run, problem));
     TRY(frame_arc_room(&engine->arc, frame, problem));
     TRY(frame_flight_make(&engine->flight, frame, problem));
     TRY(frame_press_make(&engine->pressing, frame, problem));
-    TRY(frame_ode_make(&engine->ode, frame, problem));
+    TRY(frame_ode_make(&engine->ode, frame, tolerance, problem));
     TRY(frame_trail_make(&engine->trail, frame, problem));
     TRY(frame_record_start(&engine->record, &engine->trail, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
-    frame->ledger.gain_most = LEDGER_GAIN_EXACT;
+    // What contacts may be wrong by each, of many of them.
+    frame->ledger.gain_most =
+        fmax(LEDGER_GAIN_EXACT, tolerance > FRAME_ODE_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
     return STATUS_OK;
 }
 
-Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
+Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run, double tolerance,
                            Response *response) {
     Frame *frame = &engine->frame;
     TRY(frame_make(frame, run, NULL));
-    TRY(frame_ode_make(&engine->ode, frame, NULL));
+    TRY(frame_ode_make(&engine->ode, frame, tolerance, NULL));
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;

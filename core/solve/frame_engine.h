@@ -24,13 +24,14 @@ typedef struct FrameEngine {
     double work; // since the watch was asked
 } FrameEngine;
 
-// Cleared by frame_engine_clear, also after a failure.
-Status frame_engine_make(FrameEngine *engine, Run *run, Response *response, Problem *problem);
+// `tolerance` is of contacts under a power law. Cleared by frame_engine_clear, also after a failure.
+Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Response *response,
+                         Problem *problem);
 void frame_engine_clear(FrameEngine *engine);
 
 // A run of its own that shares what the other has made once, and of which only the motion matters.
 // Its own are `frame` and `ode`; the rest is the other's to clear.
-Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
+Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run, double tolerance,
                            Response *response);
 
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.

@@ -5,16 +5,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double NUDGE = 4 * DBL_EPSILON, POWER_NUDGE = 1e-12; // an integrated contact's error
+static const double NUDGE = 4 * DBL_EPSILON;
 static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
+static const double FINER = 30;    // than the run's tolerance
+static const double CAUTION = 2;   // with what comes between two comparisons
 
-static double nudge_of(const Frame *frame) {
-    return frame->plan->form == CONTACT_POWER ? POWER_NUDGE : NUDGE;
+// Whether the run's contacts may be wrong by more than rounding.
+static bool is_loose(const FrameEngine *engine) {
+    return engine->ode.tolerance > FRAME_ODE_TOLERANCE;
 }
 
 // Some roundings more, of either sign.
 static void nudge(Frame *frame) {
-    const double by = nudge_of(frame);
+    const double by = NUDGE;
     for (size_t i = 0; i < frame->storeys; i++) {
         const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
         frame->q[i] *= 1 + sign * by;
@@ -22,11 +25,25 @@ static void nudge(Frame *frame) {
     }
 }
 
+// Of a difference, what the run's error is taken for.
+static double part_of(const FrameNeighbour *neighbour) {
+    return neighbour->is_stepped ? CAUTION : 1;
+}
+
+// What a mode's difference comes to until it is looked at again: as far as it swings.
+static double swing(const FrameNeighbour *neighbour, const Frame *frame, size_t i, double apart) {
+    const double omega = sqrt(frame->omega2[i]), since = NEIGHBOUR_SAMPLES * frame->interval;
+    const double speed = frame->p[i] - neighbour->engine.frame.p[i];
+    return hypot(apart, speed * (omega * since > 1 ? 1 / omega : since));
+}
+
 static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
     const size_t n = frame->storeys;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
         apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
+        if (neighbour->is_stepped)
+            apart[i] = swing(neighbour, frame, i, apart[i]);
         bound += frame->widest[i] * fabs(apart[i]);
     }
     neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
@@ -35,10 +52,13 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     const double *values = frame_spread(frame, apart);
     for (size_t j = 0; j < n; j++)
         difference = fmax(difference, fabs(values[j]));
+    if (neighbour->is_stepped)
+        difference = bound; // swings need not be in step
     neighbour->worst = fmax(neighbour->worst, difference);
-    if (isnan(neighbour->horizon) && !(difference <= RESPONSE_PARTING * neighbour->largest))
+    const double error = part_of(neighbour) * difference;
+    if (isnan(neighbour->horizon) && !(error <= RESPONSE_PARTING * neighbour->largest))
         neighbour->horizon = (double)before / frame->plan->sample_rate;
-    neighbour->is_spent = difference > PARTED * neighbour->largest;
+    neighbour->is_spent = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
 }
 
 bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
@@ -73,14 +93,17 @@ void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine)
     Frame *own = &neighbour->engine.frame;
     neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
     neighbour->is_known =
-        neighbour->apart != NULL && frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
-                                                        &neighbour->response) == STATUS_OK;
+        neighbour->apart != NULL &&
+        frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
+                            fmax(engine->ode.tolerance / FINER, FRAME_ODE_TOLERANCE),
+                            &neighbour->response) == STATUS_OK;
+    neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
     if (!neighbour->is_known)
         return;
     nudge(own);
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
-            (own->damper[d].r > 0 ? -1 : 1) * nudge_of(own) * own->damper[d].plan->clearance;
+            (own->damper[d].r > 0 ? -1 : 1) * NUDGE * own->damper[d].plan->clearance;
     neighbour->is_known = frame_engine_settle(&neighbour->engine) == STATUS_OK;
     neighbour->is_spent = !neighbour->is_known;
 }
@@ -91,9 +114,11 @@ void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, R
     const Base *base = frame->run->base;
     const double rate = fmax(frame->rate, base->form == BASE_SINE ? base->omega : 0);
     const double drift = DBL_EPSILON * (1 + rate * frame->plan->duration);
-    const double error = size > 0 ? fmax(neighbour->worst / size, drift) : 0;
+    const double worst = part_of(neighbour) * neighbour->worst;
+    const double error = size > 0 ? fmax(worst / size, drift) : 0;
     response->has_trust = neighbour->is_known;
-    response->error_estimate = error < PARTED ? error : 1;
+    response->is_stepped = neighbour->is_stepped;
+    response->error_estimate = error < (neighbour->is_stepped ? 1 : PARTED) ? error : 1;
     // One that is told all the same was found before the displacement had grown.
     response->trust_horizon = error <= RESPONSE_PARTING ? (double)NAN : neighbour->horizon;
 }

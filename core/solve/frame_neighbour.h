@@ -15,6 +15,7 @@ typedef struct FrameNeighbour {
     Response response;
     bool is_spent;         // parted, or failed: nothing is left to follow
     bool is_known;         // never failed
+    bool is_stepped;       // the run keeps a tolerance: this one keeps a finer one
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
     double *apart;         // scratch, of all modes

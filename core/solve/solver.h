@@ -16,6 +16,13 @@ typedef struct Accuracy {
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
 
+// Of "auto", which has no run of its own.
+typedef struct AccuracyAuto {
+    Accuracy accuracy;
+    double target; // NAN: none
+    int metric;    // Metric
+} AccuracyAuto;
+
 // Where the samples of one channel go.
 typedef struct RunColumn {
     ChannelId channel;
@@ -52,6 +59,8 @@ typedef struct Solver {
     Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
     // What a run costs, in solver steps. NULL: as the exact solver's.
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
+    // Erases the settings that a scene without a power law has no use for. NULL: there are none.
+    void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
     bool is_linear_only; // serves no contact under a power law
 } Solver;
 

@@ -11,31 +11,17 @@
 
 enum { SOLVERS = 32, REPEATS = 1000 };
 
-const char *const tradeoff_metric_names[] = {
-    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
-};
-const char *const tradeoff_metric_units[] = {"", "", "", "", " dB", "", NULL};
-static const double usual_errors[TRADEOFF_METRICS] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
+static const double usual_errors[METRICS] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
 const char *const tradeoff_status_names[] = {"measured", "refused", "failed", NULL};
 
 // clang-format off
 static const Field study_fields[] = {
     FIELD_REAL(TradeoffStudy, error, NULL, AT_LEAST(0), OPTIONAL, "error wanted, in the metric's unit; 1e-3 if absent, 1e-2 of mean_acceleration and peak_force, no impact, 0.1 dB"),
-    FIELD_CHOICE(TradeoffStudy, metric, tradeoff_metric_names, TRADEOFF_DISPLACEMENT, "what the error is of"),
+    FIELD_CHOICE(TradeoffStudy, metric, metric_names, METRIC_DISPLACEMENT, "what the error is of"),
     FIELD_COUNT(TradeoffStudy, repeats, NULL, WITHIN(1, REPEATS), 5, "timings of each point; the smallest and the median are told"),
     FIELD_TEXTS(TradeoffStudy, solvers, NULL, NULL, SOLVERS, PRESENCE_OPTIONAL, 0, "solvers that are tried; all if absent"),
     FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 5e7, "solver steps that a point may be foretold to take; it is refused beyond"),
     FIELD_COUNT(TradeoffStudy, trial, NULL, AT_LEAST(1), 1, "another number measures the CPU times anew; the same one is answered from what was measured"),
-    FIELD_END
-};
-
-const Field tradeoff_error_fields[] = {
-    FIELD_REAL(TradeoffErrors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),
-    FIELD_REAL(TradeoffErrors, mean_acceleration, NULL, ANY, OPTIONAL, "rms of the difference over rms within the horizon"),
-    FIELD_REAL(TradeoffErrors, peak_force, NULL, ANY, OPTIONAL, "difference of the largest contact force within the horizon, of that force; unknown where impacts have no force"),
-    FIELD_REAL(TradeoffErrors, impacts, NULL, ANY, OPTIONAL, "impacts within the horizon, how many more or fewer"),
-    FIELD_REAL(TradeoffErrors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel that is farthest off; unknown where that band is not covered"),
-    FIELD_REAL(TradeoffErrors, rms_displacement, NULL, ANY, OPTIONAL, "difference of the rms displacement of the whole run, of that rms"),
     FIELD_END
 };
 
@@ -54,20 +40,14 @@ const Field tradeoff_point_fields[] = {
     FIELD_REAL(TradeoffPoint, cpu_median, "s", ANY, OPTIONAL, "median of the timings; a measurement"),
     FIELD_COUNT(TradeoffPoint, runs, NULL, AT_LEAST(0), 0, "runs that were timed: short ones are timed many at once"),
     FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
-    FIELD_ITEM(TradeoffPoint, errors, tradeoff_error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
+    FIELD_ITEM(TradeoffPoint, errors, error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
     FIELD_FLAG(TradeoffPoint, is_best, false, "no other point is both cheaper and closer by the metric; follows from measured times"),
     FIELD_END
 };
 
 static const Field reference_fields[] = {
     FIELD_TEXT(TradeoffReference, solver, 0, PRESENCE_OPTIONAL, 0, "solver that the points are compared with"),
-    FIELD_REAL(TradeoffReference, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
-    FIELD_REAL(TradeoffReference, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
-    FIELD_COUNT(TradeoffReference, impacts, NULL, AT_LEAST(0), OPTIONAL, "its impacts within the horizon"),
-    FIELD_REAL(TradeoffReference, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),
-    FIELD_REAL(TradeoffReference, largest, "m", ANY, OPTIONAL, "its largest displacement"),
-    FIELD_REAL(TradeoffReference, psd_from, "Hz", ANY, OPTIONAL, "its spectra are compared from here"),
-    FIELD_REAL(TradeoffReference, psd_to, "Hz", ANY, OPTIONAL, "to here"),
+    FIELD_BASE(TradeoffReference, yardstick, yardstick_fields),
     FIELD_END
 };
 
@@ -78,7 +58,7 @@ static const Field choice_fields[] = {
 };
 
 static const Field answer_fields[] = {
-    FIELD_CHOICE(Tradeoff, metric, tradeoff_metric_names, OPTIONAL, "what the error wanted is of"),
+    FIELD_CHOICE(Tradeoff, metric, metric_names, OPTIONAL, "what the error wanted is of"),
     FIELD_REAL(Tradeoff, error, NULL, ANY, OPTIONAL, "error wanted"),
     FIELD_COUNT(Tradeoff, repeats, NULL, AT_LEAST(1), OPTIONAL, "timings of each point"),
     FIELD_COUNT(Tradeoff, trial, NULL, AT_LEAST(1), OPTIONAL, "number of the measurement"),
@@ -89,25 +69,18 @@ static const Field answer_fields[] = {
 };
 // clang-format on
 
-double tradeoff_error(const TradeoffErrors *errors, int metric) {
-    const double all[TRADEOFF_METRICS] = {errors->displacement, errors->mean_acceleration,
-                                          errors->peak_force,   errors->impacts,
-                                          errors->psd,          errors->rms_displacement};
-    return all[metric];
-}
-
 static Status check_metric(const TradeoffStudy *study, const Simulation *simulation,
                            Problem *problem) {
     static const char pointer[] = "/study/metric";
-    if (study->metric == TRADEOFF_PSD && simulation->output.psd.channels.count == 0)
+    if (study->metric == METRIC_PSD && simulation->output.psd.channels.count == 0)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "psd needs spectra: ask for some in /output/psd");
-    if (study->metric == TRADEOFF_PEAK_FORCE && !ladder_has_force(simulation))
+    if (study->metric == METRIC_PEAK_FORCE && !ladder_has_force(simulation))
         return problem_add(
             problem, STATUS_INVALID, pointer, "peak_force needs contacts with a force: %s",
             simulation->scene.dampers.count > 0 ? "impulses have none, choose another contact model"
                                                 : "the scene has no damper");
-    if (study->metric == TRADEOFF_IMPACTS && simulation->scene.dampers.count == 0)
+    if (study->metric == METRIC_IMPACTS && simulation->scene.dampers.count == 0)
         return problem_add(problem, STATUS_INVALID, pointer,
                            "impacts needs a damper: the scene has none");
     return STATUS_OK;
@@ -149,7 +122,7 @@ static Status study_complete(Study *asked, const Simulation *simulation,
                              const SimulationLimits *limits, Problem *problem) {
     TradeoffStudy *study = (TradeoffStudy *)(void *)asked;
     if (study->metric == CHOICE_ABSENT)
-        study->metric = TRADEOFF_DISPLACEMENT;
+        study->metric = METRIC_DISPLACEMENT;
     if (isnan(study->error))
         study->error = usual_errors[study->metric];
     const Status metric = check_metric(study, simulation, problem);

@@ -1,43 +1,23 @@
 // The study "tradeoff": what speed costs in accuracy, measured on the scene itself. What is asked,
 // and the table that answers. Not how: tradeoff.c runs it, tradeoff_ladder.h lists what is tried,
-// tradeoff_errors.h measures, tradeoff_choice.h chooses. Used by whoever shows a table or a chart.
+// simulation/compare.h measures, tradeoff_choice.h chooses. Used by whoever shows a table or a
+// chart.
 #ifndef CORE_STUDY_TRADEOFF_H
 #define CORE_STUDY_TRADEOFF_H
 
+#include "core/simulation/compare.h"
 #include "core/study/study.h"
-
-typedef enum TradeoffMetric {
-    TRADEOFF_DISPLACEMENT,
-    TRADEOFF_MEAN_ACCELERATION,
-    TRADEOFF_PEAK_FORCE,
-    TRADEOFF_IMPACTS,
-    TRADEOFF_PSD,
-    TRADEOFF_RMS_DISPLACEMENT,
-    TRADEOFF_METRICS
-} TradeoffMetric;
-extern const char *const tradeoff_metric_names[]; // NULL-terminated
-extern const char *const tradeoff_metric_units[]; // to stand behind a number: "", " dB"
 
 // What is asked.
 typedef struct TradeoffStudy {
     Study study;
     double error; // wanted; NAN until completed: the metric's usual one
-    int metric;   // TradeoffMetric
+    int metric;   // Metric
     uint64_t repeats;
     uint64_t trial;     // another number measures anew
     double point_steps; // no point may take more solver steps
     Texts solvers;      // none: all
 } TradeoffStudy;
-
-// Differences from the reference; NAN where a point does not answer it.
-typedef struct TradeoffErrors {
-    double displacement;      // largest over the largest
-    double mean_acceleration; // rms over rms
-    double peak_force;        // of the largest
-    double impacts;           // how many more or fewer
-    double psd;               // rms [dB]
-    double rms_displacement;
-} TradeoffErrors;
 
 typedef enum TradeoffStatus {
     TRADEOFF_MEASURED,
@@ -61,7 +41,7 @@ typedef struct TradeoffPoint {
     double cpu_minimum, cpu_median; // of one run [s]
     uint64_t runs;                  // that were timed
     double steps;                   // that the solver counted
-    TradeoffErrors errors;
+    Errors errors;
     bool is_best; // nothing is both cheaper and closer by the metric
 } TradeoffPoint;
 
@@ -73,11 +53,7 @@ typedef struct TradeoffPoints {
 // What the points are compared with.
 typedef struct TradeoffReference {
     char *solver;
-    double error_estimate, trust_horizon;
-    uint64_t impacts;        // within the horizon
-    double peak_force;       // of those [N]
-    double largest;          // displacement [m]
-    double psd_from, psd_to; // the band compared [Hz]
+    Yardstick yardstick;
 } TradeoffReference;
 
 typedef struct TradeoffChoice {
@@ -96,9 +72,6 @@ typedef struct Tradeoff {
     TradeoffChoice recommendation;
 } Tradeoff;
 
-extern const Field tradeoff_point_fields[], tradeoff_error_fields[];
-
-// The error by one metric.
-double tradeoff_error(const TradeoffErrors *errors, int metric);
+extern const Field tradeoff_point_fields[];
 
 #endif

@@ -12,19 +12,19 @@ static const double alike = 1.25; // times as long is no longer than the cheapes
 
 static bool has_both(const TradeoffPoint *point, int metric) {
     return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum) &&
-           !isnan(tradeoff_error(&point->errors, metric));
+           !isnan(errors_by(&point->errors, metric));
 }
 
 void choice_mark(TradeoffPoints *points, int metric) {
     for (size_t i = 0; i < points->count; i++) {
         TradeoffPoint *point = &points->at[i];
-        const double cpu = point->cpu_minimum, error = tradeoff_error(&point->errors, metric);
+        const double cpu = point->cpu_minimum, error = errors_by(&point->errors, metric);
         point->is_best = has_both(point, metric);
         for (size_t j = 0; j < points->count && point->is_best; j++) {
             const TradeoffPoint *other = &points->at[j];
             if (!has_both(other, metric))
                 continue;
-            const double own = tradeoff_error(&other->errors, metric);
+            const double own = errors_by(&other->errors, metric);
             if (other->cpu_minimum <= cpu && own <= error &&
                 (other->cpu_minimum < cpu || own < error))
                 point->is_best = false;
@@ -53,7 +53,7 @@ static const TradeoffPoint *cheapest(const TradeoffPoints *points, int metric, d
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
         if (point != without && has_both(point, metric) &&
-            tradeoff_error(&point->errors, metric) <= error &&
+            errors_by(&point->errors, metric) <= error &&
             (found == NULL || point->cpu_minimum < found->cpu_minimum))
             found = point;
     }
@@ -66,7 +66,7 @@ static const TradeoffPoint *closest_of_alike(const TradeoffPoints *points, int m
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
         if (has_both(point, metric) && point->cpu_minimum <= alike * cpu &&
-            tradeoff_error(&point->errors, metric) < tradeoff_error(&found->errors, metric))
+            errors_by(&point->errors, metric) < errors_by(&found->errors, metric))
             found = point;
     }
     return found;
@@ -76,16 +76,15 @@ static const TradeoffPoint *closest(const TradeoffPoints *points, int metric) {
     const TradeoffPoint *found = NULL;
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
-        if (has_both(point, metric) &&
-            (found == NULL ||
-             tradeoff_error(&point->errors, metric) < tradeoff_error(&found->errors, metric)))
+        if (has_both(point, metric) && (found == NULL || errors_by(&point->errors, metric) <
+                                                             errors_by(&found->errors, metric)))
             found = point;
     }
     return found;
 }
 
 Status choice_make(const TradeoffPoints *points, int metric, double error, TradeoffChoice *choice) {
-    const char *name = tradeoff_metric_names[metric], *unit = tradeoff_metric_units[metric];
+    const char *name = metric_names[metric], *unit = metric_units[metric];
     const TradeoffPoint *taken = cheapest(points, metric, error, NULL);
     choice->point = COUNT_ABSENT;
     if (taken == NULL) {
@@ -93,19 +92,19 @@ Status choice_make(const TradeoffPoints *points, int metric, double error, Trade
         if (near == NULL)
             return say(choice, "no point has an error of %s", name);
         return say(choice, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name,
-                   error, unit, near->name, tradeoff_error(&near->errors, metric), unit);
+                   error, unit, near->name, errors_by(&near->errors, metric), unit);
     }
     const TradeoffPoint *first = taken;
     taken = closest_of_alike(points, metric, first->cpu_minimum, first);
     choice->point = (uint64_t)(taken - points->at) + 1;
-    const double reached = tradeoff_error(&taken->errors, metric);
+    const double reached = errors_by(&taken->errors, metric);
     const double cpu = taken->cpu_minimum;
     if (taken != first)
         return say(choice,
                    "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than the "
                    "cheapest, %s, %.2g%s in %.3g s",
                    taken->name, name, error, unit, reached, unit, cpu, first->name,
-                   tradeoff_error(&first->errors, metric), unit, first->cpu_minimum);
+                   errors_by(&first->errors, metric), unit, first->cpu_minimum);
     const TradeoffPoint *next = cheapest(points, metric, error, taken);
     if (next == NULL)
         return say(choice, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",

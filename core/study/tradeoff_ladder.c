@@ -17,7 +17,7 @@ enum {
 };
 // The finest step wanted: this part of the shortest contact, or of a radian of the fastest mode.
 static const double contact_part = 3e-3, radian_part = 1e-3;
-static const double tolerance_most = 1e-3, tolerance_factor = 1e-2;
+static const double tolerance_most = 1e-3, tolerance_least = 1e-14, tolerance_factor = 1e-2;
 static const double rate_divisors[RATES] = {2, 4, 8}; // powers of 2, so that samples coincide
 static const uint64_t spectrum_divisors[SHARES] = {4, 16};
 static const double duration_divisors[SHARES] = {2, 4};
@@ -97,13 +97,12 @@ static bool add_steps(TradeoffPoints *points, const Kind *solver, const Simulati
 
 static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Range *range) {
     for (double tolerance = fmin(tolerance_most, range->most);
-         tolerance >= range->least * (1 - 1e-9); tolerance *= tolerance_factor) {
+         tolerance >= fmax(range->least, tolerance_least) * (1 - 1e-9);
+         tolerance *= tolerance_factor) {
         TradeoffPoint *point = add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
         if (point == NULL)
             return false;
         point->tolerance = tolerance;
-        if (!(range->least > 0) && tolerance < 1e-14)
-            break;
     }
     return true;
 }
@@ -141,6 +140,12 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
     return true;
 }
 
+static bool has_power_law(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    return scene->dampers.count > 0 && law->form == CONTACT_POWER;
+}
+
 static bool is_asked(const TradeoffStudy *study, const char *name) {
     bool is_named = study->solvers.count == 0;
     for (size_t i = 0; i < study->solvers.count; i++)
@@ -148,13 +153,23 @@ static bool is_asked(const TradeoffStudy *study, const char *name) {
     return is_named;
 }
 
+// Whether the solver's settings change anything of this scene.
+static bool is_of_use(const Kind *kind, const Simulation *simulation) {
+    const Solver *solver = (const Solver *)(const void *)kind;
+    return solver->forget_unused == NULL || has_power_law(simulation);
+}
+
 static bool add_solver(TradeoffPoints *points, const Kind *solver, const Simulation *simulation,
                        double finest) {
-    const Field *tolerance = row_of(solver, "tolerance", NULL);
+    const Field *tolerance =
+        is_of_use(solver, simulation) ? row_of(solver, "tolerance", NULL) : NULL;
     if (row_of(solver, "step", NULL) != NULL)
         return add_steps(points, solver, simulation, finest);
-    if (tolerance != NULL)
-        return add_tolerances(points, solver, &tolerance->range);
+    if (tolerance != NULL && !add_tolerances(points, solver, &tolerance->range))
+        return false;
+    // A tolerance that may be left out is none then.
+    if (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL)
+        return true;
     return add(points, solver, "%s", solver->name) != NULL;
 }
 
@@ -286,30 +301,4 @@ double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
     const double steps = simulation_cost(&view).steps;
     variant_free(view.accuracy);
     return steps;
-}
-
-Status ladder_watch(Simulation *simulation, Problem *problem) {
-    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    const bool are_numbered = storeys > 1 || simulation->scene.dampers.count > 1;
-    static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
-    Texts names = {calloc(COUNT(wanted) * storeys, sizeof *names.at), 0};
-    bool is_whole = names.at != NULL;
-    for (size_t i = 0; i < COUNT(wanted) * storeys && is_whole; i++) {
-        char name[64];
-        if (are_numbered)
-            snprintf(name, sizeof name, "%s_%zu", channels[wanted[i / storeys]].name,
-                     i % storeys + 1);
-        else
-            snprintf(name, sizeof name, "%s", channels[wanted[i / storeys]].name);
-        names.at[i] = strdup(name);
-        is_whole = names.at[i] != NULL;
-        names.count += is_whole;
-    }
-    Texts *asked = &simulation->output.channels;
-    for (size_t i = 0; i < asked->count; i++)
-        free(asked->at[i]);
-    free(asked->at);
-    *asked = names;
-    return is_whole ? STATUS_OK
-                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
 }

@@ -24,7 +24,4 @@ bool ladder_has_force(const Simulation *simulation);
 // What a point is foretold to take, in solver steps.
 double ladder_cost(const Simulation *simulation, const TradeoffPoint *point);
 
-// Asks for the channels that errors are measured by, and for no others; the spectra stay.
-Status ladder_watch(Simulation *simulation, Problem *problem);
-
 #endif

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/compare.h"
 #include "core/study/tradeoff_budget.h"
 #include "core/study/tradeoff_choice.h"
-#include "core/study/tradeoff_errors.h"
 #include "core/study/tradeoff_ladder.h"
 
 enum { BATCH = 10000 };                   // runs of a timing at most
@@ -89,7 +89,7 @@ static Status make_reference(Session *session, Problem *problem) {
     Status status =
         ladder_apply(session->simulation, &exact, session->tools->limits, &simulation, problem);
     if (status == STATUS_OK)
-        status = ladder_watch(&simulation, problem);
+        status = compare_watch(&simulation, problem);
     if (status == STATUS_OK)
         status = run(session, &simulation, session->tools->limits, BUDGET_BATCH,
                      &session->reference, problem);
@@ -104,6 +104,7 @@ static Compared compare(const Outcome *outcome, const Simulation *simulation,
         .storeys = structure_storeys(scene_structure(&simulation->scene)),
         .has_motion = point == NULL || (isnan(point->duration) && point->segment == COUNT_ABSENT),
         .has_force = ladder_has_force(simulation),
+        .horizon = outcome->summary.trust_horizon,
     };
 }
 
@@ -119,7 +120,7 @@ static Status measure_errors(Session *session, size_t index, Problem *problem) {
         ladder_apply(session->simulation, point, &session->limits, &simulation, session->fault);
     TradeoffStatus as = TRADEOFF_REFUSED;
     if (status == STATUS_OK)
-        status = ladder_watch(&simulation, session->fault);
+        status = compare_watch(&simulation, session->fault);
     if (status == STATUS_OK) {
         as = TRADEOFF_FAILED;
         status = run(session, &simulation, &session->limits, steps, &outcome, session->fault);
@@ -193,7 +194,7 @@ static Status measure_all(Session *session, Problem *problem) {
     const TradeoffPoints *points = &session->answer->points;
     TRY(make_reference(session, problem));
     const Compared reference = compare(session->reference, session->simulation, NULL);
-    errors_reference(&reference, &session->answer->reference);
+    session->answer->reference.yardstick = yardstick_make(&reference);
     session->done += BUDGET_BATCH;
     for (size_t i = 0; i < points->count; i++)
         TRY(measure_errors(session, i, problem));

@@ -33,7 +33,7 @@ static const Field tradeoff_fields[] = {
                 "write to this file, .json the table or .svg the chart; may be given again"),
     FIELD_REAL(TradeoffSettings, error, NULL, ANY, OPTIONAL,
                "error wanted, in the metric's unit (1e-3)"),
-    FIELD_CHOICE(TradeoffSettings, metric, tradeoff_metric_names, OPTIONAL,
+    FIELD_CHOICE(TradeoffSettings, metric, metric_names, OPTIONAL,
                  "displacement, mean_acceleration, peak_force, impacts, psd or rms_displacement"),
     FIELD_COUNT(TradeoffSettings, repeats, NULL, AT_LEAST(0), OPTIONAL,
                 "timings of each point (5)"),
@@ -66,7 +66,7 @@ static const char *number(char text[24], const char *format, double value) {
 
 static void point_print(const Tradeoff *tradeoff, size_t index, int width) {
     const TradeoffPoint *point = &tradeoff->points.at[index];
-    const TradeoffErrors *errors = &point->errors;
+    const Errors *errors = &point->errors;
     const char mark = tradeoff->recommendation.point == index + 1 ? '>'
                       : point->is_best                            ? '*'
                                                                   : ' ';
@@ -85,14 +85,14 @@ static void point_print(const Tradeoff *tradeoff, size_t index, int width) {
 }
 
 static void table_print(const Tradeoff *tradeoff) {
-    const TradeoffReference *reference = &tradeoff->reference;
+    const Yardstick *reference = &tradeoff->reference.yardstick;
     char estimate[24], horizon[24];
     int width = 5;
     for (size_t i = 0; i < tradeoff->points.count; i++)
         width = (int)strlen(tradeoff->points.at[i].name) > width
                     ? (int)strlen(tradeoff->points.at[i].name)
                     : width;
-    printf("Errors against %s, whose own is %s; ", reference->solver,
+    printf("Errors against %s, whose own is %s; ", tradeoff->reference.solver,
            number(estimate, "%.1e", reference->error_estimate));
     if (isnan(reference->trust_horizon))
         puts("samples and impacts compared over the whole run.");
@@ -108,7 +108,7 @@ static void table_print(const Tradeoff *tradeoff) {
     for (size_t i = 0; i < tradeoff->points.count; i++)
         point_print(tradeoff, i, width);
     printf("\n* no other is both cheaper and closer in %s; > the one to take:\n%s.\n",
-           tradeoff_metric_names[tradeoff->metric], tradeoff->recommendation.why);
+           metric_names[tradeoff->metric], tradeoff->recommendation.why);
 }
 
 static Status file_write(const char *path, const Tradeoff *tradeoff, Problem *problem) {

@@ -69,7 +69,7 @@ static const char *group_name(const TradeoffPoint *point) {
 }
 
 static double error_of(const Chart *chart, const TradeoffPoint *point) {
-    return tradeoff_error(&point->errors, chart->tradeoff->metric);
+    return errors_by(&point->errors, chart->tradeoff->metric);
 }
 
 static bool is_drawn(const Chart *chart, const TradeoffPoint *point) {
@@ -241,7 +241,7 @@ static void put_point(Chart *chart, const TradeoffPoint *point) {
     bytes_text(bytes, "<title>");
     put_text(bytes, point->name);
     bytes_format(bytes, ": %.2g%s in %.3g s%s</title></path>\n", error_of(chart, point),
-                 tradeoff_metric_units[chart->tradeoff->metric], point->cpu_minimum,
+                 metric_units[chart->tradeoff->metric], point->cpu_minimum,
                  point->is_best ? ", none is cheaper and closer" : "");
 }
 
@@ -292,7 +292,7 @@ static void put_legend(const Chart *chart) {
     if (error > 0) {
         bytes_format(bytes, "<path class=\"wanted\" d=\"M%.0f %.0fh16\"/>", right + 10, y);
         bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\">wanted: %.3g%s</text>\n", right + 32,
-                     y + 4, error, tradeoff_metric_units[chart->tradeoff->metric]);
+                     y + 4, error, metric_units[chart->tradeoff->metric]);
         y += 22;
     }
     bytes_format(bytes, "<circle class=\"ring\" cx=\"%.0f\" cy=\"%.0f\" r=\"7\"/>", right + 18, y);
@@ -324,7 +324,7 @@ static void put_description(const Chart *chart) {
 void chart_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
     Chart chart = {.tradeoff = tradeoff, .bytes = bytes};
     char metric[NAME];
-    snprintf(metric, sizeof metric, "%s", tradeoff_metric_names[tradeoff->metric]);
+    snprintf(metric, sizeof metric, "%s", metric_names[tradeoff->metric]);
     for (char *c = metric; *c != '\0'; c++)
         if (*c == '_')
             *c = ' ';
@@ -338,7 +338,7 @@ void chart_tradeoff(const Tradeoff *tradeoff, Bytes *bytes) {
     put_style(bytes);
     bytes_format(bytes, "<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n", width, height);
     bytes_format(bytes, "<text x=\"%.0f\" y=\"26\" font-size=\"14\">Error of %s%s</text>\n", left,
-                 metric, tradeoff->metric == TRADEOFF_PSD ? " [dB]" : "");
+                 metric, tradeoff->metric == METRIC_PSD ? " [dB]" : "");
     put_axes(&chart);
     put_best(&chart);
     put_wanted(&chart);

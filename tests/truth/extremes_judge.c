@@ -14,7 +14,7 @@
 #include "tests/support/doubles.h"
 #include "tests/truth/frame_reference.h"
 
-const char *const extremes_verdicts[VERDICTS] = {
+const char *const extremes_verdicts[EXTREME_VERDICTS] = {
     "kept", "unjudged", "untrusted", "refused", "failed", "SILENT", "NAN",
     "MUTE", "SLOW",     "DEAF",      "GREEDY",  "HANG",   "CRASH",
 };
@@ -244,7 +244,7 @@ static void judge_error(const Answer *answer, const char *text, double seconds,
     double theirs = 0;
     record->told = stated(&own);
     if (isnan(own.error) || record->told >= LARGE) {
-        record->verdict = VERDICT_UNTRUSTED;
+        record->verdict = EXTREME_UNTRUSTED;
         snprintf(record->reason, sizeof record->reason, "%s",
                  isnan(own.error)     ? "the error is not known"
                  : own.error >= LARGE ? "the error stated is a tenth or more"
@@ -262,15 +262,15 @@ static void judge_error(const Answer *answer, const char *text, double seconds,
         record->judge = EXTREMES_EXACT;
     }
     const double allowed = fmax(TIMES * (record->told + theirs), LEAST);
-    record->verdict = record->judge == EXTREMES_NOBODY ? VERDICT_UNJUDGED : VERDICT_KEPT;
+    record->verdict = record->judge == EXTREMES_NOBODY ? EXTREME_UNJUDGED : EXTREME_KEPT;
     if (record->judge != EXTREMES_NOBODY && !(record->found <= allowed)) {
-        record->verdict = VERDICT_SILENT;
+        record->verdict = EXTREME_SILENT;
         snprintf(record->reason, sizeof record->reason,
                  "more than %g times what %s states against %s", TIMES,
                  answer->outcome->plan.solver, extremes_judges[record->judge]);
     } else if (is_exact && !(answer->outcome->summary.energy_residual <=
                              fmax(1e-6, TIMES * answer->outcome->summary.error_estimate))) {
-        record->verdict = VERDICT_SILENT;
+        record->verdict = EXTREME_SILENT;
         snprintf(record->reason, sizeof record->reason, "the energies do not balance");
         record->found = answer->outcome->summary.energy_residual;
     }
@@ -340,12 +340,12 @@ void extremes_judge(const char *text, uint64_t number, double most_seconds,
     const char *bad = NULL;
     memset(record, 0, sizeof *record);
     record->number = number;
-    record->verdict = VERDICT_MUTE;
+    record->verdict = EXTREME_MUTE;
     answer_read(&answer, text, NULL, most_seconds);
     const bool is_refused = answer.status != STATUS_OK;
     if (is_refused) {
         if (problem.count > 0 && problem.faults[0].detail[0] != '\0') {
-            record->verdict = VERDICT_REFUSED;
+            record->verdict = EXTREME_REFUSED;
             generalise(record->reason, problem.faults[0].pointer, problem.faults[0].detail);
         }
         snprintf(record->solver, sizeof record->solver, "%s",
@@ -356,21 +356,21 @@ void extremes_judge(const char *text, uint64_t number, double most_seconds,
     answer_run(&answer, most_seconds);
     fill(&answer, record);
     if (answer.outcome == NULL && problem.detail[0] != '\0') {
-        record->verdict = VERDICT_FAILED;
+        record->verdict = EXTREME_FAILED;
         generalise(record->reason, "", problem.detail);
     } else if (answer.outcome != NULL && (bad = find_nan(answer.outcome)) != NULL) {
-        record->verdict = VERDICT_NAN;
+        record->verdict = EXTREME_NAN;
         snprintf(record->reason, sizeof record->reason, "%s", bad);
     } else if (answer.outcome != NULL) {
         judge_error(&answer, text, most_seconds, record);
     }
-    if (record->verdict < VERDICT_FIRST_DEFECT && is_busy(&answer) &&
+    if (record->verdict < EXTREME_FIRST_DEFECT && is_busy(&answer) &&
         answer.cpu > SLOW_LEAST + SLOW_TIMES * most_seconds) {
-        record->verdict = VERDICT_SLOW;
+        record->verdict = EXTREME_SLOW;
         snprintf(record->reason, sizeof record->reason, "more CPU than allowed");
     }
-    if (record->verdict < VERDICT_FIRST_DEFECT && answer.gap > GAP_MOST) {
-        record->verdict = VERDICT_DEAF;
+    if (record->verdict < EXTREME_FIRST_DEFECT && answer.gap > GAP_MOST) {
+        record->verdict = EXTREME_DEAF;
         snprintf(record->reason, sizeof record->reason, "asked too rarely whether to stop");
     }
     answer_clear(&answer);

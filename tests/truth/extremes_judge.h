@@ -9,23 +9,23 @@
 enum { EXTREMES_REASON = 200 };
 
 typedef enum ExtremesVerdict {
-    VERDICT_KEPT,      // the error stated holds against something closer
-    VERDICT_UNJUDGED,  // an error is stated, and nothing closer came to an end in time
-    VERDICT_UNTRUSTED, // the run says itself that its error is large or not known
-    VERDICT_REFUSED,
-    VERDICT_FAILED,
-    VERDICT_FIRST_DEFECT,
-    VERDICT_SILENT = VERDICT_FIRST_DEFECT, // wrong, and did not say so
-    VERDICT_NAN,
-    VERDICT_MUTE,   // no result, and no reason
-    VERDICT_SLOW,   // much more CPU than was foretold or allowed
-    VERDICT_DEAF,   // asked too rarely whether to stop
-    VERDICT_GREEDY, // more memory than was foretold
-    VERDICT_HANG,
-    VERDICT_CRASH,
-    VERDICTS
+    EXTREME_KEPT,      // the error stated holds against something closer
+    EXTREME_UNJUDGED,  // an error is stated, and nothing closer came to an end in time
+    EXTREME_UNTRUSTED, // the run says itself that its error is large or not known
+    EXTREME_REFUSED,
+    EXTREME_FAILED,
+    EXTREME_FIRST_DEFECT,
+    EXTREME_SILENT = EXTREME_FIRST_DEFECT, // wrong, and did not say so
+    EXTREME_NAN,
+    EXTREME_MUTE,   // no result, and no reason
+    EXTREME_SLOW,   // much more CPU than was foretold or allowed
+    EXTREME_DEAF,   // asked too rarely whether to stop
+    EXTREME_GREEDY, // more memory than was foretold
+    EXTREME_HANG,
+    EXTREME_CRASH,
+    EXTREME_VERDICTS
 } ExtremesVerdict;
-extern const char *const extremes_verdicts[VERDICTS];
+extern const char *const extremes_verdicts[EXTREME_VERDICTS];
 
 enum {
     EXTREMES_NOBODY,

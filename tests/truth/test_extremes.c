@@ -44,9 +44,9 @@ typedef struct Reason {
 } Reason;
 
 typedef struct Tally {
-    size_t of[VERDICTS];
-    Reason reasons[VERDICTS][REASONS];
-    size_t reason_count[VERDICTS];
+    size_t of[EXTREME_VERDICTS];
+    Reason reasons[EXTREME_VERDICTS][REASONS];
+    size_t reason_count[EXTREME_VERDICTS];
     size_t judged[EXTREMES_JUDGES];
     double seconds;
 } Tally;
@@ -69,7 +69,7 @@ static void count_reason(const ExtremesRecord *record) {
 }
 
 static bool is_defect(int verdict) {
-    return verdict >= VERDICT_FIRST_DEFECT;
+    return verdict >= EXTREME_FIRST_DEFECT;
 }
 
 static void take(const ExtremesRecord *record) {
@@ -147,7 +147,7 @@ static size_t supervise(size_t first) {
     memset(&record, 0, sizeof record);
     record.number = first;
     record.verdict =
-        WIFSIGNALED(status) && WTERMSIG(status) == SIGPROF ? VERDICT_HANG : VERDICT_CRASH;
+        WIFSIGNALED(status) && WTERMSIG(status) == SIGPROF ? EXTREME_HANG : EXTREME_CRASH;
     snprintf(record.reason, sizeof record.reason, "the process ended by %s %d",
              WIFSIGNALED(status) ? "signal" : "code",
              WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status));
@@ -163,7 +163,7 @@ static int by_count(const void *a, const void *b) {
 static void print_tally(void) {
     printf("%zu scenes of seed %llu, at most %g s of CPU each: %.1f s in all\n", scenes,
            (unsigned long long)seed, most_seconds, tally.seconds);
-    for (int v = 0; v < VERDICTS; v++) {
+    for (int v = 0; v < EXTREME_VERDICTS; v++) {
         printf("%6zu %s\n", tally.of[v], extremes_verdicts[v]);
         qsort(tally.reasons[v], tally.reason_count[v], sizeof *tally.reasons[v], by_count);
         for (size_t i = 0; i < tally.reason_count[v]; i++)
@@ -179,9 +179,9 @@ static void extremes_are_right_or_say_that_they_are_not(void **state) {
     for (size_t next = 0; next < scenes;)
         next = supervise(next);
     print_tally();
-    for (int v = VERDICT_FIRST_DEFECT; v < VERDICTS; v++)
+    for (int v = EXTREME_FIRST_DEFECT; v < EXTREME_VERDICTS; v++)
         assert_int_equal(tally.of[v], 0);
-    assert_true(2 * tally.of[VERDICT_KEPT] > scenes / 2);
+    assert_true(2 * tally.of[EXTREME_KEPT] > scenes / 2);
 }
 
 static int show(const char *of_seed, const char *number) {

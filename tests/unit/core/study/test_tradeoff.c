@@ -90,7 +90,7 @@ static void every_solver_is_tried_and_the_reference_with_less(void **state) {
         assert_true(point->steps > 0);
     }
     const TradeoffPoint *exact = find(answer, "exact"), *impulse = find(answer, names[5]);
-    assert_true(exact->errors.displacement == answer->reference.error_estimate);
+    assert_true(exact->errors.displacement == answer->reference.yardstick.error_estimate);
     assert_true(exact->errors.psd == 0 && exact->errors.peak_force == 0);
     assert_true(isnan(impulse->errors.peak_force) && impulse->errors.displacement > 0.01);
     assert_true(find(answer, names[2])->errors.displacement <
@@ -221,12 +221,12 @@ static void assert_refused(Inquiry *inquiry, const SimulationLimits *limits, con
 static void what_cannot_be_answered_is_refused(void **state) {
     (void)state;
     Inquiry inquiry = inquiry_make(0.025, 2, 3);
-    study_of(&inquiry)->metric = TRADEOFF_PSD;
+    study_of(&inquiry)->metric = METRIC_PSD;
     paper_no_psd(&inquiry.simulation);
     assert_refused(&inquiry, NULL, "/study/metric", "psd needs spectra");
 
     inquiry = inquiry_make(0.025, 2, 3);
-    study_of(&inquiry)->metric = TRADEOFF_PEAK_FORCE;
+    study_of(&inquiry)->metric = METRIC_PEAK_FORCE;
     paper_model(&inquiry.simulation, "impulse");
     assert_refused(&inquiry, NULL, "/study/metric", "impulses have none");
 
@@ -246,7 +246,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 static void the_usual_error_is_the_metrics(void **state) {
     (void)state;
     static const double usual[] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
-    for (int metric = 0; metric < TRADEOFF_METRICS; metric++) {
+    for (int metric = 0; metric < METRICS; metric++) {
         Inquiry inquiry = inquiry_make(0.025, 2, 3);
         study_of(&inquiry)->metric = metric;
         complete(&inquiry);

@@ -10,6 +10,7 @@
 
 #include "core/excite/random.h"
 #include "core/math/fourier.h"
+#include "core/simulation/compare.h"
 #include "core/study/tradeoff_ladder.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
@@ -169,7 +170,7 @@ static void what_a_point_does_not_name_stays_the_scenes(void **state) {
     assert_int_equal(target.output.psd.segment, 100);
     assert_int_equal(target.output.psd.overlap, 50);
     assert_int_equal(target.output.channels.count, simulation.output.channels.count);
-    assert_int_equal(ladder_watch(&target, &problem), STATUS_OK);
+    assert_int_equal(compare_watch(&target, &problem), STATUS_OK);
     assert_int_equal(target.output.channels.count, 2);
     assert_string_equal(target.output.channels.at[0], "displacement");
     assert_string_equal(target.output.channels.at[1], "mean_acceleration");

@@ -22,7 +22,7 @@ static TradeoffPoint point_make(char *name, char *solver, double cpu, double err
 }
 
 static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t choice) {
-    const Tradeoff tradeoff = {.metric = TRADEOFF_DISPLACEMENT,
+    const Tradeoff tradeoff = {.metric = METRIC_DISPLACEMENT,
                                .error = error,
                                .points = {points, count},
                                .recommendation = {choice, "because a < b & c"}};

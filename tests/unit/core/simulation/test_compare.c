@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/tradeoff_errors.h"
+#include "core/simulation/compare.h"
 
 // An outcome of one storey made up by hand: samples at `rate`, a spectrum of `bins` up to half of
 // it.
@@ -37,15 +37,16 @@ static void outcome_free(Outcome *outcome) {
     spectrum_clear(&outcome->spectrum);
 }
 
-static TradeoffErrors measure(const Outcome *reference, const Outcome *point) {
-    const Compared from = {reference, 1, true, true}, to = {point, 1, true, true};
+static Errors measure(const Outcome *reference, const Outcome *point) {
+    const Compared from = {reference, 1, true, true, reference->summary.trust_horizon},
+                   to = {point, 1, true, true, (double)NAN};
     return errors_measure(&from, &to);
 }
 
 static void the_same_outcome_has_no_error_but_the_references_own(void **state) {
     (void)state;
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
-    const TradeoffErrors errors = measure(&a, &b);
+    const Errors errors = measure(&a, &b);
     assert_true(errors.displacement == 1e-14);
     assert_true(errors.mean_acceleration == 0 && errors.impacts == 0 && errors.psd == 0 &&
                 errors.rms_displacement == 0);
@@ -116,15 +117,14 @@ static void impacts_and_forces_are_those_within_the_horizon(void **state) {
     a.summary.trust_horizon = 0.45;
     assert_true(measure(&a, &b).impacts == 2);
     assert_true(fabs(measure(&a, &b).peak_force - 0.25) < 1e-15);
-    TradeoffReference told = {0};
-    const Compared from = {&a, 1, true, true};
-    errors_reference(&from, &told);
+    const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
+    const Yardstick told = yardstick_make(&from);
     assert_int_equal(told.impacts, 1);
     assert_true(told.peak_force == 4 && told.trust_horizon == 0.45);
-    const Compared impulsive = {&b, 1, true, false};
+    const Compared impulsive = {&b, 1, true, false, (double)NAN};
     assert_true(isnan(errors_measure(&from, &impulsive).peak_force));
-    const Compared shorter = {&b, 1, false, true};
-    const TradeoffErrors errors = errors_measure(&from, &shorter);
+    const Compared shorter = {&b, 1, false, true, (double)NAN};
+    const Errors errors = errors_measure(&from, &shorter);
     assert_true(isnan(errors.displacement) && isnan(errors.mean_acceleration) &&
                 isnan(errors.impacts) && isnan(errors.peak_force) &&
                 isnan(errors.rms_displacement) && errors.psd == 0);
@@ -137,9 +137,8 @@ static void spectra_are_compared_over_the_band_that_holds_the_power(void **state
     (void)state;
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     double *density = b.spectrum.densities.at[0].values;
-    TradeoffReference told = {0};
-    const Compared from = {&a, 1, true, true};
-    errors_reference(&from, &told);
+    const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
+    const Yardstick told = yardstick_make(&from);
     assert_true(told.psd_from == 1 && told.psd_to == 9);
     density[0] = 1e6;   // the mean is taken off
     density[40] = 1000; // out of the band

@@ -1,9 +1,41 @@
 // A point may have fewer samples than the reference: then its displacement is the line between its
 // samples, and its mean acceleration holds for the whole of its interval. Both are what a reader of
 // the coarser series has.
-#include "core/study/tradeoff_errors.h"
+#include "core/simulation/compare.h"
 
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+// clang-format off
+const Field error_fields[] = {
+    FIELD_REAL(Errors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),
+    FIELD_REAL(Errors, mean_acceleration, NULL, ANY, OPTIONAL, "rms of the difference over rms within the horizon"),
+    FIELD_REAL(Errors, peak_force, NULL, ANY, OPTIONAL, "difference of the largest contact force within the horizon, of that force; unknown where impacts have no force"),
+    FIELD_REAL(Errors, impacts, NULL, ANY, OPTIONAL, "impacts within the horizon, how many more or fewer"),
+    FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel that is farthest off; unknown where that band is not covered"),
+    FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "difference of the rms displacement of the whole run, of that rms"),
+    FIELD_END
+};
+
+const Field yardstick_fields[] = {
+    FIELD_REAL(Yardstick, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
+    FIELD_REAL(Yardstick, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
+    FIELD_COUNT(Yardstick, impacts, NULL, AT_LEAST(0), OPTIONAL, "its impacts within the horizon"),
+    FIELD_REAL(Yardstick, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),
+    FIELD_REAL(Yardstick, largest, "m", ANY, OPTIONAL, "its largest displacement"),
+    FIELD_REAL(Yardstick, psd_from, "Hz", ANY, OPTIONAL, "its spectra are compared from here"),
+    FIELD_REAL(Yardstick, psd_to, "Hz", ANY, OPTIONAL, "to here"),
+    FIELD_END
+};
+// clang-format on
+
+double errors_by(const Errors *errors, int metric) {
+    const double all[METRICS] = {errors->displacement, errors->mean_acceleration,
+                                 errors->peak_force,   errors->impacts,
+                                 errors->psd,          errors->rms_displacement};
+    return all[metric];
+}
 
 // The part of a spectrum's power that its band holds.
 static const double band_power = 0.999;
@@ -14,20 +46,23 @@ static double ratio(double difference, double whole) {
     return difference == 0 ? 0 : (double)NAN;
 }
 
+static double end_of(const Compared *reference) {
+    return isnan(reference->horizon) ? (double)INFINITY : reference->horizon;
+}
+
 // How far the reference itself is off in the samples compared: an estimate for the whole run says
 // nothing of those before the horizon, which is where it passes RESPONSE_PARTING.
-static double own_error(const Summary *reference) {
-    return isnan(reference->trust_horizon) ? reference->error_estimate
-                                           : fmin(reference->error_estimate, RESPONSE_PARTING);
+static double own_error(const Compared *reference) {
+    const double estimate = reference->outcome->summary.error_estimate;
+    return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_PARTING);
 }
 
 // Samples of the reference that can be compared.
-static size_t samples_within(const Outcome *reference) {
-    const double horizon = reference->summary.trust_horizon;
-    const size_t count = reference->response.count;
-    if (isnan(horizon))
+static size_t samples_within(const Compared *reference) {
+    const size_t count = reference->outcome->response.count;
+    if (isnan(reference->horizon))
         return count;
-    const double within = floor(horizon * reference->response.sample_rate) + 1;
+    const double within = floor(reference->horizon * reference->outcome->response.sample_rate) + 1;
     return within < (double)count ? (size_t)within : count;
 }
 
@@ -157,46 +192,45 @@ static double psd_error(const Spectrum *reference, const Spectrum *point) {
     return worst;
 }
 
-void errors_reference(const Compared *reference, TradeoffReference *told) {
+Yardstick yardstick_make(const Compared *reference) {
     const Outcome *outcome = reference->outcome;
-    const double horizon = outcome->summary.trust_horizon;
-    const Within within =
-        ledger_within(&outcome->response.impacts, isnan(horizon) ? (double)INFINITY : horizon);
-    told->error_estimate = own_error(&outcome->summary);
-    told->trust_horizon = horizon;
-    told->impacts = within.impacts;
-    told->peak_force = within.peak;
-    told->largest = outcome->summary.peak_displacement;
-    told->psd_from = told->psd_to = (double)NAN;
+    const Within within = ledger_within(&outcome->response.impacts, end_of(reference));
+    Yardstick told = {.error_estimate = own_error(reference),
+                      .trust_horizon = reference->horizon,
+                      .impacts = within.impacts,
+                      .peak_force = within.peak,
+                      .largest = outcome->summary.peak_displacement,
+                      .psd_from = (double)NAN,
+                      .psd_to = (double)NAN};
     const Spectrum *spectrum = &outcome->spectrum;
     for (size_t i = 0; i < spectrum->densities.count; i++) {
         const size_t end = band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
         if (end < 2)
             continue;
-        told->psd_from = spectrum->frequency[1];
-        told->psd_to = fmax(told->psd_to, spectrum->frequency[end - 1]);
+        told.psd_from = spectrum->frequency[1];
+        told.psd_to = fmax(told.psd_to, spectrum->frequency[end - 1]);
     }
+    return told;
 }
 
-TradeoffErrors errors_measure(const Compared *reference, const Compared *point) {
+Errors errors_measure(const Compared *reference, const Compared *point) {
     const Outcome *from = reference->outcome, *to = point->outcome;
-    TradeoffErrors errors = {.displacement = (double)NAN,
-                             .mean_acceleration = (double)NAN,
-                             .peak_force = (double)NAN,
-                             .impacts = (double)NAN,
-                             .psd = psd_error(&from->spectrum, &to->spectrum),
-                             .rms_displacement = (double)NAN};
+    Errors errors = {.displacement = (double)NAN,
+                     .mean_acceleration = (double)NAN,
+                     .peak_force = (double)NAN,
+                     .impacts = (double)NAN,
+                     .psd = psd_error(&from->spectrum, &to->spectrum),
+                     .rms_displacement = (double)NAN};
     if (!point->has_motion)
         return errors;
-    const size_t count = samples_within(from);
+    const size_t count = samples_within(reference);
     if (count > 1) {
         // Nothing closer than the reference itself can be told.
         errors.displacement =
-            fmax(displacement_error(reference, point, count), own_error(&from->summary));
+            fmax(displacement_error(reference, point, count), own_error(reference));
         errors.mean_acceleration = acceleration_error(reference, point, count);
     }
-    const double horizon =
-        isnan(from->summary.trust_horizon) ? (double)INFINITY : from->summary.trust_horizon;
+    const double horizon = end_of(reference);
     const Within a = ledger_within(&from->response.impacts, horizon);
     const Within b = ledger_within(&to->response.impacts, horizon);
     errors.impacts = fabs((double)a.impacts - (double)b.impacts);
@@ -206,4 +240,30 @@ TradeoffErrors errors_measure(const Compared *reference, const Compared *point) 
         ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
               from->summary.rms_displacement);
     return errors;
+}
+
+Status compare_watch(Simulation *simulation, Problem *problem) {
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    const bool are_numbered = storeys > 1 || simulation->scene.dampers.count > 1;
+    static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
+    Texts names = {calloc(COUNT(wanted) * storeys, sizeof *names.at), 0};
+    bool is_whole = names.at != NULL;
+    for (size_t i = 0; i < COUNT(wanted) * storeys && is_whole; i++) {
+        char name[64];
+        if (are_numbered)
+            snprintf(name, sizeof name, "%s_%zu", channels[wanted[i / storeys]].name,
+                     i % storeys + 1);
+        else
+            snprintf(name, sizeof name, "%s", channels[wanted[i / storeys]].name);
+        names.at[i] = strdup(name);
+        is_whole = names.at[i] != NULL;
+        names.count += is_whole;
+    }
+    Texts *asked = &simulation->output.channels;
+    for (size_t i = 0; i < asked->count; i++)
+        free(asked->at[i]);
+    free(asked->at);
+    *asked = names;
+    return is_whole ? STATUS_OK
+                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
 }
