@@ -146,7 +146,7 @@ const ExcitationKind excitation_chirp = {
     .fastest = chirp_fastest,
     .interval = chirp_interval,
     .lasts = chirp_lasts,
-    .effort = 2,
+    .effort = 1.5,
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

@@ -10,16 +10,17 @@ static const double TURN = 6.28318530717958647693;
 
 // In solver steps: a sample of the engine for one mass, an arc, and an impact, which is flight up
 // to it, contact and flight after it.
-static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 15, IMPACT = 35;
+static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
 static const double VALUE = 0.02;      // of a channel, at one sample
 static const double TRANSFORMED = 0.4; // of a spectrum, once
 static const double MODES = 2;         // of a storey cubed
-static const double RUN = 300;         // plan, room and summary
+static const double RUN = 200;         // plan, room and summary
 static const double FRAME_ARCS = 14;   // of an impact in a frame
-static const double ODE_STEPS = 130;   // of a contact under a power law
 static const double NEIGHBOUR = 1.6;   // of a frame with dampers, and its neighbour until they part
 static const double IMPACTS_A_CYCLE = 2;
-static const double FREE_CYCLES = 30; // after which free vibration does not reach the stops
+static const double TRANSFORM = 25000; // the first time, because it is planned then
+static const double REACHING = 0.3;    // of fast flight, where no bound keeps it from the stops
+static const double FREE_CYCLES = 30;  // after which free vibration does not reach the stops
 
 static const double IMPACTS_KEPT = 1e5; // more are hardly meant
 
@@ -40,7 +41,7 @@ static double flight_arcs(const Scene *scene, const StructureRates *rates) {
     const Structure *structure = scene_structure(scene);
     const bool is_by_arcs = scene->dampers.count > 0 ||
                             (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
-    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
+    return is_by_arcs && rate > scene->sample_rate ? REACHING * rate * scene->duration : 0;
 }
 
 // Samples of the base within the run.
@@ -66,7 +67,10 @@ static double base_arcs(const Simulation *simulation) {
 static double guess_impacts(const Scene *scene, const StructureRates *rates) {
     const bool is_free = excitation_kind(scene_excitation(scene)) == &excitation_free;
     // What has no spring moves with the duration.
-    const double rate = rates->slowest > 0 ? rates->slowest : TURN / scene->duration;
+    double rate = rates->slowest > 0 ? rates->slowest : TURN / scene->duration;
+    const Excitation *excitation = scene_excitation(scene);
+    if (excitation_kind(excitation)->fastest != NULL)
+        rate = fmax(rate, fmin(excitation_kind(excitation)->fastest(excitation), 3 * rate));
     const double cycles = rate / TURN * scene->duration;
     return IMPACTS_A_CYCLE * (is_free ? fmin(cycles, FREE_CYCLES) : cycles) *
            (double)scene->dampers.count;
@@ -80,7 +84,7 @@ static double frame_steps(const Scene *scene, const Outlook *outlook) {
     const double event = frame_work_steps(FRAME_WORK_EVENT, n, m, is_coupled);
     const double flight = frame_work_steps(FRAME_WORK_FLIGHT, n, m, is_coupled);
     const double contact = law->form == CONTACT_POWER
-                               ? ODE_STEPS * frame_work_steps(FRAME_WORK_ODE, n, m, is_coupled)
+                               ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled)
                                : FRAME_ARCS * arc;
     return (m > 0 ? NEIGHBOUR : 1) * (outlook->samples * flight + outlook->arcs * arc +
                                       outlook->impacts * (contact + 2 * event + 2 * arc));
@@ -167,7 +171,8 @@ Cost simulation_cost(const Simulation *simulation) {
     const double storeys = (double)structure_storeys(scene_structure(scene));
     const double columns = (double)(output->channels.count + output->psd.channels.count);
     Cost cost = {.bytes = foretell_bytes(simulation)};
-    cost.spectra = samples * TRANSFORMED * transforms(&output->psd);
+    cost.spectra = samples * TRANSFORMED * transforms(&output->psd) +
+                   (output->psd.channels.count > 0 ? TRANSFORM : 0);
     cost.base = base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
     cost.steps = RUN + samples * VALUE * columns + cost.spectra + cost.base +
                  (storeys > 1 ? MODES * storeys * storeys * storeys : 0) +

@@ -225,7 +225,7 @@ static double cost(const Accuracy *accuracy, double base_interval, const Plan *p
     if (base_interval > 0)
         steps = fmax(steps, 1 / base_interval);
     steps = fmax(steps, each / steps_mode_time(plan)) +
-            7 * 10 * each * sqrt((double)plan->damper_count);
+            7 * 25 * each * sqrt((double)plan->damper_count);
     const double one =
         adaptive_cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
     return 3 * one * steps * plan->duration; // the neighbour takes twice as many

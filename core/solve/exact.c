@@ -30,8 +30,8 @@
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
 
-// Solver steps of an arc, of an event, and of a long step of contact.
-static const double ARC_STEPS = 15, EVENT_STEPS = 8, HOLD_STEPS = 6;
+// Solver steps of an arc and of each order of it, of an event, and of a long step of contact.
+static const double ARC_STEPS = 4, ARC_ORDER_STEPS = 0.7, EVENT_STEPS = 8, HOLD_STEPS = 6;
 
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
@@ -124,10 +124,10 @@ static Status advance(Exact *exact, double length) {
         if (hold(exact, &slice, length))
             return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
     }
-    exact->run->steps += ARC_STEPS;
     length = fmin(length, 1 / fmax(system->rate, slice.omega));
     Arc arc;
     arc_make(&arc, system, &exact->state, &slice, length);
+    exact->run->steps += ARC_STEPS + ARC_ORDER_STEPS * (double)arc.degree;
     double s;
     Side side;
     const bool is_event = exact_find_event(exact, &arc, &s, &side);

@@ -1,5 +1,7 @@
 #include "core/solve/frame_work.h"
 
+#include <math.h>
+
 double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool is_coupled) {
     const double n = (double)storeys, m = (double)dampers, pairs = is_coupled ? n * n : 0;
     switch (kind) {
@@ -11,8 +13,8 @@ double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool
         return 20 + 5 * m + 1.2 * n + 0.15 * pairs;
     case FRAME_WORK_EVENT:
         return 10 * (1 + m);
-    case FRAME_WORK_ODE:
-        return 90 + 20 * m + 8 * n + 0.5 * pairs;
+    case FRAME_WORK_POWER:
+        return (300 + 1000 * ceil(n / 8) + 20 * pairs) * fmax(m * sqrt(m), 1);
     }
     return 0;
 }

@@ -11,7 +11,7 @@ typedef enum FrameWorkKind {
     FRAME_WORK_HOLD,   // a long step of contact, taken or not
     FRAME_WORK_ARC,
     FRAME_WORK_EVENT,
-    FRAME_WORK_ODE, // a step of contact under a power law
+    FRAME_WORK_POWER, // a contact under a power law; foretold only
 } FrameWorkKind;
 
 double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool is_coupled);
