@@ -18,9 +18,9 @@ static const double RUN = 200;         // plan, room and summary
 static const double FRAME_ARCS = 14;   // of an impact in a frame
 static const double NEIGHBOUR = 1.6;   // of a frame with dampers, and its neighbour until they part
 static const double IMPACTS_A_CYCLE = 2;
-static const double TRANSFORM = 25000; // the first time, because it is planned then
-static const double REACHING = 0.3;    // of fast flight, where no bound keeps it from the stops
-static const double FREE_CYCLES = 30;  // after which free vibration does not reach the stops
+static const double TRANSFORM = 8000; // the first time, because it is planned then
+static const double REACHING = 0.3;   // of fast flight, where no bound keeps it from the stops
+static const double FREE_CYCLES = 30; // after which free vibration does not reach the stops
 
 static const double IMPACTS_KEPT = 1e5; // more are hardly meant
 
@@ -71,6 +71,8 @@ static double guess_impacts(const Scene *scene, const StructureRates *rates) {
     const Excitation *excitation = scene_excitation(scene);
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, fmin(excitation_kind(excitation)->fastest(excitation), 3 * rate));
+    // Masses on a frame feel its higher modes as well.
+    rate *= sqrt((double)structure_storeys(scene_structure(scene)));
     const double cycles = rate / TURN * scene->duration;
     return IMPACTS_A_CYCLE * (is_free ? fmin(cycles, FREE_CYCLES) : cycles) *
            (double)scene->dampers.count;

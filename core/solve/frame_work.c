@@ -10,7 +10,7 @@ double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool
     case FRAME_WORK_HOLD:
         return 6 + 0.3 * n * (1 + m) + 0.1 * n * n;
     case FRAME_WORK_ARC:
-        return 20 + 5 * m + 1.2 * n + 0.15 * pairs;
+        return 20 + 5 * m + (1.2 + 0.06 * m) * n + 0.15 * pairs;
     case FRAME_WORK_EVENT:
         return 10 * (1 + m);
     case FRAME_WORK_POWER:

@@ -206,6 +206,16 @@ static Status follow(Pair *pair) {
     return steps_check(&pair->run); // it may have been told to stop
 }
 
+// So many samples in one interval of the neighbour, and so many steps in that.
+static void set_pace(Pair *pair, size_t stride, size_t share) {
+    const Plan *plan = pair->run.frame.plan;
+    pair->stride = stride;
+    pair->longer = (double)(pair->run.share * stride) / (double)share;
+    pair->plan = *plan;
+    pair->plan.sample_rate /= (double)stride;
+    pair->plan.count = (plan->count - 1) / stride + 1;
+}
+
 static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double tolerance) {
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
@@ -215,21 +225,26 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
                          : kinks > 1   ? 2 * kinks // none is longer: a shorter one
                                        : 1;
     pair->horizon = NAN;
-    pair->stride = pair->run.share > 1 || tolerance > 0 ? 1 : 2;
-    pair->longer = (double)(pair->run.share * pair->stride) / (double)share;
-    pair->plan = *frame->plan;
-    pair->plan.sample_rate /= (double)pair->stride;
-    pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
+    set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
     pair->near_run = (Run){.plan = &pair->plan,
                            .base = frame->run->base,
                            .watch = frame->run->watch,
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
     pair->apart = malloc(frame->storeys * sizeof *pair->apart);
-    pair->is_known = pair->apart != NULL &&
-                     steps_make(&pair->near, stepper, &pair->near_run, share,
-                                fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0), true,
-                                &pair->near_response, NULL) == STATUS_OK;
+    const double finer = fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0);
+    Status status = pair->apart == NULL ? STATUS_NO_MEMORY
+                                        : steps_make(&pair->near, stepper, &pair->near_run, share,
+                                                     finer, true, &pair->near_response, NULL);
+    if (status == STATUS_UNSTABLE && share < pair->run.share * pair->stride) {
+        // Longer steps are unstable where the run's are not: shorter ones then.
+        steps_clear(&pair->near);
+        response_clear(&pair->near_response);
+        set_pace(pair, 1, 2 * pair->run.share);
+        status = steps_make(&pair->near, stepper, &pair->near_run, 2 * pair->run.share, finer, true,
+                            &pair->near_response, NULL);
+    }
+    pair->is_known = status == STATUS_OK;
     pair->is_spent = !pair->is_known;
 }
 
