@@ -78,9 +78,9 @@ static Status keep_going(Exact *exact) {
                            "the motion left what double precision can hold at t = %.6g s",
                            exact_time(exact));
     if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
-        return problem_set(exact->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
-                           exact->run->steps_most, exact_time(exact), exact->plan->duration);
+        return problem_set(exact->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           exact->run->steps_most, exact->run->steps_most * SOLVER_STEP,
+                           exact_time(exact), exact->plan->duration);
     if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
         return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            exact_time(exact));
@@ -384,9 +384,8 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
 }
 
 double exact_tolerance(const Accuracy *accuracy) {
-    const double asked = accuracy == NULL
-                             ? (double)NAN
-                             : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
+    const double asked =
+        accuracy == NULL ? (double)NAN : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
     return asked > FRAME_ODE_TOLERANCE ? asked : FRAME_ODE_TOLERANCE;
 }
 

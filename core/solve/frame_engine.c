@@ -34,9 +34,9 @@ Status frame_engine_check(FrameEngine *engine) {
                            "the motion left what double precision can hold at t = %.6g s",
                            frame_time(frame));
     if (frame->run->steps_most > 0 && frame->run->steps > frame->run->steps_most)
-        return problem_set(frame->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
-                           frame->run->steps_most, frame_time(frame), frame->plan->duration);
+        return problem_set(frame->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           frame->run->steps_most, frame->run->steps_most * SOLVER_STEP,
+                           frame_time(frame), frame->plan->duration);
     if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));

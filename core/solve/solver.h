@@ -34,6 +34,10 @@ typedef struct RunColumn {
 // much CPU time on a middling machine [s].
 #define SOLVER_STEP 3e-8
 
+// What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
+#define SOLVER_STOPPED                                                                             \
+    "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
+
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {
     const Plan *plan;

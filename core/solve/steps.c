@@ -185,10 +185,9 @@ Status steps_check(Steps *steps) {
     steps->watched = 0;
     if (run->steps_most > 0 && run->steps > run->steps_most)
         return problem_set(frame->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s, by steps "
-                           "of %.4g s",
-                           run->steps_most, frame_time(frame), frame->plan->duration,
-                           steps->length);
+                           SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
+                           run->steps_most, run->steps_most * SOLVER_STEP, frame_time(frame),
+                           frame->plan->duration, steps->length);
     if (!watch_advance(run->watch, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));
