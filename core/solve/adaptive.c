@@ -13,6 +13,7 @@
 #include "core/solve/steps_run.h"
 
 enum { STILL_MOST = 1000 };
+static const double JUMP = 1e-9; // of a_g, from the end of a step to the start of the next
 
 static FrameEvent event_of(const Frame *frame, size_t d, int which) {
     const FrameDamper *damper = &frame->damper[d];
@@ -120,8 +121,12 @@ static Status advance(Adaptive *own, double length) {
     FrameEvent event;
     double to;
     int root;
+    const double before_jump = frame->ground;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &own->slice);
     frame->ground = own->slice.value;
+    // Where a base ends at once the motion begins anew: the integrator still holds the rate before.
+    if (fabs(frame->ground - before_jump) > JUMP * (fabs(frame->ground) + fabs(before_jump)))
+        own->events = SIZE_MAX;
     if (own->events != frame->events) {
         frame_feel(frame);
         if (find_beyond(frame, false, &event))

@@ -250,13 +250,46 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
 
 // What one contact a step late moves a storey by, within the time that its speed turns in [m]: both
 // runs may be as late by chance.
+static double jolt_of(const Pair *pair, const Impact *impact) {
+    const Frame *frame = &pair->run.frame;
+    double slowest = INFINITY, impulse = fabs(impact->impulse);
+    for (size_t i = 0; i < frame->storeys; i++)
+        slowest = fmin(slowest, sqrt(frame->omega2[i]));
+    // Of a long contact no more than acts while that lasts.
+    if (impact->peak_force < impulse * slowest)
+        impulse = impact->peak_force / slowest;
+    return pair->run.tolerance > 0
+               ? 0
+               : impulse * frame->damper[impact->damper - 1].thrust * pair->run.length / 2;
+}
+
 static double largest_jolt(const Pair *pair) {
     const Frame *frame = &pair->run.frame;
     const Impacts *impacts = &frame->ledger.response->impacts;
     double most = 0;
     for (size_t i = 0; i < impacts->count; i++)
-        most = fmax(most, impacts->at[i].impulse * frame->damper[impacts->at[i].damper - 1].thrust);
-    return pair->run.tolerance > 0 ? 0 : most * pair->run.length / 2;
+        most = fmax(most, jolt_of(pair, &impacts->at[i]));
+    for (size_t d = 0; d < frame->dampers; d++)
+        if (frame->damper[d].row.is_open)
+            most = fmax(most, jolt_of(pair, &frame->damper[d].row.impact));
+    return most;
+}
+
+// When the first contact began that may have moved a storey by more than `most` [s]; INFINITY:
+// none.
+static double first_jolt(const Pair *pair, double most) {
+    const Frame *frame = &pair->run.frame;
+    const Impacts *impacts = &frame->ledger.response->impacts;
+    double first = INFINITY;
+    for (size_t i = 0; i < impacts->count; i++)
+        if (jolt_of(pair, &impacts->at[i]) > most)
+            first = fmin(first, impacts->at[i].start);
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const LedgerRow *row = &frame->damper[d].row;
+        if (row->is_open && jolt_of(pair, &row->impact) > most)
+            first = fmin(first, row->impact.start);
+    }
+    return first;
 }
 
 // What a storey moves by at most that the steps did not see of the base [m].
@@ -280,9 +313,12 @@ static void tell(const Pair *pair, Response *response) {
     response->has_trust = pair->is_known && pair->compared > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
-    response->trust_horizon = unseen > RESPONSE_PARTING * size
-                                  ? fmin(pair->horizon, pair->run.unseen_since)
-                                  : pair->horizon;
+    const double jolted = first_jolt(pair, RESPONSE_PARTING * size);
+    response->trust_horizon = pair->horizon;
+    if (isfinite(jolted))
+        response->trust_horizon = fmin(response->trust_horizon, jolted);
+    if (unseen > RESPONSE_PARTING * size)
+        response->trust_horizon = fmin(response->trust_horizon, pair->run.unseen_since);
     // It was found before the displacement had grown.
     if (response->error_estimate <= RESPONSE_PARTING)
         response->trust_horizon = NAN;
