@@ -13,7 +13,8 @@
 #include "core/solve/steps_run.h"
 
 enum { STILL_MOST = 1000 };
-static const double JUMP = 1e-9; // of a_g, from the end of a step to the start of the next
+static const double POISED = 1e-4; // of a step
+static const double JUMP = 1e-9;   // of a_g, from the end of a step to the start of the next
 
 static FrameEvent event_of(const Frame *frame, size_t d, int which) {
     const FrameDamper *damper = &frame->damper[d];
@@ -114,6 +115,20 @@ static Status happen_apart(Adaptive *own, const FrameEvent *event) {
     return happen(&own->steps->frame, event);
 }
 
+// A mass at rest between stops without clearance is beyond one as soon as anything moves, which is
+// no root: only the step's end shows it.
+static bool is_poised(const Adaptive *own) {
+    const Frame *frame = &own->steps->frame;
+    const bool is_still = own->slice.value == 0 && own->slice.slope == 0 && frame_size(frame) == 0;
+    for (size_t d = 0; d < frame->dampers && !is_still; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        if (damper->phase == FRAME_FLIGHT && damper->plan->clearance == 0 && damper->r == 0 &&
+            damper->w == 0)
+            return true;
+    }
+    return false;
+}
+
 // One step, at most `length` long, and the event at its end.
 static Status advance(Adaptive *own, double length) {
     Steps *steps = own->steps;
@@ -136,6 +151,8 @@ static Status advance(Adaptive *own, double length) {
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
+    if (is_poised(own))
+        length *= POISED;
     TRY(ode_step(own->ode, from + length, &to, own->y, &root, frame->problem));
     const double taken = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     own->at = to;

@@ -252,15 +252,23 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
 // runs may be as late by chance.
 static double jolt_of(const Pair *pair, const Impact *impact) {
     const Frame *frame = &pair->run.frame;
+    const double h = pair->run.length;
     double slowest = INFINITY, impulse = fabs(impact->impulse);
+    if (pair->run.tolerance > 0)
+        return 0;
     for (size_t i = 0; i < frame->storeys; i++)
         slowest = fmin(slowest, sqrt(frame->omega2[i]));
     // Of a long contact no more than acts while that lasts.
     if (impact->peak_force < impulse * slowest)
         impulse = impact->peak_force / slowest;
-    return pair->run.tolerance > 0
-               ? 0
-               : impulse * frame->damper[impact->damper - 1].thrust * pair->run.length / 2;
+    double late = h / 2;
+    // A power law's factors are the speed's, which changes while the mass is not yet seen.
+    if (frame->plan->form == CONTACT_POWER && impact->approach_speed > 0) {
+        const double changed = frame->ledger.response->peaks.velocity * frame->rate * h;
+        late = fmax(late, fmin(changed / impact->approach_speed, 1) *
+                              fmin(1 / slowest, frame->plan->duration));
+    }
+    return impulse * frame->damper[impact->damper - 1].thrust * late;
 }
 
 static double largest_jolt(const Pair *pair) {

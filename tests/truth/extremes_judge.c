@@ -139,7 +139,7 @@ static Opinion opinion_of(const Outcome *outcome, size_t storeys) {
     const Columns *series = &outcome->response.series;
     const Column *bare = columns_find(series, "displacement");
     for (size_t i = 0; i < storeys; i++) {
-        char name[32];
+        char name[48];
         snprintf(name, sizeof name, "displacement_%zu", i + 1);
         const Column *column = bare != NULL ? bare : columns_find(series, name);
         if (column == NULL)
