@@ -140,11 +140,37 @@ static void a_neighbour_that_would_be_unstable_takes_shorter_steps(void **state)
     assert_states_its_error(text);
 }
 
+// A mass that crosses its clearance many times within a step: with what speed is chance.
+static void a_speed_that_is_chance_is_told(void **state) {
+    (void)state;
+    assert_states_its_error(
+        FAST
+        "\"dampers\": [{\"mass\": 1e-6, \"clearance\": 1e-6, \"buffer\": {\"restitution\": 0.001, "
+        "\"contact_time\": 1}}], \"contact\": {\"model\": \"jankowski\"}, \"excitation\": "
+        "{\"kind\": "
+        "\"chirp\", \"amplitude\": 1000, \"start_frequency\": 1000, \"end_frequency\": 30000, "
+        "\"displacement\": 0.1}, \"duration\": 0.0025, \"sample_rate\": 200000, \"accuracy\": "
+        "{\"solver\": \"rk4\"}," END);
+}
+
+static void a_mass_without_clearance_is_taken_along_from_the_start(void **state) {
+    (void)state;
+    assert_states_its_error(
+        "{\"structure\": {\"mass\": 1, \"stiffness\": 1e4, \"damping\": 1}, \"dampers\": "
+        "[{\"mass\": "
+        "0.5, \"clearance\": 0, \"buffer\": {\"restitution\": 0.9, \"contact_time\": 0.001}}], "
+        "\"excitation\": {\"kind\": \"triangular\", \"amplitude\": 1, \"length\": 0.002}, "
+        "\"accuracy\": "
+        "{\"solver\": \"adaptive\"}, \"duration\": 0.1, \"sample_rate\": 1000," END);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(steps_as_long_as_the_bases_lines_have_a_shorter_neighbour),
         cmocka_unit_test(a_pulse_between_two_instants_is_told),
         cmocka_unit_test(a_contact_that_both_runs_see_late_is_told),
+        cmocka_unit_test(a_speed_that_is_chance_is_told),
+        cmocka_unit_test(a_mass_without_clearance_is_taken_along_from_the_start),
         cmocka_unit_test(a_late_bounce_ends_trust),
         cmocka_unit_test(a_base_that_ends_at_once_is_no_error_of_adaptive_steps),
         cmocka_unit_test(a_neighbour_that_would_be_unstable_takes_shorter_steps),
