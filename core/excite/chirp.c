@@ -82,6 +82,10 @@ static double chirp_interval(const Excitation *excitation) {
     return chirp->sweep_time / line_count(chirp);
 }
 
+static double chirp_lasts(const Excitation *excitation) {
+    return chirp_of(excitation)->sweep_time;
+}
+
 static Status chirp_make(const Excitation *excitation, const Span *span, const Watch *watch,
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
@@ -141,6 +145,8 @@ const ExcitationKind excitation_chirp = {
     .complete = chirp_complete,
     .fastest = chirp_fastest,
     .interval = chirp_interval,
+    .lasts = chirp_lasts,
+    .effort = 1.5,
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

@@ -35,6 +35,9 @@ typedef struct ExcitationKind {
     double (*fastest)(const Excitation *excitation);
     // Between the samples by which the base is known [s]. NULL: it is known in closed form.
     double (*interval)(const Excitation *excitation);
+    // Until when it has samples [s]. NULL: to the run's end.
+    double (*lasts)(const Excitation *excitation);
+    double effort; // of making one of them, in solver steps
     // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
     // `watch` says so.
     Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,

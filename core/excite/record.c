@@ -108,10 +108,17 @@ static double record_interval(const Excitation *excitation) {
     return ((const ExcitationRecord *)(const void *)excitation)->interval;
 }
 
+static double record_lasts(const Excitation *excitation) {
+    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+    return record->interval * (double)record->samples.count;
+}
+
 const ExcitationKind excitation_record = {
     .kind = {"record", "a measured base acceleration", record_fields, sizeof(ExcitationRecord)},
     .complete = record_complete,
     .interval = record_interval,
+    .lasts = record_lasts,
+    .effort = 0.05,
     .make = record_make,
     .doubt = record_doubt,
 };

@@ -310,7 +310,7 @@ Status aim_plan(const Simulation *simulation, PlanReport *report, Problem *probl
 Cost aim_cost(const Simulation *simulation) {
     Aim aim;
     Simulation view;
-    Cost cost = {0, 0};
+    Cost cost = {0};
     if (aim_make(&aim, simulation, NULL) == STATUS_OK) {
         const Way way = choose(&aim, aim.asked->target);
         if (view_make(simulation, &way, &view) == STATUS_OK) {

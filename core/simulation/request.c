@@ -168,24 +168,45 @@ static Status complete_accuracy(Simulation *simulation, Problem *problem) {
     return STATUS_OK;
 }
 
-// A scene that can be told beforehand to take too long is refused at once.
+static Status refuse_time(const Simulation *simulation, const Cost *cost,
+                          const SimulationLimits *limits, Problem *problem) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    const double most = limits->steps * SOLVER_STEP;
+    static const char told[] = "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
+    if (2 * cost->spectra > cost->steps)
+        return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
+                           ", most of it for spectra", "", most,
+                           "ask for fewer channels or less overlap");
+    if (2 * cost->base > cost->steps)
+        return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
+                           ", most of it to make the base's motion", "", most,
+                           "take fewer samples of it, or a shorter duration");
+    if (solver->cost != NULL)
+        return problem_add(problem, STATUS_INVALID, "/accuracy", told, cost->cpu_seconds, " by ",
+                           solver->kind.name, most,
+                           "take longer steps or a larger tolerance, or the solver exact");
+    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
+                            told, cost->cpu_seconds, "", "", most,
+                            cost->is_fast ? "take a shorter one; the structure or the base moves "
+                                            "many times within a sample interval"
+                                          : "take a shorter one, or fewer samples");
+}
+
+// A scene that can be told beforehand to take too much is refused at once.
 static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
                          Problem *problem) {
-    if (limits == NULL || !(limits->steps > 0))
+    if (limits == NULL)
         return STATUS_OK;
-    const double steps = simulation_cost(simulation).steps;
-    if (steps <= limits->steps)
-        return STATUS_OK;
-    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
-    if (solver->cost != NULL)
-        return problem_add(problem, STATUS_INVALID, "/accuracy",
-                           "would take about %.2g solver steps by %s, must be at most %.2g: take "
-                           "fewer of them, or the solver exact",
-                           steps, solver->kind.name, limits->steps);
-    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
-                            "would take about %.2g solver steps, must be at most %.2g: the "
-                            "structure or the base moves that fast",
-                            steps, limits->steps);
+    const Cost cost = simulation_cost(simulation);
+    if (limits->steps > 0 && !(cost.steps <= limits->steps))
+        return refuse_time(simulation, &cost, limits, problem);
+    if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))
+        return problem_add_real(problem, STATUS_INVALID, "/output/channels",
+                                (double)simulation->output.channels.count, NULL,
+                                "would take about %.3g MB of memory, at most %.4g MB are allowed: "
+                                "ask for fewer channels or samples",
+                                1e-6 * cost.bytes, 1e-6 * limits->bytes);
+    return STATUS_OK;
 }
 
 // Many channels may be more than one scene's share, though each of them has few samples.

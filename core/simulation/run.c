@@ -7,12 +7,12 @@
 #include "core/plan/keep.h"
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
+#include "core/simulation/choice.h"
 #include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/rest.h"
 #include "core/solve/solver.h"
-#include "core/solve/solvers.h"
 
 // The part nobody outside sees: how many hold it.
 typedef struct Held {
@@ -20,39 +20,15 @@ typedef struct Held {
     atomic_size_t holds;
 } Held;
 
-static const Solver *chosen_solver(const Simulation *simulation) {
-    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
-    return solver->run != NULL ? solver : &solver_exact;
-}
-
-// Every solver has these rows, "auto" too.
-static const Accuracy *common_settings(const Simulation *simulation) {
-    return (const Accuracy *)(const void *)simulation->accuracy;
-}
-
-// What the chosen solver is asked for; the settings of "auto" are not the chosen one's.
-static const Accuracy *settings(const Simulation *simulation) {
-    const Variant *accuracy = simulation->accuracy;
-    return accuracy->kind == &chosen_solver(simulation)->kind
-               ? (const Accuracy *)(const void *)accuracy
-               : NULL;
-}
-
-static double base_interval(const Simulation *simulation) {
-    const Excitation *excitation = scene_excitation(&simulation->scene);
-    const ExcitationKind *kind = excitation_kind(excitation);
-    return kind->interval == NULL ? 0 : kind->interval(excitation);
-}
-
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
-    const Solver *solver = chosen_solver(simulation);
+    const Solver *solver = choice_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
-    Status status =
-        plan_keep(*plan, &simulation->scene,
-                  accuracy_modes(common_settings(simulation), (*plan)->storeys), problem);
+    Status status = plan_keep(*plan, &simulation->scene,
+                              accuracy_modes(choice_common(simulation), (*plan)->storeys), problem);
     if (status == STATUS_OK && solver->decide != NULL)
-        status = solver->decide(settings(simulation), base_interval(simulation), *plan, problem);
+        status = solver->decide(choice_settings(simulation), choice_base_interval(simulation),
+                                *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
@@ -87,7 +63,7 @@ static Status foretell(const Simulation *simulation, Plan *plan, Problem *proble
         regime = regime_find(plan, &base);
         base_clear(&base);
     }
-    if (omissions_tell(simulation, chosen_solver(simulation), plan, is_known ? &regime : NULL,
+    if (omissions_tell(simulation, choice_solver(simulation), plan, is_known ? &regime : NULL,
                        &plan->report.decisions) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     return STATUS_OK;
@@ -252,7 +228,7 @@ static Status make_approaches(const Scene *scene, Response *response, Problem *p
 
 // By the solver, or without it where nothing moves.
 static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *problem) {
-    const Solver *solver = chosen_solver(journey->simulation);
+    const Solver *solver = choice_solver(journey->simulation);
     Outcome *outcome = journey->outcome;
     run->is_clear = regime->is_clear;
     if (regime->is_at_rest)
@@ -285,11 +261,12 @@ static Status travel(Journey *journey, Problem *problem) {
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
-               .accuracy = settings(simulation),
+               .accuracy = choice_settings(simulation),
                .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
                .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
-               .steps_most = journey->limits == NULL ? 0 : journey->limits->steps};
+               .steps_most =
+                   journey->limits == NULL ? 0 : SIMULATION_PATIENCE * journey->limits->steps};
     journey->wanted =
         calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,
                sizeof *journey->wanted);
@@ -310,7 +287,7 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(make_spectrum(journey, problem));
     outcome->work.spectrum_segments =
         outcome->spectrum.segments * outcome->spectrum.densities.count;
-    if (omissions_tell(simulation, chosen_solver(simulation), journey->plan, &regime,
+    if (omissions_tell(simulation, choice_solver(simulation), journey->plan, &regime,
                        &journey->plan->report.decisions) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     outcome->plan = journey->plan->report;
@@ -369,95 +346,4 @@ size_t outcome_bytes(const Outcome *outcome) {
            sizeof(double) *
                (series->count * series->rows + (densities->count + 1) * densities->rows) +
            outcome->response.impacts.count * sizeof(Impact);
-}
-
-// Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
-// shows that the stops are out of reach, and coupled modes have no closed form for a whole
-// interval.
-static double flight_arcs(const Scene *scene, double fastest) {
-    const Excitation *excitation = scene_excitation(scene);
-    double rate = fastest;
-    if (excitation_kind(excitation)->fastest != NULL)
-        rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    const Structure *structure = scene_structure(scene);
-    const bool is_by_arcs = scene->dampers.count > 0 ||
-                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
-    return is_by_arcs && rate > scene->sample_rate ? rate * scene->duration : 0;
-}
-
-// A frame's sample is a step for each mode and each damper, or a product with a matrix where
-// damping couples the modes; and finding the modes comes before.
-static double steps_a_sample(const Simulation *simulation, double *planning) {
-    const Scene *scene = &simulation->scene;
-    const Structure *structure = scene_structure(scene);
-    const double storeys = (double)structure_storeys(structure);
-    *planning = 0;
-    if (storeys == 1 && scene->dampers.count <= 1)
-        return 1;
-    *planning = 2 * storeys * storeys * storeys;
-    const double modes =
-        (double)accuracy_modes(common_settings(simulation), structure_storeys(structure));
-    const bool may_couple = modes > 1 && isnan(structure->damping_ratio);
-    return (double)(1 + scene->dampers.count) * modes + (may_couple ? modes * modes / 4 : 0);
-}
-
-// Contacts under a power law: at a guess seven a second, each of some 1000 steps' worth and of more
-// for each digit of its tolerance, for each mode.
-static double power_steps(const Simulation *simulation) {
-    const Scene *scene = &simulation->scene;
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    const double storeys = (double)structure_storeys(scene_structure(scene));
-    const double digits = -log10(exact_tolerance(settings(simulation)));
-    return law->form == CONTACT_POWER ? 7 * (1000 + 400 * digits * (0.5 + storeys / 2)) *
-                                            scene->duration * (double)scene->dampers.count
-                                      : 0;
-}
-
-// Steps of the exact solver.
-static double exact_steps(const Simulation *simulation) {
-    const double samples = (double)scene_sample_count(&simulation->scene);
-    const bool has_damper = simulation->scene.dampers.count > 0;
-    // Flight takes a step a sample; impacts, at a guess one per 150 samples, some ten arcs each.
-    StructureRates rates;
-    const Structure *structure = scene_structure(&simulation->scene);
-    const size_t modes = accuracy_modes(common_settings(simulation), structure_storeys(structure));
-    if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
-        rates.fastest = 0; // a guess without memory: the run will tell
-    double planning, step = steps_a_sample(simulation, &planning);
-    return planning +
-           step *
-               (samples * (has_damper ? 1.1 : 1) + flight_arcs(&simulation->scene, rates.fastest)) +
-           power_steps(simulation);
-}
-
-// Steps of a solver that knows its own cost.
-static double own_steps(const Simulation *simulation) {
-    const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
-    Plan *plan;
-    if (plan_sketch(&simulation->scene,
-                    accuracy_modes(common_settings(simulation), (size_t)storeys),
-                    &plan) != STATUS_OK)
-        return 0; // the run will tell why
-    const double steps =
-        chosen_solver(simulation)->cost(settings(simulation), base_interval(simulation), plan);
-    plan_free(plan);
-    return steps + (storeys > 1 ? 2 * storeys * storeys * storeys : 0);
-}
-
-Cost simulation_cost(const Simulation *simulation) {
-    if (aim_is_asked(simulation))
-        return aim_cost(simulation);
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double samples = (double)scene_sample_count(&simulation->scene);
-    double steps =
-        chosen_solver(simulation)->cost != NULL ? own_steps(simulation) : exact_steps(simulation);
-    // A value written costs about a tenth of a step.
-    steps += samples * (double)simulation->output.channels.count / 10;
-    // A transformed sample costs about a third of a step, and overlap transforms it several times.
-    if (psd->channels.count > 0 && psd->segment > psd->overlap)
-        steps += samples * (double)psd->channels.count * (double)psd->segment /
-                 (double)(psd->segment - psd->overlap) / 3;
-    return (Cost){.steps = steps,
-                  .bytes = sizeof(Outcome) +
-                           samples * (double)simulation->output.channels.count * sizeof(double)};
 }

@@ -9,6 +9,7 @@
 #include "core/result/spectrum.h"
 #include "core/result/work.h"
 #include "core/scene/scene.h"
+#include "core/solve/solver.h"
 #include "core/solve/workspace.h"
 
 // The engine's name and version; part of every result's id. Changes whenever any bit of any result
@@ -46,8 +47,17 @@ extern const Field simulation_fields[];
 typedef struct SimulationLimits {
     size_t samples; // per channel; 0: none
     size_t impacts; // ledger rows; 0: none
-    double steps;   // solver steps of a run; 0: none
+    // Solver steps that a run may be foretold to take; it is refused beyond, and stopped at
+    // SIMULATION_PATIENCE times as many where it was foretold too little. 0: none.
+    double steps;
+    double bytes; // of memory that a run may be foretold to take; 0: none
 } SimulationLimits;
+
+#define SIMULATION_PATIENCE 3
+
+// What callers allow a run unless they are told otherwise.
+#define SIMULATION_CPU_SECONDS 60
+#define SIMULATION_BYTES 4e9
 
 void simulation_clear(
     Simulation *simulation); // fields_clear by another name; defaults by fields_default
@@ -96,8 +106,12 @@ size_t outcome_bytes(const Outcome *outcome); // of memory, for caches
 
 // Expected cost of a completed simulation, before running it.
 typedef struct Cost {
-    double steps; // solver steps
-    double bytes; // of the outcome in memory
+    double steps;       // solver steps
+    double cpu_seconds; // the same as time [s]
+    double bytes;       // of memory while it runs
+    double spectra;     // steps of these, for spectra
+    double base;        // and for making the base's motion
+    bool is_fast;       // most of the rest is for motion within sample intervals
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
 

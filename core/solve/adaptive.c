@@ -13,6 +13,8 @@
 #include "core/solve/steps_run.h"
 
 enum { STILL_MOST = 1000 };
+static const double POISED = 1e-4; // of a step
+static const double JUMP = 1e-9;   // of a_g, from the end of a step to the start of the next
 
 static FrameEvent event_of(const Frame *frame, size_t d, int which) {
     const FrameDamper *damper = &frame->damper[d];
@@ -88,10 +90,43 @@ static Status happen(Frame *frame, const FrameEvent *event) {
     return ledger_status(&frame->ledger, frame->problem);
 }
 
+enum { RATES = 13 };              // of an ordinary step
+static const double ADVANCE = 10; // solver steps of an advance beside its rates
+
 static double adaptive_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
     const double n = (double)modes, m = (double)dampers;
     *making = 0;
     return 100 + 3 * n * (1 + m) + (is_coupled ? 0.1 * n * n : 0);
+}
+
+// What has been done since the last time, which many roots may have made much of.
+static double take_cost(Adaptive *own) {
+    const Frame *frame = &own->steps->frame;
+    double making;
+    const double usual =
+        adaptive_cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making);
+    const double cost = ADVANCE + *own->rated * (usual - ADVANCE) / RATES;
+    *own->rated = 0;
+    return cost;
+}
+
+static Status happen_apart(Adaptive *own, const FrameEvent *event) {
+    TRY(steps_note(own->steps, take_cost(own)));
+    return happen(&own->steps->frame, event);
+}
+
+// A mass at rest between stops without clearance is beyond one as soon as anything moves, which is
+// no root: only the step's end shows it.
+static bool is_poised(const Adaptive *own) {
+    const Frame *frame = &own->steps->frame;
+    const bool is_still = own->slice.value == 0 && own->slice.slope == 0 && frame_size(frame) == 0;
+    for (size_t d = 0; d < frame->dampers && !is_still; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        if (damper->phase == FRAME_FLIGHT && damper->plan->clearance == 0 && damper->r == 0 &&
+            damper->w == 0)
+            return true;
+    }
+    return false;
 }
 
 // One step, at most `length` long, and the event at its end.
@@ -99,20 +134,26 @@ static Status advance(Adaptive *own, double length) {
     Steps *steps = own->steps;
     Frame *frame = &steps->frame;
     FrameEvent event;
-    double making, to;
+    double to;
     int root;
+    const double before_jump = frame->ground;
     const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &own->slice);
     frame->ground = own->slice.value;
+    // Where a base ends at once the motion begins anew: the integrator still holds the rate before.
+    if (fabs(frame->ground - before_jump) > JUMP * (fabs(frame->ground) + fabs(before_jump)))
+        own->events = SIZE_MAX;
     if (own->events != frame->events) {
         frame_feel(frame);
         if (find_beyond(frame, false, &event))
-            return happen(frame, &event);
+            return happen_apart(own, &event);
         TRY(adaptive_motion_start(own));
     }
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
     frame->run->work.stop_searches += frame->has_stops;
+    if (is_poised(own))
+        length *= POISED;
     TRY(ode_step(own->ode, from + length, &to, own->y, &root, frame->problem));
     const double taken = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     own->at = to;
@@ -121,8 +162,7 @@ static Status advance(Adaptive *own, double length) {
     frame->ground = slice_at(&own->slice, taken);
     if (taken > frame_clock(frame))
         frame->still_events = 0;
-    TRY(steps_note(
-        steps, adaptive_cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making)));
+    TRY(steps_note(steps, take_cost(own)));
     if (root != ODE_NO_ROOT) {
         const size_t d = (size_t)root / ADAPTIVE_WATCHED;
         const bool is_peak = root % ADAPTIVE_WATCHED == ADAPTIVE_PEAK;
@@ -208,7 +248,7 @@ static double cost(const Accuracy *accuracy, double base_interval, const Plan *p
     if (base_interval > 0)
         steps = fmax(steps, 1 / base_interval);
     steps = fmax(steps, each / steps_mode_time(plan)) +
-            7 * 10 * each * sqrt((double)plan->damper_count);
+            7 * 25 * each * sqrt((double)plan->damper_count);
     const double one =
         adaptive_cost(plan_mode_count(plan), plan->damper_count, steps_may_couple(plan), &making);
     return 3 * one * steps * plan->duration; // the neighbour takes twice as many

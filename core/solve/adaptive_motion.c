@@ -55,6 +55,7 @@ static void rate(const void *context, double t, const double *y, double *out) {
     double *impulse = out + at_impulse(frame), *total = out + at_totals(frame);
     const double ground = slice_at(&own->slice, t - own->at);
     feel(own, y, ground);
+    ++*own->rated;
     steps_rate(own->steps, y, ground, own->force, out);
     double momentum = frame_dot(frame->carry, p, n), loss = 0;
     for (size_t i = 0; i < n; i++)
@@ -215,7 +216,7 @@ Status adaptive_motion_make(Adaptive *own, Steps *steps) {
     own->steps = steps;
     own->size = at_totals(frame) + TOTALS;
     own->events = SIZE_MAX;
-    own->block = calloc(4 * own->size + 2 * m, sizeof *own->block);
+    own->block = calloc(4 * own->size + 2 * m + 1, sizeof *own->block);
     const OdeSystem system = {.context = own,
                               .size = own->size,
                               .roots = frame->has_stops ? ADAPTIVE_WATCHED * m : 0,
@@ -232,6 +233,7 @@ Status adaptive_motion_make(Adaptive *own, Steps *steps) {
     own->rates = own->scale + own->size;
     own->force = own->rates + own->size;
     own->strain = own->force + m;
+    own->rated = own->strain + m;
     return STATUS_OK;
 }
 

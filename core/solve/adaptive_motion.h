@@ -16,6 +16,7 @@ typedef struct Adaptive {
     size_t size; // of y
     double *y, *before, *scale, *rates, *force;
     double *strain; // of the dampers' buffers, at the last step [J]
+    double *rated;  // how often the motion's rate was asked for since it was last counted
     double *block;
     double speed;  // sqrt(p'p + q'W^2 q) at most, so far
     Slice slice;   // of the base

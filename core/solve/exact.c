@@ -28,6 +28,9 @@
 
 enum { WATCH_ARCS = 8192, STILL_EVENTS = 1000, HOLD_AFTER = 48 };
 
+// Solver steps of an arc and of each order of it, of an event, and of a long step of contact.
+static const double ARC_STEPS = 4, ARC_ORDER_STEPS = 0.7, EVENT_STEPS = 8, HOLD_STEPS = 6;
+
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
     ledger_work(&exact->ledger,
@@ -73,9 +76,9 @@ static Status keep_going(Exact *exact) {
                            "the motion left what double precision can hold at t = %.6g s",
                            exact_time(exact));
     if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
-        return problem_set(exact->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
-                           exact->run->steps_most, exact_time(exact), exact->plan->duration);
+        return problem_set(exact->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           exact->run->steps_most, exact->run->steps_most * SOLVER_STEP,
+                           exact_time(exact), exact->plan->duration);
     if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
         return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            exact_time(exact));
@@ -114,14 +117,16 @@ static Status advance(Exact *exact, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
-    exact->run->steps++;
     exact->run->work.arcs++;
-    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER &&
-        hold(exact, &slice, length))
-        return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+    if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER) {
+        exact->run->steps += HOLD_STEPS;
+        if (hold(exact, &slice, length))
+            return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
+    }
     length = fmin(length, 1 / fmax(system->rate, slice.omega));
     Arc arc;
     arc_make(&arc, system, &exact->state, &slice, length);
+    exact->run->steps += ARC_STEPS + ARC_ORDER_STEPS * (double)arc.degree;
     double s;
     Side side;
     const bool is_event = exact_find_event(exact, &arc, &s, &side);
@@ -140,6 +145,7 @@ static Status advance(Exact *exact, double length) {
     }
     if (is_event) {
         exact->events++;
+        exact->run->steps += EVENT_STEPS;
         if (++exact->still_events > STILL_EVENTS)
             return problem_set(exact->problem, STATUS_UNSTABLE,
                                "more than %d contact events at one instant, t = %.17g s",

@@ -288,7 +288,7 @@ INLINE void enter(Press *press, const Tally *tally, size_t count, bool is_counte
     peaks->acceleration = ledger_larger(peaks->acceleration, most_of(tally->acceleration));
     peaks->damper_displacement = ledger_larger(peaks->damper_displacement, most_of(tally->z));
     ledger_force(&exact->ledger, &exact->row, most_of(tally->force));
-    exact->run->steps += (double)count;
+    exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
     if (is_counted)
         recorder_sums(&exact->recorder, count, sum_of(&tally->xx), sum_of(&tally->aa));
 }

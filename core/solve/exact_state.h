@@ -18,6 +18,10 @@
 #include "core/solve/solver.h"
 #include "core/solve/trust.h"
 
+// Solver steps of a sample among many, and of a stretch to or of a contact in closed form.
+#define EXACT_SAMPLE_STEPS 0.1
+#define EXACT_HOP_STEPS 5
+
 typedef enum Phase { FLIGHT, CONTACT, RESTING } Phase;
 typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN_MIDDLE } Origin;
 

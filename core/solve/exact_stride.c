@@ -136,7 +136,7 @@ static size_t fly(Exact *exact, size_t most) {
     peaks->displacement = ledger_larger(peaks->displacement, lanes_take_peak(s, OF_DISPLACEMENT));
     exact->pending += count;
     exact->sample += count;
-    exact->run->steps += (double)count;
+    exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
     exact_count_flight(exact, count);
     exact->recorder.last_velocity = s->v;
     if (exact->pending >= PENDING_MOST)
@@ -153,7 +153,7 @@ INLINE void take_hop(Exact *exact, const Hop *hop, double s) {
                 plan->damping[0] * integrals.vv);
     recorder_base(&exact->recorder, integrals.a);
     hop_at(hop, s, &exact->state);
-    exact->run->steps++;
+    exact->run->steps += EXACT_HOP_STEPS;
 }
 
 // What r'' can come to in flight over the rest of an interval.

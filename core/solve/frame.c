@@ -19,7 +19,8 @@ static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (frame->sample < until)
             TRY(frame_engine_step(engine, until));
-        frame_neighbour_step(neighbour, frame);
+        if (!frame_neighbour_step(neighbour, frame))
+            TRY(frame_engine_check(engine)); // it may have been told to stop
     }
     frame_neighbour_tell(neighbour, frame, frame->ledger.response);
     // The duration may end between samples.
@@ -35,7 +36,8 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (neighbour == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
-    Status status = frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
+    Status status =
+        frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
         status = solve(&engine, neighbour);
     if (engine.record.block != NULL)

@@ -9,21 +9,17 @@
 #include <math.h>
 #include <string.h>
 
-enum {
-    STILL_EVENTS = 1000,
-    STORM_EVENTS = 100,
-    IDLE_STEPS = 1000,
-    FLIGHT_WORK = 8,
-    PRESS_WORK = 64,
-    WORK_OF_STEP = 20 // multiplications
-};
+#include "core/solve/frame_work.h"
+
+enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
 
 static const double GAIN_CONTACTS = 1e3;
 
-static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
+static const double WATCH_STEPS = 3e4; // between looks at the watch
+static const double WORK_OF_STEP = 60; // multiplications
 
 Status frame_engine_check(FrameEngine *engine) {
     const Frame *frame = &engine->frame;
@@ -39,24 +35,24 @@ Status frame_engine_check(FrameEngine *engine) {
                            "the motion left what double precision can hold at t = %.6g s",
                            frame_time(frame));
     if (frame->run->steps_most > 0 && frame->run->steps > frame->run->steps_most)
-        return problem_set(frame->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s",
-                           frame->run->steps_most, frame_time(frame), frame->plan->duration);
+        return problem_set(frame->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           frame->run->steps_most, frame->run->steps_most * SOLVER_STEP,
+                           frame_time(frame), frame->plan->duration);
     if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));
     return STATUS_OK;
 }
 
-// Counts steps of about `each` multiplications per mode. In steps of the single engine it is one
-// for each mode and damper, as simulation_cost foresees.
-static Status count_steps(FrameEngine *engine, double count, double each) {
+static double each(const FrameEngine *engine, FrameWorkKind kind) {
     const Frame *frame = &engine->frame;
-    const double n = (double)frame->mode_count, m = (double)frame->dampers;
-    const double pairs = frame->diagonal != NULL ? 0 : n * n;
-    frame->run->steps += count * (n * (1 + m) + pairs / 4);
-    engine->work += count * each * (n * (1 + m) + pairs);
-    return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
+    return frame_work_steps(kind, frame->mode_count, frame->dampers, frame->diagonal == NULL);
+}
+
+static Status count_steps(FrameEngine *engine, double steps) {
+    engine->frame.run->steps += steps;
+    engine->work += steps;
+    return engine->work > WATCH_STEPS ? frame_engine_check(engine) : STATUS_OK;
 }
 
 static void take_work(FrameEngine *engine, const FrameWork *work) {
@@ -156,9 +152,7 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     else
         frame_record_note(frame);
     frame->run->work.steps++;
-    frame->run->steps += step.work / WORK_OF_STEP;
-    engine->work += step.work;
-    return engine->work > WATCH_WORK ? frame_engine_check(engine) : STATUS_OK;
+    return count_steps(engine, step.work / WORK_OF_STEP);
 }
 
 // A long step of contact. False: it must go by arcs.
@@ -202,7 +196,7 @@ static Status advance(FrameEngine *engine, double length) {
     if (frame_ode_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
     if (hold(engine, &slice, fmin(length, knot)))
-        return count_steps(engine, 1, PRESS_WORK);
+        return count_steps(engine, each(engine, FRAME_WORK_HOLD));
     const bool stays = is_stalled(frame);
     const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
     frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
@@ -216,7 +210,8 @@ static Status advance(FrameEngine *engine, double length) {
         pass(engine, is_event ? &event : NULL);
     if (is_event)
         TRY(happen(frame, &event));
-    return count_steps(engine, 1, 2 * (double)arc->degree);
+    return count_steps(engine, each(engine, FRAME_WORK_ARC) +
+                                   (is_event ? each(engine, FRAME_WORK_EVENT) : 0));
 }
 
 Status frame_engine_cross(FrameEngine *engine, double length) {
@@ -342,7 +337,7 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
     const size_t flown = fly(engine, until);
     if (flown > 0) {
-        TRY(count_steps(engine, (double)flown, FLIGHT_WORK));
+        TRY(count_steps(engine, (double)flown * each(engine, FRAME_WORK_FLIGHT)));
     } else {
         TRY(frame_engine_cross(engine, frame->interval));
         frame->run->work.mode_samples += frame->mode_count;

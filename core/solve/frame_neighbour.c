@@ -63,22 +63,22 @@ static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before
     neighbour->is_spent = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
 }
 
-void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
+bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     if (neighbour->is_spent)
-        return;
+        return true;
+    neighbour->run.steps = frame->run->steps;
     Frame *own = &neighbour->engine.frame;
     const size_t from = own->sample;
-    const double steps = neighbour->run.steps;
     nudge(own);
     while (own->sample < frame->sample && neighbour->is_known)
         neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
     frame->run->work.neighbour_samples += own->sample - from;
-    if (frame->plan->form == CONTACT_POWER)
-        frame->run->steps += neighbour->run.steps - steps;
+    frame->run->steps = neighbour->run.steps;
     if (neighbour->is_known)
         compare(neighbour, frame, from);
     else
         neighbour->is_spent = true;
+    return neighbour->is_known;
 }
 
 void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
@@ -88,8 +88,10 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     neighbour->is_known = neighbour->is_spent = true;
     if (!frame->has_stops)
         return;
-    neighbour->run =
-        (Run){.plan = frame->plan, .base = frame->run->base, .steps_most = frame->run->steps_most};
+    neighbour->run = (Run){.plan = frame->plan,
+                           .base = frame->run->base,
+                           .watch = frame->run->watch,
+                           .steps_most = frame->run->steps_most};
     neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;
     neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
@@ -126,7 +128,8 @@ void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, R
     response->has_trust = neighbour->is_known;
     response->is_stepped = neighbour->is_stepped;
     response->error_estimate = error < (neighbour->is_stepped ? 1 : PARTED) ? error : 1;
-    response->trust_horizon = neighbour->horizon;
+    // One that is told all the same was found before the displacement had grown.
+    response->trust_horizon = error <= RESPONSE_PARTING ? (double)NAN : neighbour->horizon;
 }
 
 void frame_neighbour_clear(FrameNeighbour *neighbour) {

@@ -27,8 +27,9 @@ typedef struct FrameNeighbour {
 void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine);
 void frame_neighbour_clear(FrameNeighbour *neighbour);
 
-// Follows the run to the sample it has just reached, NEIGHBOUR_SAMPLES on or fewer.
-void frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame);
+// Follows the run to the sample it has just reached, NEIGHBOUR_SAMPLES on or fewer; its steps are
+// the run's. False: it has failed just now, perhaps because it was told to stop.
+bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame);
 
 // Error estimate and horizon, into the response.
 void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, Response *response);

@@ -37,6 +37,14 @@ typedef struct RunColumn {
     double *values; // plan->count of them
 } RunColumn;
 
+// Work is foretold and counted in solver steps, whatever the solver: each stands for about this
+// much CPU time on a middling machine [s].
+#define SOLVER_STEP 3e-8
+
+// What is said of a run that takes more than was foretold: steps, the same in seconds, and when.
+#define SOLVER_STOPPED                                                                             \
+    "more than %.3g solver steps, about %.3g s of CPU, far more than foretold; stopped at "
+
 // One run: borrowed inputs, and where samples go.
 typedef struct Run {
     const Plan *plan;
@@ -50,7 +58,7 @@ typedef struct Run {
     size_t impacts_most;    // ledger rows; 0: no limit
     double steps_most;      // solver steps; 0: no limit
     bool is_clear;          // no mass comes to a stop: none has to be searched for
-    double steps;           // out: work counted, in solver steps
+    double steps;           // out: work counted, in solver steps of SOLVER_STEP
     Work work;              // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
@@ -62,7 +70,7 @@ typedef struct Solver {
     // report; `base_interval` is that of a base known by samples, else 0 [s]. NULL: nothing to
     // decide.
     Status (*decide)(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
-    // What a run costs, in steps of the single engine. NULL: as the exact solver's.
+    // What a run costs, in solver steps. NULL: as the exact solver's.
     double (*cost)(const Accuracy *accuracy, double base_interval, const Plan *plan);
     // Erases the settings that a scene without a power law has no use for. NULL: there are none.
     void (*forget_unused)(Accuracy *accuracy, bool has_power_law);

@@ -13,6 +13,7 @@ static const double WATCH_WORK = 1e6; // multiplications, about, between looks a
 
 // Energy that neither start nor base gave, over what they did: no error of a sound run.
 static const double GROWN = 1e6;
+static const double POWER_STEPS = 8;
 
 void steps_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
     const size_t n = frame->mode_count;
@@ -139,6 +140,36 @@ static void read_base(Steps *steps, double length) {
     }
 }
 
+// What the base gains in speed over a step, piece by piece.
+static double base_gain(const Frame *frame, double length) {
+    double gain = 0, done = 0;
+    while (length - done > 1e-12 * length) {
+        Slice slice;
+        const double knot =
+            base_cursor_slice(&frame->base, frame->sample, frame->offset + done, &slice);
+        const double h = fmin(knot, length - done), turn = slice.omega * h;
+        gain += slice.omega > 0
+                    ? (slice.value * sin(turn) + slice.slope * (1 - cos(turn))) / slice.omega
+                    : (slice.value + slice.slope * h / 2) * h;
+        done += h;
+    }
+    return gain;
+}
+
+// A pulse shorter than a step may lie between all instants at which steps look at the base, those
+// of a neighbour too.
+static void look_for_unseen(Steps *steps, double length, double seen) {
+    const Frame *frame = &steps->frame;
+    Slice slice;
+    if (frame->base.base->form != BASE_PIECES ||
+        !(base_cursor_slice(&frame->base, frame->sample, frame->offset, &slice) < length))
+        return;
+    if (steps->most_unseen == 0)
+        steps->unseen_since = frame_time(frame);
+    steps->unseen += base_gain(frame, length) - seen;
+    steps->most_unseen = fmax(steps->most_unseen, fabs(steps->unseen));
+}
+
 static Status unstable(const Steps *steps) {
     const Frame *frame = &steps->frame;
     return problem_set(frame->problem, STATUS_UNSTABLE,
@@ -154,10 +185,9 @@ Status steps_check(Steps *steps) {
     steps->watched = 0;
     if (run->steps_most > 0 && run->steps > run->steps_most)
         return problem_set(frame->problem, STATUS_LIMIT,
-                           "more than %.0f solver steps; stopped at t = %.6g s of %.6g s, by steps "
-                           "of %.4g s",
-                           run->steps_most, frame_time(frame), frame->plan->duration,
-                           steps->length);
+                           SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
+                           run->steps_most, run->steps_most * SOLVER_STEP, frame_time(frame),
+                           frame->plan->duration, steps->length);
     if (!watch_advance(run->watch, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));
@@ -209,6 +239,15 @@ static void scatter(Frame *frame, const double *y) {
     }
 }
 
+// Forces under a power law take several powers a step.
+static double contact_cost(const Steps *steps) {
+    const Frame *frame = &steps->frame;
+    size_t touching = 0;
+    for (size_t d = 0; d < frame->dampers && frame->plan->form == CONTACT_POWER; d++)
+        touching += frame->damper[d].phase == FRAME_CONTACT;
+    return POWER_STEPS * (double)touching;
+}
+
 // `offset`: of the step's end.
 static Status step(Steps *steps, double length, double offset) {
     Frame *frame = &steps->frame;
@@ -225,18 +264,19 @@ static Status step(Steps *steps, double length, double offset) {
         steps->before[d] = frame->damper[d].phase == FRAME_CONTACT
                                ? steps_contact(frame, d, frame->damper[d].r, 0).strain
                                : 0;
+    const double gain = length / 6 * (steps->ground[0] + 4 * steps->ground[1] + steps->ground[2]);
+    look_for_unseen(steps, length, gain);
     TRY(steps->stepper->step(steps, length));
     scatter(frame, steps->y);
     frame->offset = offset;
     frame->ground = steps->ground[2];
     ledger_work(&frame->ledger, sums->input, sums->damping);
-    steps->record.base_speed +=
-        length / 6 * (steps->ground[0] + 4 * steps->ground[1] + steps->ground[2]);
+    steps->record.base_speed += gain;
     if (frame->has_stops) {
         frame->run->work.stop_searches++;
         steps_turn(steps, length);
     }
-    return steps_note(steps, cost);
+    return steps_note(steps, cost + contact_cost(steps));
 }
 
 void steps_take_sample(Steps *steps) {

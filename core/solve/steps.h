@@ -51,6 +51,9 @@ struct Steps {
     size_t size;      // of y
     double *y;        // the state: q, p, r, w
     double ground[3]; // a_g at the step's start, in its middle and at its end [m/s^2]
+    // Of the base's speed what the steps have not seen of a pulse that begins or ends within one:
+    // now, and the most so far [m/s]; and since when [s].
+    double unseen, most_unseen, unseen_since;
     StepSums sums;
     double *force;     // scratch: N of the dampers [N]
     double *elastic;   // scratch

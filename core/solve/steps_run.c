@@ -136,9 +136,10 @@ double steps_cost(const Accuracy *accuracy, const Stepper *stepper, double base_
     double making;
     const double each =
         stepper->cost(plan_mode_count(plan), plan->damper_count, steps_may_couple(plan), &making);
-    const double steps =
-        choose(plan, accuracy, base_interval).share * plan->duration * plan->sample_rate;
-    return 1.5 * each * steps + 2 * making; // the neighbour takes half as many
+    const Choice choice = choose(plan, accuracy, base_interval);
+    const double steps = choice.share * plan->duration * plan->sample_rate;
+    const double beside = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5; // neighbour's
+    return (1 + beside) * each * steps + 2 * making;
 }
 
 // The run, and beside it one whose error is known to be another.
@@ -165,7 +166,7 @@ static double part_of(const Pair *pair) {
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
     if (pair->run.tolerance > 0)
         return 2;
-    return is_touched ? CHANCE : 1 / (pow(pair->longer, pair->run.stepper->order) - 1);
+    return is_touched ? CHANCE : 1 / fabs(pow(pair->longer, pair->run.stepper->order) - 1);
 }
 
 static void compare(Pair *pair) {
@@ -206,49 +207,137 @@ static Status follow(Pair *pair) {
     return steps_check(&pair->run); // it may have been told to stop
 }
 
+// So many samples in one interval of the neighbour, and so many steps in that.
+static void set_pace(Pair *pair, size_t stride, size_t share) {
+    const Plan *plan = pair->run.frame.plan;
+    pair->stride = stride;
+    pair->longer = (double)(pair->run.share * stride) / (double)share;
+    pair->plan = *plan;
+    pair->plan.sample_rate /= (double)stride;
+    pair->plan.count = (plan->count - 1) / stride + 1;
+}
+
 static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double tolerance) {
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
     const size_t own = pair->run.share / kinks;
-    const size_t share = tolerance > 0 ? 2 : kinks * (own > 2 ? own / 2 + 1 : 1);
+    const size_t share = tolerance > 0 ? 2
+                         : own > 1     ? kinks * (own > 2 ? own / 2 + 1 : 1)
+                         : kinks > 1   ? 2 * kinks // none is longer: a shorter one
+                                       : 1;
     pair->horizon = NAN;
-    pair->stride = pair->run.share > 1 || tolerance > 0 ? 1 : 2;
-    pair->longer = (double)(pair->run.share * pair->stride) / (double)share;
-    pair->plan = *frame->plan;
-    pair->plan.sample_rate /= (double)pair->stride;
-    pair->plan.count = (pair->plan.count - 1) / pair->stride + 1;
-    pair->near_run =
-        (Run){.plan = &pair->plan, .base = frame->run->base, .is_clear = frame->run->is_clear};
+    set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
+    pair->near_run = (Run){.plan = &pair->plan,
+                           .base = frame->run->base,
+                           .watch = frame->run->watch,
+                           .steps_most = frame->run->steps_most,
+                           .is_clear = frame->run->is_clear};
     pair->near_response.is_unlisted = true;
     pair->apart = malloc(frame->mode_count * sizeof *pair->apart);
-    pair->is_known = pair->apart != NULL &&
-                     steps_make(&pair->near, stepper, &pair->near_run, share,
-                                fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0), true,
-                                &pair->near_response, NULL) == STATUS_OK;
+    const double finer = fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0);
+    Status status = pair->apart == NULL ? STATUS_NO_MEMORY
+                                        : steps_make(&pair->near, stepper, &pair->near_run, share,
+                                                     finer, true, &pair->near_response, NULL);
+    if (status == STATUS_UNSTABLE && share < pair->run.share * pair->stride) {
+        // Longer steps are unstable where the run's are not: shorter ones then.
+        steps_clear(&pair->near);
+        response_clear(&pair->near_response);
+        set_pace(pair, 1, 2 * pair->run.share);
+        status = steps_make(&pair->near, stepper, &pair->near_run, 2 * pair->run.share, finer, true,
+                            &pair->near_response, NULL);
+    }
+    pair->is_known = status == STATUS_OK;
     pair->is_spent = !pair->is_known;
 }
 
 // What one contact a step late moves a storey by, within the time that its speed turns in [m]: both
 // runs may be as late by chance.
+static double jolt_of(const Pair *pair, const Impact *impact) {
+    const Frame *frame = &pair->run.frame;
+    const double h = pair->run.length;
+    double slowest = INFINITY, impulse = fabs(impact->impulse);
+    if (pair->run.tolerance > 0)
+        return 0;
+    for (size_t i = 0; i < frame->mode_count; i++)
+        slowest = fmin(slowest, sqrt(frame->omega2[i]));
+    // Of a long contact no more than acts while that lasts.
+    if (impact->peak_force < impulse * slowest)
+        impulse = impact->peak_force / slowest;
+    double late = h / 2;
+    // A power law's factors are the speed's, which changes while the mass is not yet seen.
+    if (frame->plan->form == CONTACT_POWER && impact->approach_speed > 0) {
+        const double changed = frame->ledger.response->peaks.velocity * frame->rate * h;
+        late = fmax(late, fmin(changed / impact->approach_speed, 1) *
+                              fmin(1 / slowest, frame->plan->duration));
+    }
+    return impulse * frame->damper[impact->damper - 1].thrust * late;
+}
+
 static double largest_jolt(const Pair *pair) {
     const Frame *frame = &pair->run.frame;
+    const Impacts *impacts = &frame->ledger.response->impacts;
     double most = 0;
+    // Where no rows are kept, the largest impulse is.
+    for (size_t d = 0; d < frame->dampers && frame->ledger.response->is_unlisted; d++) {
+        const Impact largest = {
+            .damper = d + 1, .impulse = frame->ledger.impulse[d], .peak_force = (double)NAN};
+        most = fmax(most, jolt_of(pair, &largest));
+    }
+    for (size_t i = 0; i < impacts->count; i++)
+        most = fmax(most, jolt_of(pair, &impacts->at[i]));
     for (size_t d = 0; d < frame->dampers; d++)
-        most = fmax(most, frame->ledger.impulse[d] * frame->damper[d].thrust);
-    return pair->run.tolerance > 0 ? 0 : most * pair->run.length / 2;
+        if (frame->damper[d].row.is_open)
+            most = fmax(most, jolt_of(pair, &frame->damper[d].row.impact));
+    return most;
+}
+
+// When the first contact began that may have moved a storey by more than `most` [s]; INFINITY:
+// none.
+static double first_jolt(const Pair *pair, double most) {
+    const Frame *frame = &pair->run.frame;
+    const Impacts *impacts = &frame->ledger.response->impacts;
+    double first = frame->ledger.response->is_unlisted ? 0 : INFINITY;
+    for (size_t i = 0; i < impacts->count; i++)
+        if (jolt_of(pair, &impacts->at[i]) > most)
+            first = fmin(first, impacts->at[i].start);
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const LedgerRow *row = &frame->damper[d].row;
+        if (row->is_open && jolt_of(pair, &row->impact) > most)
+            first = fmin(first, row->impact.start);
+    }
+    return first;
+}
+
+// What a storey moves by at most that the steps did not see of the base [m].
+static double largest_unseen(const Pair *pair) {
+    const Frame *frame = &pair->run.frame;
+    double most = 0;
+    for (size_t i = 0; i < frame->mode_count && pair->run.most_unseen > 0; i++)
+        most += frame->widest[i] * fabs(frame->modes->participation[i]) *
+                fmin(1 / sqrt(frame->omega2[i]), frame->plan->duration);
+    return most * pair->run.most_unseen;
 }
 
 static void tell(const Pair *pair, Response *response) {
-    const double size = fmax(pair->largest, response->peaks.displacement);
+    const double unseen = largest_unseen(pair);
+    const double size = fmax(fmax(pair->largest, response->peaks.displacement), unseen);
     const Ledger *ledger = &pair->run.frame.ledger;
     const double balance =
         ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
     const double error =
-        size > 0 ? fmax(part_of(pair) * pair->worst, largest_jolt(pair)) / size : 0;
+        size > 0 ? fmax(fmax(part_of(pair) * pair->worst, largest_jolt(pair)), unseen) / size : 0;
     response->has_trust = pair->is_known && pair->compared > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
+    const double jolted = first_jolt(pair, RESPONSE_PARTING * size);
     response->trust_horizon = pair->horizon;
+    if (isfinite(jolted))
+        response->trust_horizon = fmin(response->trust_horizon, jolted);
+    if (unseen > RESPONSE_PARTING * size)
+        response->trust_horizon = fmin(response->trust_horizon, pair->run.unseen_since);
+    // It was found before the displacement had grown.
+    if (response->error_estimate <= RESPONSE_PARTING)
+        response->trust_horizon = NAN;
 }
 
 static Status solve(Pair *pair, Response *response) {

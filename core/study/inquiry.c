@@ -22,8 +22,9 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
     if (cost.steps <= study_runs * limits->steps)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
-                       "would take about %.2g solver steps in all, must be at most %.2g: %s",
-                       cost.steps, study_runs * limits->steps, study_kind(inquiry->study)->lessen);
+                       "would take about %.2g s of CPU in all, at most %.4g s are allowed: %s",
+                       cost.cpu_seconds, study_runs * limits->steps * SOLVER_STEP,
+                       study_kind(inquiry->study)->lessen);
 }
 
 Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,
@@ -54,5 +55,6 @@ Status inquiry_cost(const Inquiry *inquiry, const SimulationLimits *limits, Cost
             ->cost((const Study *)(const void *)inquiry->study, &inquiry->simulation, limits,
                    &steps, problem));
     cost->steps += steps;
+    cost->cpu_seconds = cost->steps * SOLVER_STEP;
     return STATUS_OK;
 }

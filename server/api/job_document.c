@@ -72,7 +72,7 @@ void job_put_dry_run(Bytes *bytes, const DryRun *run) {
     write_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);
     bytes_format(bytes, ", \"samples\": %zu, \"cost\": {\"cpu_seconds\": ",
                  scene_sample_count(&run->inquiry.simulation.scene));
-    bytes_real(bytes, run->cpu_seconds);
+    bytes_real(bytes, run->cost.cpu_seconds);
     bytes_text(bytes, ", \"bytes\": ");
     bytes_real(bytes, run->cost.bytes);
     bytes_text(bytes, "}, \"warnings\": ");

@@ -12,10 +12,12 @@
 
 typedef struct CheckSettings {
     bool json;
+    double max_cpu_seconds;
 } CheckSettings;
 
 static const Field check_fields[] = {
     FIELD_FLAG(CheckSettings, json, false, "the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+    SCENE_FILE_CPU_ROW(CheckSettings),
     FIELD_END,
 };
 
@@ -81,7 +83,7 @@ static void plan_print(const char *path, const DryRun *run) {
            run->inquiry.simulation.output.channels.count);
     if (run->inquiry.study != NULL)
         printf("Study: %s\n", run->inquiry.study->kind->name);
-    printf("Cost: about %.2g s of CPU, %.3g MB\n", run->cpu_seconds, run->cost.bytes * 1e-6);
+    printf("Cost: about %.2g s of CPU, %.3g MB\n", run->cost.cpu_seconds, run->cost.bytes * 1e-6);
     printf("Contact model: %s\nSolver: %s\n", run->plan.contact_model, run->plan.solver);
     if (run->plan.decisions.count > 0)
         puts("\nDecisions");
@@ -99,12 +101,10 @@ static void plan_print(const char *path, const DryRun *run) {
         printf("  %s: %s\n", run->warnings.at[i].pointer, run->warnings.at[i].detail);
 }
 
-static Status plan_show(const char *path, const Bytes *text, bool is_json, Problem *problem) {
-    const IntakeSettings settings = {.workers = 1,
-                                     .queue_most = 1,
-                                     .limits = {.samples = SCENE_FILE_SAMPLES,
-                                                .impacts = SCENE_FILE_IMPACTS,
-                                                .steps = SCENE_FILE_STEPS}};
+static Status plan_show(const char *path, const Bytes *text, const CheckSettings *asked,
+                        Problem *problem) {
+    const IntakeSettings settings = {
+        .workers = 1, .queue_most = 1, .limits = scene_file_limits(asked->max_cpu_seconds)};
     Store *store = NULL;
     Intake *intake = NULL;
     DryRun run = {0};
@@ -112,7 +112,7 @@ static Status plan_show(const char *path, const Bytes *text, bool is_json, Probl
     Status status = intake_open(store, &settings, &intake, problem);
     if (status == STATUS_OK)
         status = intake_dry_run(intake, text->at, text->count, &run, problem);
-    if (status == STATUS_OK && is_json) {
+    if (status == STATUS_OK && asked->json) {
         Bytes bytes = {0};
         job_put_dry_run(&bytes, &run);
         bytes_text(&bytes, "\n");
@@ -144,7 +144,7 @@ static int check(int argc, char *const *argv, Problem *problem) {
     Bytes text;
     status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
-        status = plan_show(path, &text, settings.json, problem);
+        status = plan_show(path, &text, &settings, problem);
     bytes_clear(&text);
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);

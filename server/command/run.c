@@ -19,16 +19,15 @@
 
 typedef struct RunSettings {
     char *output;
+    double max_cpu_seconds;
 } RunSettings;
 
 static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write to this file; its extension says what"),
+    SCENE_FILE_CPU_ROW(RunSettings),
     FIELD_END,
 };
-
-static const SimulationLimits limits = {
-    .samples = SCENE_FILE_SAMPLES, .impacts = SCENE_FILE_IMPACTS, .steps = SCENE_FILE_STEPS};
 
 // The series as the encoders take it. The caller frees *chosen.
 static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes) {
@@ -100,7 +99,9 @@ static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const 
 
 // Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
 static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings *warnings,
-                        const char *output, const Encoder *encoder, Problem *problem) {
+                        const RunSettings *settings, const Encoder *encoder, Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
+    const char *output = settings->output;
     Outcome *outcome = NULL;
     Bytes job = {0}, bytes = {0};
     Bar bar;
@@ -136,8 +137,10 @@ static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings
     return status;
 }
 
-static Status scene_prepare_and_run(const char *path, const Bytes *text, const char *output,
-                                    const Encoder *encoder, Problem *problem) {
+static Status scene_prepare_and_run(const char *path, const Bytes *text,
+                                    const RunSettings *settings, const Encoder *encoder,
+                                    Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     Store *store = NULL;
     Inquiry inquiry = {0};
     Warnings warnings = {0};
@@ -153,10 +156,10 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text, const c
     if (status == STATUS_OK) {
         scene_file_warn(path, &warnings);
         // Before the run, so that a wrong folder is told now and not after it.
-        if (output != NULL)
-            status = output_open(output, problem);
+        if (settings->output != NULL)
+            status = output_open(settings->output, problem);
         if (status == STATUS_OK)
-            status = scene_run(path, &inquiry, &warnings, output, encoder, problem);
+            status = scene_run(path, &inquiry, &warnings, settings, encoder, problem);
         output_drop();
     }
     inquiry_clear(&inquiry);
@@ -197,7 +200,7 @@ static int run(void *of, const Options *options, Problem *problem) {
     output_guard();
     status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
-        status = scene_prepare_and_run(path, &text, settings->output, encoder, problem);
+        status = scene_prepare_and_run(path, &text, settings, encoder, problem);
     bytes_clear(&text);
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);

@@ -4,6 +4,13 @@
 #include <stdio.h>
 #include <string.h>
 
+SimulationLimits scene_file_limits(double cpu_seconds) {
+    return (SimulationLimits){.samples = SCENE_FILE_SAMPLES,
+                              .impacts = SCENE_FILE_IMPACTS,
+                              .steps = cpu_seconds / SOLVER_STEP,
+                              .bytes = SIMULATION_BYTES};
+}
+
 const char *scene_file_name(const char *path) {
     return strcmp(path, "-") == 0 ? "standard input" : path;
 }

@@ -3,15 +3,22 @@
 #ifndef SERVER_COMMAND_SCENE_FILE_H
 #define SERVER_COMMAND_SCENE_FILE_H
 
-#include "core/plan/plan.h"
+#include "core/simulation/simulation.h"
 #include "server/base/bytes.h"
 
 enum {
     SCENE_FILE_BYTES = 16 << 20,
     SCENE_FILE_SAMPLES = 1 << 25,
     SCENE_FILE_IMPACTS = 10000000,
-    SCENE_FILE_STEPS = 1000000000
 };
+
+// Of every command that judges or runs a scene, as a row of its options.
+#define SCENE_FILE_CPU_ROW(struct_type)                                                            \
+    FIELD_REAL(struct_type, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS,       \
+               "CPU time a scene may be foretold to take; it is refused beyond")
+
+// What a scene may take that a person runs.
+SimulationLimits scene_file_limits(double cpu_seconds);
 
 // What people call the source of the text: the path, or standard input for "-".
 const char *scene_file_name(const char *path);

@@ -43,7 +43,6 @@ typedef struct DryRun {
     Warnings warnings;
     PlanReport plan;
     Cost cost;
-    double cpu_seconds;
     char result[72];
     bool is_cached;
 } DryRun;

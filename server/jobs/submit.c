@@ -12,9 +12,6 @@
 #include "server/jobs/documents.h"
 #include "server/jobs/intake_state.h"
 
-// CPU time of a solver step, with its share of statistics and spectra, on a middling machine [s].
-static const double step_seconds = 4e-8;
-
 static Status make_id(char id[40]) {
     unsigned char bytes[12];
     if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
@@ -271,7 +268,6 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
     intake_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
     TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    dry_run->cpu_seconds = dry_run->cost.steps * step_seconds;
     pthread_mutex_lock(&intake->lock);
     Outcome *outcome = cache_find(intake->cache, dry_run->result);
     pthread_mutex_unlock(&intake->lock);

@@ -179,6 +179,27 @@ def test_check_shows_the_plan():
     assert again[0] == 0 and json.loads(again[1])["result"] == plan["result"], again
 
 
+def test_what_takes_too_long_is_refused_in_seconds():
+    """`run` and `check` refuse what is foretold to take more than 60 s of CPU, or --max-cpu-seconds; a run that was
+    foretold too little stops, and says so."""
+    slow = {**program.scene("paper_free_sponge"), "duration": 1000, "accuracy": {"solver": "rk4", "step": 1e-7}}
+    for command in ("run", "check"):
+        code, _, errors = program.run(command, "-", text=json.dumps(slow))
+        assert code == 3 and "/accuracy: would take about" in errors, (command, code, errors)
+        assert "s of CPU by rk4, at most 60 s are allowed: take longer steps" in errors, (command, errors)
+        code, _, errors = program.run(command, "-", "--max-cpu-seconds", "1e-6", text=json.dumps(
+            {**program.scene("paper_free_sponge"), "output": {"psd": None}}))
+        assert code == 3 and "/duration: would take about" in errors and "at most 1e-06 s" in errors, errors
+    stalled = {"structure": {"mass": 25696, "stiffness": 3134636, "damping": 9082}, "sample_rate": 9, "duration": 6,
+               "dampers": [{"mass": mass, "clearance": 0, "buffer": {"restitution": 0.2, "contact_time": 5e-8}}
+                           for mass in (0.03, 18)],
+               "contact": {"model": "spring_damper", "separation": "zero_force"},
+               "excitation": {"kind": "sine", "amplitude": 1000, "frequency": 0.6, "displacement": 0.33}}
+    first, second = (program.run("run", "-", "--max-cpu-seconds", "0.01", text=json.dumps(stalled)) for _ in range(2))
+    assert first[0] == 1 and "more than 1e+06 solver steps, about 0.03 s of CPU" in first[2], first
+    assert first == second, "the count decides, not the clock"
+
+
 def test_a_full_disk_is_told():
     """Output that cannot be written is exit code 1."""
     with open("/dev/full", "w", encoding="utf-8") as full:

@@ -145,6 +145,23 @@ def test_dry_run_runs_nothing():
         problem(daemon.request("POST", "/v1/jobs?dry_run=1", json=sponge(duration=0)), 422, "/duration")
 
 
+def test_what_takes_too_long_is_refused_at_the_door():
+    """--max-cpu-seconds (60) and --max-run-bytes bound what a scene may be foretold to take: 422 with the cost."""
+    with program.daemon() as daemon:
+        slow = sponge(duration=1000, accuracy={"solver": "rk4", "step": 1e-7})
+        for path in ("/v1/jobs", "/v1/jobs?dry_run=1"):
+            reply = daemon.request("POST", path, json=slow)
+            problem(reply, 422, "/accuracy")
+            assert "at most 60 s are allowed" in reply.json()["errors"][0]["detail"], reply
+    with program.daemon("--max-cpu-seconds", "0.001", "--max-run-bytes", "2000000") as daemon:
+        problem(daemon.submit(sponge(duration=1e4)), 422, "/output/psd")
+        problem(daemon.submit(sponge(duration=1e4, output={"psd": None})), 422, "/duration")
+        cost = daemon.request("POST", "/v1/jobs?dry_run=1", json=sponge()).json()["cost"]
+        assert cost["cpu_seconds"] < 0.001 and 4e5 < cost["bytes"] < 1e6, cost
+    with program.daemon("--max-run-bytes", "2000000") as daemon:
+        problem(daemon.submit(sponge(duration=100)), 422, "/output/channels")
+
+
 def test_series_by_channel_window_and_format():
     """series.json, csv and npy hold the same numbers; channels, from and to choose; what is not there is told."""
     with program.daemon() as daemon:

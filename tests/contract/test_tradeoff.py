@@ -247,7 +247,7 @@ def test_progress_and_cancel():
 
 def test_faults_of_a_study_are_told_with_the_scenes():
     """422 with the pointer; what is too long in all is refused before anything runs."""
-    with program.daemon("--max-steps", "1000000") as daemon:
+    with program.daemon("--max-cpu-seconds", "0.03") as daemon:
         for members, pointer, expected in [
                 ({"kind": "trade"}, "/study/kind", "must be one of tradeoff"),
                 ({"kind": 5}, "/study/kind", "must be a string"),
@@ -255,7 +255,7 @@ def test_faults_of_a_study_are_told_with_the_scenes():
                 ({"solvers": ["exact", "rk5"]}, "/study/solvers/1", "must be one of exact"),
                 ({"eror": 1}, "/study/eror", "unknown key"),
                 ({"trial": 0}, "/study/trial", "must be at least 1"),
-                ({"repeats": 1000}, "/study", "solver steps in all, must be at most 1e+07")]:
+                ({"repeats": 1000}, "/study", "s of CPU in all, at most 0.3 s are allowed")]:
             reply = daemon.submit(study(**members))
             faults = reply.json()["errors"]
             assert reply.status == 422 and [f["pointer"] for f in faults] == [pointer], (members, faults)

@@ -32,7 +32,7 @@ static bool first_below(const Quad *f, int degree, Quad a, Quad b, int depth, Qu
         if (i > 1)
             bend += i * fabsq(g[i]) * power / w;
     }
-    if (g[0] > rest)
+    if (g[0] >= rest)
         return false;
     const bool is_monotone = fabsq(g[1]) > bend;
     if (is_monotone || depth == 0) {

@@ -240,7 +240,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 
     inquiry = inquiry_make(0.025, 2, 1000);
     const SimulationLimits limits = {.steps = 1e6};
-    assert_refused(&inquiry, &limits, "/study", "solver steps in all, must be at most 1e+07");
+    assert_refused(&inquiry, &limits, "/study", "s of CPU in all, at most 0.3 s are allowed");
 }
 
 static void the_usual_error_is_the_metrics(void **state) {

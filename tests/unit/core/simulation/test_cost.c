@@ -1,0 +1,191 @@
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/support/document.h"
+#include "tests/support/fields.h"
+
+static Problem told;
+
+#define SDOF "\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}"
+#define DAMPER                                                                                     \
+    "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": {\"restitution\": 0.5, "   \
+    "\"contact_time\": 0.002}}]"
+#define RANDOM "\"excitation\": {\"kind\": \"random\", \"band\": [0, 15], \"rms\": 1}"
+#define NO_PSD "\"output\": {\"psd\": null}"
+
+static Cost cost_of(const char *members, double duration, double sample_rate) {
+    Simulation simulation;
+    document_pass(&simulation, members);
+    simulation.scene.duration = duration;
+    simulation.scene.sample_rate = sample_rate;
+    const Cost cost = simulation_cost(&simulation);
+    simulation_clear(&simulation);
+    return cost;
+}
+
+static void work_counted_is_about_what_was_foretold(void **state) {
+    (void)state;
+    static const char *const scenes[] = {
+        SDOF "," DAMPER "," RANDOM "," NO_PSD,
+        SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\"}",
+        SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"precise\"}",
+        SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"newmark\"}",
+        SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"adaptive\"}",
+        SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"contact\": {\"model\": \"hunt_crossley\"}",
+        "\"structure\": {\"kind\": \"frame\", \"masses\": [9, 9, 9], \"stiffnesses\": [9000, "
+        "9000, 9000], \"damping_ratio\": 0.02}," DAMPER "," RANDOM "," NO_PSD,
+    };
+    for (size_t i = 0; i < COUNT(scenes); i++) {
+        Simulation simulation;
+        Outcome *outcome;
+        document_pass(&simulation, scenes[i]);
+        simulation.scene.duration = 30;
+        simulation.scene.sample_rate = 1000;
+        problem_clear(&told);
+        assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &outcome, &told), STATUS_OK);
+        const Cost cost = simulation_cost(&simulation);
+        const double solving = cost.steps - cost.base;
+        if (!(outcome->steps > solving / 3 && outcome->steps < 3 * solving))
+            fail_msg("%zu: %g steps, foretold %g", i, outcome->steps, solving);
+        assert_true(cost.cpu_seconds == cost.steps * SOLVER_STEP);
+        outcome_drop(outcome);
+        simulation_clear(&simulation);
+    }
+}
+
+static void memory_foretold_holds_series_hidden_columns_and_base(void **state) {
+    (void)state;
+    const double samples = 1e6 * sizeof(double);
+    const double five = cost_of(SDOF "," DAMPER "," NO_PSD, 1000, 1000).bytes;
+    const double base = cost_of(SDOF "," DAMPER "," RANDOM "," NO_PSD, 1000, 1000).bytes;
+    const double hidden = cost_of(SDOF "," DAMPER "," RANDOM, 1000, 1000).bytes;
+    assert_true(five > 5 * samples && five < 5.5 * samples);
+    assert_true(fabs(base - five - 0.1 * samples) < 0.05 * samples ||
+                base - five > 0.9 * samples); // its rate is the document's or the run's
+    assert_true(fabs(hidden - base - samples) < 0.1 * samples);
+}
+
+// A record is still after its last sample, however short its interval.
+static void a_short_record_makes_no_long_run(void **state) {
+    (void)state;
+    const Cost cost =
+        cost_of(SDOF ", \"excitation\": {\"kind\": \"record\", \"samples\": [0, 1, -1, "
+                     "0], \"interval\": 1e-8}," NO_PSD,
+                2, 200);
+    assert_true(cost.steps < 1e5);
+}
+
+static void refuse(const char *members, const SimulationLimits *limits, double duration,
+                   double sample_rate, const char *pointer, const char *says) {
+    Simulation simulation;
+    document_pass(&simulation, members);
+    simulation.scene.duration = duration;
+    simulation.scene.sample_rate = sample_rate;
+    problem_clear(&told);
+    assert_int_equal(simulation_complete(&simulation, limits, NULL, &told), STATUS_INVALID);
+    if (strstr(detail_at(&told, pointer), says) == NULL)
+        fail_msg("%s: %s", told.faults[0].pointer, told.faults[0].detail);
+    simulation_clear(&simulation);
+}
+
+static void what_takes_too_long_is_refused_where_it_helps_most(void **state) {
+    (void)state;
+    const SimulationLimits second = {.steps = 1 / SOLVER_STEP};
+    refuse(SDOF "," DAMPER "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\", \"step\": 1e-6}",
+           &second, 100, 100, "/accuracy", " by rk4, at most 1 s are allowed: take longer steps");
+    refuse(SDOF "," DAMPER "," NO_PSD, &second, 1e5, 1e4, "/duration",
+           "at most 1 s are allowed: take a shorter one");
+    refuse("\"structure\": {\"mass\": 1, \"stiffness\": 1e18}," DAMPER "," NO_PSD, &second, 100,
+           100, "/duration", "moves many times within a sample interval");
+    refuse(SDOF ", \"output\": {\"channels\": [], \"psd\": {\"segment\": 64, \"overlap\": 63}}",
+           &second, 2000, 1000, "/output/psd", "most of it for spectra");
+    refuse(SDOF ",\"excitation\": {\"kind\": \"chirp\", \"amplitude\": 1, \"start_frequency\": 1, "
+                "\"end_frequency\": 2, \"sweep_time\": 1e4, \"rate\": 3000},"
+                "\"output\": {\"channels\": [], \"psd\": null}",
+           &second, 1e4, 3000, "/excitation", "to make the base's motion");
+}
+
+static void what_takes_too_much_memory_is_refused(void **state) {
+    (void)state;
+    const SimulationLimits limits = {.bytes = 1e6};
+    refuse(SDOF "," DAMPER "," NO_PSD, &limits, 100, 1000, "/output/channels",
+           "would take about 4.01 MB of memory, at most 1 MB are allowed");
+}
+
+// Two masses between stops without clearance, T_c a hundred-thousandth of a sample interval.
+static void a_run_foretold_too_little_stops_at_a_count_of_its_own(void **state) {
+    (void)state;
+    static const char members[] =
+        "\"structure\": {\"mass\": 25695.8, \"stiffness\": 3134636.4, \"damping\": 9081.86},"
+        "\"dampers\": [{\"mass\": 0.0319433, \"clearance\": 0, \"buffer\": {\"restitution\": "
+        "0.214, "
+        "\"contact_time\": 5e-08}}, {\"mass\": 17.8, \"clearance\": 0, \"buffer\": "
+        "{\"restitution\": "
+        "0.214, \"contact_time\": 5e-08}}], \"contact\": {\"model\": \"spring_damper\", "
+        "\"separation\": \"zero_force\"}, \"excitation\": {\"kind\": \"sine\", \"amplitude\": "
+        "1000, "
+        "\"frequency\": 0.6}, " NO_PSD;
+    const SimulationLimits limits = {.steps = 1e5};
+    char first[sizeof told.detail] = "";
+    for (int i = 0; i < 2; i++) {
+        Simulation simulation;
+        Outcome *outcome;
+        document_pass(&simulation, members);
+        problem_clear(&told);
+        assert_int_equal(simulation_run(&simulation, &limits, NULL, NULL, &outcome, &told),
+                         STATUS_LIMIT);
+        assert_non_null(strstr(told.detail, "more than 3e+05 solver steps, about 0.009 s of CPU"));
+        if (i > 0)
+            assert_string_equal(told.detail, first);
+        snprintf(first, sizeof first, "%s", told.detail);
+        simulation_clear(&simulation);
+    }
+}
+
+static void many_dampers_on_many_storeys_are_foretold_to_take_long(void **state) {
+    (void)state;
+    enum { SIZE = 1 << 15 };
+    char *text = malloc(SIZE);
+    assert_non_null(text);
+    size_t used =
+        (size_t)snprintf(text, SIZE, "\"structure\": {\"kind\": \"frame\", \"masses\": [");
+    for (int i = 0; i < 200; i++)
+        used += (size_t)snprintf(text + used, SIZE - used, "%s1000", i > 0 ? ", " : "");
+    used += (size_t)snprintf(text + used, SIZE - used, "], \"stiffnesses\": [");
+    for (int i = 0; i < 200; i++)
+        used += (size_t)snprintf(text + used, SIZE - used, "%s1e8", i > 0 ? ", " : "");
+    used +=
+        (size_t)snprintf(text + used, SIZE - used, "], \"damping_ratio\": 0.02}, \"dampers\": [");
+    for (int i = 0; i < 64; i++)
+        used +=
+            (size_t)snprintf(text + used, SIZE - used,
+                             "%s{\"mass\": 10, \"clearance\": 0.001, \"storey\": %d, \"buffer\": "
+                             "{\"restitution\": 0.5, \"contact_time\": 0.001}}",
+                             i > 0 ? ", " : "", 3 * i + 1);
+    (void)snprintf(text + used, SIZE - used,
+                   "], " RANDOM
+                   ", \"output\": {\"channels\": [\"displacement_200\"], \"psd\": null}");
+    assert_true(cost_of(text, 30, 1000).cpu_seconds > 20);
+    free(text);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(work_counted_is_about_what_was_foretold),
+        cmocka_unit_test(memory_foretold_holds_series_hidden_columns_and_base),
+        cmocka_unit_test(a_short_record_makes_no_long_run),
+        cmocka_unit_test(what_takes_too_long_is_refused_where_it_helps_most),
+        cmocka_unit_test(what_takes_too_much_memory_is_refused),
+        cmocka_unit_test(a_run_foretold_too_little_stops_at_a_count_of_its_own),
+        cmocka_unit_test(many_dampers_on_many_storeys_are_foretold_to_take_long),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
