@@ -150,6 +150,7 @@ typedef struct Pair {
     Response near_response;
     size_t stride;         // samples of the run in one interval of the neighbour
     double longer;         // the neighbour's step over the run's
+    bool is_kinked;        // the base has kinks within steps
     bool is_known;         // the neighbour has not failed
     bool is_spent;         // nothing more to learn
     size_t compared;       // samples
@@ -166,7 +167,10 @@ static double part_of(const Pair *pair) {
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
     if (pair->run.tolerance > 0)
         return 2;
-    return is_touched ? CHANCE : 1 / fabs(pow(pair->longer, pair->run.stepper->order) - 1);
+    if (is_touched)
+        return CHANCE;
+    // Where a step has a kink of the base inside, its error is as that lies.
+    return pair->is_kinked ? 1 : 1 / fabs(pow(pair->longer, pair->run.stepper->order) - 1);
 }
 
 static void compare(Pair *pair) {
@@ -225,6 +229,9 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
                          : own > 1     ? kinks * (own > 2 ? own / 2 + 1 : 1)
                          : kinks > 1   ? 2 * kinks // none is longer: a shorter one
                                        : 1;
+    const Base *base = frame->run->base;
+    pair->is_kinked = base->form == BASE_PIECES ||
+                      (base->form == BASE_SAMPLED && kinks == 1 && frame->base.ratio == 0);
     pair->horizon = NAN;
     set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
     pair->near_run = (Run){.plan = &pair->plan,
