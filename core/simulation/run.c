@@ -159,7 +159,7 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
         columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
-    Stage stage = {journey->watch, 0.9, 0.1};
+    Stage stage = stage_of(journey->watch, 0.9, 0.1);
     const Watch watch = stage_watch(&stage);
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
@@ -252,7 +252,7 @@ static Status travel(Journey *journey, Problem *problem) {
                        .most = journey->limits == NULL ? 0 : journey->limits->samples,
                        .transforms = stock(journey)};
     const Excitation *excitation = scene_excitation(scene);
-    Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
+    Stage making = stage_of(journey->watch, 0, 0.2), solving = stage_of(journey->watch, 0.2, 0.7);
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
     TRY(excitation_kind(excitation)
             ->make(excitation, &span, &making_watch, &journey->base, problem));

@@ -295,7 +295,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 
     inquiry = inquiry_make(1, 2000);
     const SimulationLimits limits = {.steps = 1e5};
-    assert_refused(&inquiry, &limits, "/study", "must be at most 1e+06: ask for fewer runs");
+    assert_refused(&inquiry, &limits, "/study", "at most 0.03 s are allowed: ask for fewer runs");
 }
 
 static void a_metric_without_a_target_is_left_out(void **state) {
