@@ -16,4 +16,19 @@ static inline bool watch_advance(const Watch *watch, double fraction) {
     return watch == NULL || watch->advance == NULL || watch->advance(watch->context, fraction);
 }
 
+// A part of a journey tells its own 0 to 1; whoever watches the whole sees the whole's.
+typedef struct Stage {
+    const Watch *whole;
+    double from, share;
+} Stage;
+
+static inline bool stage_advance(void *context, double fraction) {
+    const Stage *stage = context;
+    return watch_advance(stage->whole, stage->from + stage->share * fraction);
+}
+
+static inline Watch stage_watch(Stage *stage) {
+    return (Watch){stage, stage_advance};
+}
+
 #endif

@@ -49,10 +49,10 @@ typedef struct ContactForce {
 // What N is made of under CONTACT_POWER: k p^n + viscous p^viscous_exponent p' while p' > turn, and
 // else k p^n or nothing.
 typedef struct ContactTerms {
-    double stiffness, exponent;        // k [N/m^n], n
-    double viscous, viscous_exponent;  // 0: no damping
-    double turn;                       // [m/s]
-    bool is_elastic_below;             // k p^n there, else nothing
+    double stiffness, exponent;       // k [N/m^n], n
+    double viscous, viscous_exponent; // 0: no damping
+    double turn;                      // [m/s]
+    bool is_elastic_below;            // k p^n there, else nothing
 } ContactTerms;
 
 typedef struct ContactLaw {

@@ -25,7 +25,7 @@
 
 #include "core/base/noise.h"
 #include "core/math/circle.h"
-#include "core/math/fourier.h"
+#include "core/math/synthesis.h"
 
 #define PI 3.14159265358979323846264338328
 #define RATE_LEAST 1e-9 // [Hz]
@@ -36,6 +36,7 @@ enum {
     BINS_WANTED = 256,
     BINS_LEAST = 8,
     SAMPLES_MOST = 1 << 25,
+    PART = 1 << 10, // of a block, read at once
 };
 
 // clang-format off
@@ -132,46 +133,59 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     return status;
 }
 
-// Leaves y_m in the transform's real buffer.
+// Of y_m.
 static void make_block(const ExcitationRandom *random, const RandomBlocks *blocks, uint64_t m,
-                       Fourier *fourier) {
-    double *bin = fourier_complex(fourier);
+                       Synthesis *synthesis) {
+    double *bin = synthesis_bins(synthesis);
     // Half, because the transform of a real sequence adds bin k and its mirror.
     const double scale = random->rms / sqrt((double)blocks->bins) / 2;
-    memset(bin, 0, (blocks->length / 2 + 1) * 2 * sizeof *bin);
-    for (size_t k = blocks->first_bin; k < blocks->first_bin + blocks->bins; k++) {
-        double normal[2];
-        noise_normal_pair(random->seed, m, k, normal);
-        bin[2 * k] = scale * normal[0];
-        bin[2 * k + 1] = scale * normal[1];
+    memset(bin, 0, 2 * blocks->first_bin * sizeof *bin);
+    double *inside = bin + 2 * blocks->first_bin;
+    noise_normal_pairs(random->seed, m, blocks->first_bin, blocks->bins, inside);
+    for (size_t k = 0; k < 2 * blocks->bins; k++)
+        inside[k] *= scale;
+    synthesis_run(synthesis);
+}
+
+// Fade out onto a fresh hop only after fading in onto the one before it: so many samples of either,
+// no more of the block being made than they need.
+static void fade_in(const Synthesis *synthesis, const double *fade, size_t count, double *x) {
+    double y[PART];
+    for (size_t from = 0; from < count; from += PART) {
+        const size_t many = count - from < PART ? count - from : PART;
+        synthesis_read(synthesis, from, PART, y);
+        for (size_t i = 0; i < many; i++)
+            x[from + i] += fade[from + i] * y[i];
     }
-    fourier_run(fourier);
+}
+
+static void fade_out(const Synthesis *synthesis, const double *fade, size_t hop, size_t count,
+                     double *x) {
+    double y[PART];
+    for (size_t from = 0; from < count; from += PART) {
+        const size_t many = count - from < PART ? count - from : PART;
+        synthesis_read(synthesis, hop + from, PART, y);
+        for (size_t i = 0; i < many; i++)
+            x[from + i] = fade[hop - 1 - from - i] * y[i];
+    }
 }
 
 static Status make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
-                           Fourier *fourier, const double *fade, const Watch *watch, Base *base,
+                           Synthesis *synthesis, const double *fade, const Watch *watch, Base *base,
                            Problem *problem) {
     const size_t hop = blocks->length / 2;
     const size_t hops = (base->count + hop - 1) / hop;
-    const double *y = fourier_real(fourier);
     for (size_t m = 0; m <= hops; m++) {
         if (!watch_advance(watch, (double)m / (double)(hops + 1)))
             return problem_set(problem, STATUS_CANCELLED,
                                "stopped while the base's motion was made");
-        make_block(random, blocks, m, fourier);
-        // Fade out onto a fresh hop only after fading in onto the one before it.
-        if (m > 0) {
-            double *x = base->values + (m - 1) * hop;
-            const size_t count = m == hops ? base->count - (m - 1) * hop : hop;
-            for (size_t i = 0; i < count; i++)
-                x[i] += fade[i] * y[i];
-        }
-        if (m < hops) {
-            double *x = base->values + m * hop;
-            const size_t count = m == hops - 1 ? base->count - m * hop : hop;
-            for (size_t i = 0; i < count; i++)
-                x[i] = fade[hop - 1 - i] * y[hop + i];
-        }
+        make_block(random, blocks, m, synthesis);
+        if (m > 0)
+            fade_in(synthesis, fade, m == hops ? base->count - (m - 1) * hop : hop,
+                    base->values + (m - 1) * hop);
+        if (m < hops)
+            fade_out(synthesis, fade, hop, m == hops - 1 ? base->count - m * hop : hop,
+                     base->values + m * hop);
     }
     return STATUS_OK;
 }
@@ -180,18 +194,21 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
                           Base *base, Problem *problem) {
     const ExcitationRandom *random = random_of(excitation);
     *base = (Base){0};
+    if (random->rms == 0)
+        return STATUS_OK; // still
     const double wanted = sample_count(random, span);
     if (!(wanted >= 2 && wanted <= SAMPLES_MOST + 1))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d samples, not %.0f",
                            SAMPLES_MOST, wanted);
     const RandomBlocks blocks = random_blocks(random);
     const size_t hop = blocks.length / 2;
-    Fourier *fourier = fourier_take(span->transforms, blocks.length, FOURIER_BACKWARD);
+    Synthesis *synthesis =
+        synthesis_new(blocks.length, blocks.first_bin + blocks.bins, span->transforms);
     double *fade = malloc(hop * sizeof *fade);
     base->count = (size_t)wanted;
     base->values = malloc(base->count * sizeof *base->values);
     Status status;
-    if (fourier == NULL || fade == NULL || base->values == NULL) {
+    if (synthesis == NULL || fade == NULL || base->values == NULL) {
         status = problem_set(problem, STATUS_NO_MEMORY,
                              "no memory for %zu samples of the base's motion", base->count);
     } else {
@@ -199,10 +216,10 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
         base->interval = 1 / random->rate;
         const double step = PI / (double)blocks.length;
         circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
-        status = make_samples(random, &blocks, fourier, fade, watch, base, problem);
+        status = make_samples(random, &blocks, synthesis, fade, watch, base, problem);
     }
     free(fade);
-    fourier_put(span->transforms, fourier);
+    synthesis_free(synthesis, span->transforms);
     if (status != STATUS_OK)
         base_clear(base);
     return status;

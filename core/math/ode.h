@@ -1,7 +1,7 @@
 // Motion that no closed form describes: explicit Runge-Kutta steps of order 8 whose error is held
 // at rounding's edge or at a tolerance, and where functions of the state first fall to zero.
 // SUNDIALS lives here alone. Not for linear motion that must be exact (arc.h, frame_arc.h). Used by
-// solve/frame_ode.c and solve/adaptive.c.
+// solve/adaptive*.c.
 #ifndef CORE_MATH_ODE_H
 #define CORE_MATH_ODE_H
 

@@ -24,6 +24,8 @@ static void damp(Modes *modes, const double *damping, long double *work) {
         for (size_t a = 0; a < n; a++) {
             carried[a] = magnitude[a] = 0;
             for (size_t b = 0; b < n; b++) {
+                if (damping[a * n + b] == 0)
+                    continue;
                 const long double term = (long double)damping[a * n + b] * modes->shapes[b * n + j];
                 carried[a] += term;
                 magnitude[a] += fabsl(term);
@@ -108,6 +110,23 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                : problem_set(problem, STATUS_UNSTABLE,
                              "the structure has no modes that double precision can hold: its "
                              "masses and stiffnesses are too far apart, or not positive definite");
+}
+
+// What stays moves forward in its array, never past what is still to be read.
+void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count) {
+    const size_t all = modes->count;
+    for (size_t i = 0; i < count; i++) {
+        modes->omega[i] = modes->omega[list[i]];
+        modes->participation[i] = modes->participation[list[i]];
+    }
+    for (size_t j = 0; j < storeys; j++)
+        for (size_t i = 0; i < count; i++)
+            modes->shapes[j * count + i] = modes->shapes[j * all + list[i]];
+    for (size_t k = 0; k < count; k++)
+        for (size_t i = 0; i < count; i++)
+            modes->damping[k * count + i] = modes->damping[list[k] * all + list[i]];
+    modes->count = count;
+    modes->is_classical = modes->is_classical || count == 1;
 }
 
 void modes_clear(Modes *modes) {

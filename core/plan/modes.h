@@ -8,10 +8,10 @@
 
 #include "core/base/status.h"
 
-// In modal coordinates x = shapes q:  q'' + damping q' + omega^2 q = -participation a_g + shapes'
-// N. All zero is empty.
+// In modal coordinates x = shapes q, to the part of x that the modes span:  q'' + damping q' +
+// omega^2 q = -participation a_g + shapes' N. All zero is empty.
 typedef struct Modes {
-    size_t count;          // as many as storeys
+    size_t count;          // as many as storeys, or those that were kept
     double *omega;         // rising; 0 for a rigid-body motion [rad/s]
     double *shapes;        // storeys x count, row after row [1/sqrt(kg)]
     double *damping;       // shapes' C shapes, count x count, row after row [1/s]
@@ -24,5 +24,8 @@ typedef struct Modes {
 Status modes_make(Modes *modes, size_t storeys, const double *mass, const double *stiffness,
                   const double *damping, const double *influence, Problem *problem);
 void modes_clear(Modes *modes);
+
+// Keeps the `count` modes listed, by rising index, and forgets the others.
+void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count);
 
 #endif

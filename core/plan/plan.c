@@ -73,9 +73,12 @@ static void start(const Reals *given, double *start) {
         start[i] = given->at[i];
 }
 
+bool plan_is_single_in_flight(const Plan *plan) {
+    return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1;
+}
+
 bool plan_is_single(const Plan *plan) {
-    return plan->storeys == 1 && plan->influence[0] == 1 && plan->damper_count <= 1 &&
-           plan->separation == SEPARATION_ZERO_PENETRATION &&
+    return plan_is_single_in_flight(plan) && plan->separation == SEPARATION_ZERO_PENETRATION &&
            (plan->damper_count == 0 || !stops_vary(&plan->dampers[0]));
 }
 
@@ -199,16 +202,17 @@ Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan 
                                       : status;
 }
 
-Status plan_sketch(const Scene *scene, Plan **plan) {
+Status plan_sketch(const Scene *scene, size_t modes, Plan **plan) {
     *plan = calloc(1, sizeof **plan);
     if (*plan == NULL)
         return STATUS_NO_MEMORY;
     StructureRates rates;
     Status status = plan_values(scene, *plan);
     if (status == STATUS_OK)
-        status = structure_rates(scene_structure(scene), &rates);
+        status = structure_rates_of(scene_structure(scene), modes, &rates);
     if (status == STATUS_OK) {
         (*plan)->fastest = rates.fastest;
+        (*plan)->kept = modes;
         (*plan)->modes.is_classical = !isnan(scene_structure(scene)->damping_ratio);
         return STATUS_OK;
     }

@@ -120,8 +120,11 @@ typedef struct Plan {
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
-    Modes modes;                        // empty where plan_is_single, and in a sketch
-    double fastest; // of a sketch: no mode is faster, or dies away faster [rad/s]
+    Modes modes; // of all, or those that are kept; empty where plan_is_single, and in a sketch
+    bool is_truncated; // modes are left out that would move (plan/keep.h)
+    size_t kept;       // of a sketch: modes that a run is asked to keep; 0: all
+    double given_up;   // foretold error of displacement of a truncated plan, over its largest value
+    double fastest;    // of a sketch: no mode is faster, or dies away faster [rad/s]
     PlanDamper *dampers;
     size_t damper_count;
     const ContactLaw *law;
@@ -136,14 +139,21 @@ typedef struct Plan {
 // what the accuracy object said. Freed by plan_free.
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
-// A plan without modes and reasons, in a small part of the time, to tell what a run may cost. Freed
-// by plan_free.
-Status plan_sketch(const Scene *scene, Plan **plan);
+// A plan without modes and reasons, in a small part of the time, to tell what a run may cost that
+// keeps so many modes. Freed by plan_free.
+Status plan_sketch(const Scene *scene, size_t modes, Plan **plan);
 void plan_free(Plan *plan);
 
 // Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
 // and a law whose contact phases are linear or instantaneous.
 bool plan_is_single(const Plan *plan);
+// The same where no stop is ever reached: then the law does not matter.
+bool plan_is_single_in_flight(const Plan *plan);
+
+// Of a run.
+static inline size_t plan_mode_count(const Plan *plan) {
+    return plan->modes.count > 0 ? plan->modes.count : plan->kept > 0 ? plan->kept : plan->storeys;
+}
 
 // Add one line; texts are copied. Lines beyond 256 are left out, and all where the
 // list is NULL. STATUS_NO_MEMORY leaves the list as it was.

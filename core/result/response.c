@@ -43,5 +43,6 @@ void response_clear(Response *response) {
         return;
     columns_clear(&response->series);
     free(response->impacts.at);
+    free(response->approaches);
     memset(response, 0, sizeof *response);
 }

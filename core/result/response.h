@@ -35,6 +35,15 @@ typedef struct Impacts {
     size_t count;
 } Impacts;
 
+// How fast impacts met one stop whose buffer is a table over approach speed. A rest has no
+// approach, and what is resumed keeps the parameters with which it began: neither counts.
+typedef struct Approaches {
+    bool has_table;
+    double from, to;         // the table's speeds [m/s]
+    uint64_t count, outside; // impacts, and those of them beyond the table
+    double least, most;      // speeds met [m/s]
+} Approaches;
+
 // Energies relative to the base [J]; `residual` is the largest |balance| over the largest energy.
 typedef struct Energy {
     double initial;            // kinetic, of the springs and of the free masses at t = 0
@@ -55,8 +64,12 @@ typedef struct Peaks {
 typedef struct Response {
     double sample_rate; // [Hz]
     size_t count;       // samples, i = 0 ... count - 1 at t = i / sample_rate
-    Columns series; // the channels that were wanted, in the order wanted; rows == count (or none)
-    Impacts impacts;
+    Columns series;   // the channels that were wanted, in the order wanted; rows == count (or none)
+    Impacts impacts;  // empty where is_unlisted
+    bool is_unlisted; // set beforehand: impacts are counted, not listed
+    uint64_t impact_count; // of kind IMPACT_IMPACT
+    uint64_t resting_count;
+    Approaches *approaches; // made beforehand, or NULL: of damper d at 2 d + side
     Energy energy;
     Peaks peaks;
     // Over samples from statistics_from on; of several storeys the largest.
@@ -64,6 +77,7 @@ typedef struct Response {
     size_t statistics_count;
     bool has_trust;        // did the solver estimate what follows?
     bool is_stepped;       // it is its steps' error then, not rounding's
+    double given_up;       // foretold error of displacement of the modes left out; in the estimate
     double error_estimate; // largest error of displacement over the largest displacement, at most 1
     double trust_horizon;  // that error passes RESPONSE_PARTING here [s]; NAN: not within the run
 } Response;

@@ -77,6 +77,8 @@ typedef struct StructureRates {
     double fastest; // about its last one, or its fastest decay if that is faster
 } StructureRates;
 Status structure_rates(const Structure *structure, StructureRates *rates);
+// The same where only the `modes` slowest move.
+Status structure_rates_of(const Structure *structure, size_t modes, StructureRates *rates);
 
 // For the kinds: a list of `count` zeros; a fault unless the list has one number per storey.
 Status structure_zeros(Reals *reals, size_t count, Problem *problem);

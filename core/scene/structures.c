@@ -109,6 +109,51 @@ Status structure_rates(const Structure *structure, StructureRates *rates) {
     return status;
 }
 
+// How many squares of natural frequencies are below one: as many as K - square M has negative
+// pivots (Sylvester). `room` is as large as K.
+static size_t count_below(size_t n, const Matrices *all, double square, double *room) {
+    size_t count = 0;
+    for (size_t i = 0; i < n * n; i++)
+        room[i] = all->stiffness[i] - square * all->mass[i];
+    for (size_t k = 0; k < n; k++) {
+        const double pivot = room[k * n + k];
+        count += pivot < 0;
+        for (size_t i = k + 1; i < n; i++) {
+            const double factor = room[i * n + k] / pivot;
+            if (factor == 0 || !isfinite(factor))
+                continue;
+            for (size_t j = k + 1; j < n; j++)
+                room[i * n + j] -= factor * room[k * n + j];
+        }
+    }
+    return count;
+}
+
+Status structure_rates_of(const Structure *structure, size_t modes, StructureRates *rates) {
+    enum { HALVINGS = 8 };
+    const size_t n = structure_storeys(structure);
+    TRY(structure_rates(structure, rates));
+    if (modes >= n || !(rates->fastest > 0))
+        return STATUS_OK;
+    double *room = calloc(n, (4 * n + 1) * sizeof *room);
+    if (room == NULL)
+        return STATUS_NO_MEMORY;
+    const Matrices all = {room, room + n * n, room + 2 * n * n, room + 3 * n * n};
+    structure_fill(structure, &all);
+    // Of the logarithm of a part of the fastest.
+    double least = -10, most = 0;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = (least + most) / 2, rate = rates->fastest * exp(middle);
+        if (count_below(n, &all, rate * rate, room + 3 * n * n + n) >= modes)
+            most = middle;
+        else
+            least = middle;
+    }
+    rates->fastest *= exp(most);
+    free(room);
+    return STATUS_OK;
+}
+
 Status structure_zeros(Reals *reals, size_t count, Problem *problem) {
     double *at = calloc(count, sizeof *at);
     if (at == NULL)

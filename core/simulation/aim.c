@@ -11,22 +11,32 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/plan/truncation.h"
 #include "core/result/metric.h"
 #include "core/solve/solvers.h"
 
 enum { ATTEMPTS = 3 };
+static const double ROUNDING = 1e-15; // of a contact at its exactest, about
 
 // By how much the metric's relative error may be larger than the displacement's. An impact that
 // comes a little late falls into another sample interval; of the rms, see metric_error.
-static const double gains[METRICS] = {1, 100, 30, 10, 100, 5};
+static const double gains[METRICS] = {1, 200, 30, 10, 5000, 5};
+
+// By how much lines of a spectrum may be more wrong than the motion's rms.
+static const double spectrum_gain = 10;
 
 // Tolerances worth their own run: below, rounding's edge costs hardly more.
-static const double tolerance_most = 1e-2, tolerance_least = 1e-12;
-static const double contact_share = 1; // error of displacement per error of a contact
+static const double tolerance_most = 0.1, tolerance_least = 1e-12;
+static const double contact_share = 0.05; // error of displacement per error of a contact
 static const double impacts_a_period = 2;
 static const double growth_a_period = 0.2; // natural logarithm, where a base drives the mass
 static const double growth_most = 40;
 static const double margin = 0.3; // of what an estimate says a second run may take
+
+// Of the error asked for, what may be foretold of modes left out: without dampers that is seldom
+// less than they do, with them it may be many times less.
+static const double modes_margin = 0.7, dampers_margin = 0.1;
+static const double modes_worth = 0.75; // keeping more than this part is not worth while
 
 // One way to run the scene: what it gives up.
 typedef struct Way {
@@ -41,6 +51,7 @@ typedef struct Aim {
     Plan *plan;
     bool has_tolerance;
     double impacts, growth; // foretold
+    double *modes_error;    // of the metric by the modes kept, from 1 on; NULL: all are
 } Aim;
 
 static const AccuracyAuto *asked_of(const Simulation *simulation) {
@@ -59,6 +70,11 @@ Status aim_complete(Simulation *simulation, Problem *problem) {
     static const char pointer[] = "/accuracy/metric";
     AccuracyAuto *asked = (AccuracyAuto *)(void *)simulation->accuracy;
     const Scene *scene = &simulation->scene;
+    if (asked->accuracy.modes != COUNT_ABSENT)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes",
+                                (double)asked->accuracy.modes, NULL,
+                                "a target chooses how many modes are kept: leave one of the two "
+                                "out");
     if (asked->metric == CHOICE_ABSENT)
         asked->metric = METRIC_DISPLACEMENT;
     if (asked->metric == METRIC_PSD && simulation->output.psd.channels.count == 0)
@@ -75,6 +91,37 @@ Status aim_complete(Simulation *simulation, Problem *problem) {
     return STATUS_OK;
 }
 
+static double truncation_error(const TruncationError *error, int metric) {
+    switch ((Metric)metric) {
+    case METRIC_DISPLACEMENT:
+        return error->displacement;
+    case METRIC_RMS_DISPLACEMENT:
+        return error->rms_displacement;
+    case METRIC_MEAN_ACCELERATION:
+        return error->mean_acceleration;
+    case METRIC_PSD: // of any channel, in each of its lines
+        return fmin(fmax(error->mean_acceleration, error->displacement) * spectrum_gain, 1);
+    default:
+        return fmin(gains[metric] * error->displacement, 1);
+    }
+}
+
+static Status foretell_modes(Aim *aim, Problem *problem) {
+    const Scene *scene = &aim->simulation->scene;
+    const size_t n = aim->plan->storeys;
+    if (aim->plan->modes.count < 2)
+        return STATUS_OK;
+    TruncationError *errors = calloc(n, sizeof *errors);
+    aim->modes_error = calloc(n, sizeof *aim->modes_error);
+    Status status = errors == NULL || aim->modes_error == NULL
+                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
+                        : truncation_predict(aim->plan, scene, errors);
+    for (size_t k = 0; k < n && status == STATUS_OK; k++)
+        aim->modes_error[k] = truncation_error(&errors[k], aim->asked->metric);
+    free(errors);
+    return status;
+}
+
 static Status aim_make(Aim *aim, const Simulation *simulation, Problem *problem) {
     const Scene *scene = &simulation->scene;
     *aim = (Aim){.simulation = simulation, .asked = asked_of(simulation)};
@@ -85,11 +132,12 @@ static Status aim_make(Aim *aim, const Simulation *simulation, Problem *problem)
     const bool is_driven = excitation_kind(scene_excitation(scene)) != excitations[0];
     aim->impacts = 1 + impacts_a_period * periods * (double)scene->dampers.count;
     aim->growth = is_driven ? exp(fmin(growth_a_period * periods, growth_most)) : 1;
-    return STATUS_OK;
+    return foretell_modes(aim, problem);
 }
 
 static void aim_clear(Aim *aim) {
     plan_free(aim->plan);
+    free(aim->modes_error);
 }
 
 // What a relative error of displacement comes to in the metric.
@@ -114,25 +162,46 @@ static bool is_whole(const Way *way) {
 
 static Way whole_way(const Aim *aim) {
     Way way = whole;
-    way.predicted = metric_error(aim, contact_error(aim, 1e-15), NULL);
+    way.predicted = metric_error(aim, contact_error(aim, ROUNDING), NULL);
     return way;
 }
 
 // The loosest decade that keeps `error`; NAN: none is worth while.
 static double choose_tolerance(const Aim *aim, double error) {
-    const double most = error / metric_error(aim, contact_error(aim, 1e-15), NULL) * 1e-15;
+    const double most = error / metric_error(aim, contact_error(aim, ROUNDING), NULL) * ROUNDING;
     const double tolerance = pow(10, floor(log10(fmin(most, tolerance_most)) + 1e-9));
     return tolerance >= tolerance_least * (1 - 1e-9) ? tolerance : (double)NAN;
 }
 
+static double modes_share(const Aim *aim) {
+    return aim->plan->damper_count > 0 ? dampers_margin : modes_margin;
+}
+
+// The fewest modes that keep `error`; COUNT_ABSENT: it takes all.
+static uint64_t choose_modes(const Aim *aim, double error) {
+    const size_t n = aim->plan->storeys;
+    size_t kept = 1;
+    while (kept < n && aim->modes_error[kept - 1] > modes_share(aim) * error)
+        kept++;
+    return (double)kept <= modes_worth * (double)n ? kept : COUNT_ABSENT;
+}
+
+// The error of modes left out, of the metric.
+static double modes_error(const Aim *aim, const Way *way) {
+    return way->modes == COUNT_ABSENT ? 0 : aim->modes_error[way->modes - 1];
+}
+
 // The cheapest way foretold to keep `error`.
 static Way choose(const Aim *aim, double error) {
-    Way way = whole_way(aim);
-    if (aim->has_tolerance) {
-        way.tolerance = choose_tolerance(aim, error);
-        if (!isnan(way.tolerance))
-            way.predicted = metric_error(aim, contact_error(aim, way.tolerance), NULL);
-    }
+    Way way = whole;
+    const double share = aim->has_tolerance && aim->modes_error != NULL ? error / 2 : error;
+    if (aim->has_tolerance)
+        way.tolerance = choose_tolerance(aim, share);
+    if (aim->modes_error != NULL)
+        way.modes = choose_modes(aim, share);
+    const double tolerance = isnan(way.tolerance) ? ROUNDING : way.tolerance;
+    way.predicted =
+        fmin(metric_error(aim, contact_error(aim, tolerance), NULL) + modes_error(aim, &way), 1);
     return way;
 }
 
@@ -253,17 +322,6 @@ Cost aim_cost(const Simulation *simulation) {
     return cost;
 }
 
-// A run tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
 // What is at hand while one way after the other is run.
 typedef struct Session {
     Aim aim;
@@ -272,6 +330,7 @@ typedef struct Session {
     Workspace *workspace;
     double done;      // of the whole
     double steps;     // of all runs
+    Work work;        // of all runs
     Outcome *outcome; // of the last run; NULL: it failed
     PlanAttempts attempts;
 } Session;
@@ -292,14 +351,16 @@ static Status add_attempt(Session *session, const Way *way, double estimated, do
 }
 
 // The run's own estimate, as the metric has it; NAN: unknown.
-static double estimate(const Aim *aim, const Outcome *outcome) {
-    const double own = outcome->summary.error_estimate;
+static double estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
+    // Of modes left out it says only what was foretold of them.
+    const double own = outcome->summary.error_estimate - outcome->response.given_up;
     // Where the paths have parted their statistics are near each other, nobody knows how near.
     const bool is_path =
         aim->asked->metric == METRIC_DISPLACEMENT || aim->asked->metric == METRIC_MEAN_ACCELERATION;
     if (isnan(own) || (own >= 1 && !is_path))
         return (double)NAN;
-    return metric_error(aim, own, &outcome->summary);
+    return fmin(
+        metric_error(aim, own, &outcome->summary) + modes_error(aim, way) / modes_share(aim), 1);
 }
 
 // Runs one way. A cheap one that fails leaves no outcome; `estimated` is 1 then.
@@ -307,7 +368,7 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
     Simulation view;
     const double left = 1 - session->done;
     Stage stage = {session->watch, session->done, is_whole(way) ? left : left / 2};
-    const Watch watch = {&stage, stage_advance};
+    const Watch watch = stage_watch(&stage);
     outcome_drop(session->outcome);
     session->outcome = NULL;
     if (view_make(session->aim.simulation, way, &view) != STATUS_OK)
@@ -318,8 +379,9 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
     variant_free(view.accuracy);
     *estimated = 1;
     if (status == STATUS_OK) {
-        *estimated = estimate(&session->aim, session->outcome);
+        *estimated = estimate(&session->aim, way, session->outcome);
         session->steps += session->outcome->steps;
+        work_add(&session->work, &session->outcome->work);
         if (add_attempt(session, way, *estimated, session->outcome->steps) != STATUS_OK)
             status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
     } else if (!is_whole(way) && status != STATUS_CANCELLED && status != STATUS_NO_MEMORY) {
@@ -377,6 +439,7 @@ static Status finish(Session *session, const Way *way, double estimated, Problem
     target->attempts = session->attempts;
     session->attempts = (PlanAttempts){NULL, 0};
     outcome->steps = session->steps;
+    outcome->work = session->work;
     return warn(session, estimated) == STATUS_OK
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");

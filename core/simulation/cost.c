@@ -4,6 +4,7 @@
 
 #include "core/simulation/aim.h"
 #include "core/simulation/choice.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/frame_work.h"
 
 static const double TURN = 6.28318530717958647693;
@@ -27,8 +28,16 @@ static const double IMPACTS_KEPT = 1e5; // more are hardly meant
 // What the exact solver will meet.
 typedef struct Outlook {
     double samples, arcs, impacts;
+    size_t modes;
+    double digits; // of a contact under a power law
     bool is_coupled;
 } Outlook;
+
+// How many modes a run keeps.
+static size_t modes_of(const Simulation *simulation) {
+    return accuracy_modes((const Accuracy *)(const void *)simulation->accuracy,
+                          structure_storeys(scene_structure(&simulation->scene)));
+}
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
 // shows that the stops are out of reach, and coupled modes have no closed form for a whole
@@ -79,15 +88,16 @@ static double guess_impacts(const Scene *scene, const StructureRates *rates) {
 }
 
 static double frame_steps(const Scene *scene, const Outlook *outlook) {
-    const size_t n = structure_storeys(scene_structure(scene)), m = scene->dampers.count;
+    const size_t n = outlook->modes, m = scene->dampers.count;
     const bool is_coupled = outlook->is_coupled;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     const double arc = frame_work_steps(FRAME_WORK_ARC, n, m, is_coupled);
     const double event = frame_work_steps(FRAME_WORK_EVENT, n, m, is_coupled);
     const double flight = frame_work_steps(FRAME_WORK_FLIGHT, n, m, is_coupled);
-    const double contact = law->form == CONTACT_POWER
-                               ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled)
-                               : FRAME_ARCS * arc;
+    const double contact =
+        law->form == CONTACT_POWER
+            ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled) * (0.25 + 0.05 * outlook->digits)
+            : FRAME_ARCS * arc;
     return (m > 0 ? NEIGHBOUR : 1) * (outlook->samples * flight + outlook->arcs * arc +
                                       outlook->impacts * (contact + 2 * event + 2 * arc));
 }
@@ -112,14 +122,16 @@ static bool is_single(const Scene *scene) {
 static double exact_steps(const Simulation *simulation, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
+    const size_t modes = modes_of(simulation);
     StructureRates rates;
-    if (structure_rates(structure, &rates) != STATUS_OK)
+    if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // a guess without memory: the run will tell
-    const Outlook outlook = {.samples = (double)scene_sample_count(scene),
+    const Outlook outlook = {.modes = modes,
+                             .digits = -log10(exact_tolerance(choice_settings(simulation))),
+                             .samples = (double)scene_sample_count(scene),
                              .arcs = flight_arcs(scene, &rates) + base_arcs(simulation),
                              .impacts = guess_impacts(scene, &rates),
-                             .is_coupled = structure_storeys(structure) > 1 &&
-                                           isnan(structure->damping_ratio)};
+                             .is_coupled = modes > 1 && isnan(structure->damping_ratio)};
     *is_fast = outlook.arcs > outlook.samples;
     if (!is_single(scene))
         return frame_steps(scene, &outlook);
@@ -130,7 +142,7 @@ static double exact_steps(const Simulation *simulation, bool *is_fast) {
 // Steps of a solver that knows its own cost.
 static double own_steps(const Simulation *simulation) {
     Plan *plan;
-    if (plan_sketch(&simulation->scene, &plan) != STATUS_OK)
+    if (plan_sketch(&simulation->scene, modes_of(simulation), &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
         choice_solver(simulation)

@@ -29,6 +29,7 @@ static const Field psd_fields[] = {
 static const Field output_fields[] = {
     FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels that are sampled; with several storeys or dampers each with its number from 1, displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
+    FIELD_FLAG(Output, impacts, true, "whether the ledger of impacts is kept; false: they are counted, and their peaks and energies summed, but not listed"),
     FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
     FIELD_END
 };
@@ -140,7 +141,25 @@ static Status complete_solver(Simulation *simulation, Problem *problem) {
                        solver->kind.name, law->kind.name);
 }
 
+// All modes are as many as storeys, which is what none asked for means.
+static Status complete_modes(const Simulation *simulation, Problem *problem) {
+    Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (accuracy->modes == COUNT_ABSENT)
+        return STATUS_OK;
+    if (accuracy->modes > storeys)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes", (double)accuracy->modes,
+                                NULL,
+                                "must be at most %zu, the structure has one mode per storey, is "
+                                "%llu",
+                                storeys, (unsigned long long)accuracy->modes);
+    if (accuracy->modes == storeys)
+        accuracy->modes = COUNT_ABSENT;
+    return STATUS_OK;
+}
+
 static Status complete_accuracy(Simulation *simulation, Problem *problem) {
+    TRY(complete_modes(simulation, problem));
     if (aim_is_asked(simulation))
         return aim_complete(simulation, problem);
     // Without a target it says nothing.

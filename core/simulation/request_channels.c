@@ -44,6 +44,14 @@ static Status add_name(Texts *names, const Owners *owners, const Channel *channe
     return STATUS_OK;
 }
 
+size_t request_usual_count(const Scene *scene) {
+    const Owners owners = {structure_storeys(scene_structure(scene)), scene->dampers.count, false};
+    size_t count = 0;
+    for (size_t i = 0; i < COUNT(usual); i++)
+        count += owners_count(&owners, &channels[usual[i]]);
+    return count;
+}
+
 static Status add_usual(Texts *names, const Owners *owners, bool is_spectrum) {
     if (is_spectrum)
         return add_name(names, owners, &channels[CHANNEL_MEAN_ACCELERATION], owners->storeys);

@@ -11,4 +11,7 @@
 Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, const char *pointer,
                         Problem *problem);
 
+// How many channels CHANNEL_USUAL stands for, in a completed scene.
+size_t request_usual_count(const Scene *scene);
+
 #endif

@@ -4,10 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/plan/keep.h"
 #include "core/simulation/aim.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/choice.h"
+#include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/exact_accuracy.h"
+#include "core/solve/rest.h"
 #include "core/solve/solver.h"
 
 // The part nobody outside sees: how many hold it.
@@ -16,14 +20,21 @@ typedef struct Held {
     atomic_size_t holds;
 } Held;
 
+// Every solver has these rows, "auto" too.
+static const Accuracy *common_settings(const Simulation *simulation) {
+    return (const Accuracy *)(const void *)simulation->accuracy;
+}
+
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
     const Solver *solver = choice_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
-    if (solver->decide == NULL)
-        return STATUS_OK;
-    const Status status = solver->decide(choice_settings(simulation),
-                                         choice_base_interval(simulation), *plan, problem);
+    Status status =
+        plan_keep(*plan, &simulation->scene,
+                  accuracy_modes(common_settings(simulation), (*plan)->storeys), problem);
+    if (status == STATUS_OK && solver->decide != NULL)
+        status = solver->decide(choice_settings(simulation), choice_base_interval(simulation),
+                                *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
@@ -32,31 +43,51 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
                                       : status;
 }
 
+// A base that never moves is a still one, however it is given.
+static void still(Base *base) {
+    bool moves = base->form == BASE_SINE && base->amplitude != 0;
+    for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED && !moves; i++)
+        moves = base->values[i] != 0;
+    for (size_t i = 0; i < base->piece_count && base->form == BASE_PIECES && !moves; i++)
+        moves = base->pieces[i].value != 0 || base->pieces[i].slope != 0;
+    if (!moves)
+        base_clear(base);
+}
+
+// Tells what a plan leaves out as far as it is known before the run: a base in closed form costs
+// nothing to make.
+static Status foretell(const Simulation *simulation, Plan *plan, Problem *problem) {
+    const Scene *scene = &simulation->scene;
+    const Excitation *excitation = scene_excitation(scene);
+    const bool is_known = excitation_kind(excitation)->interval == NULL;
+    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
+    Base base = {0};
+    Regime regime = {0};
+    if (is_known) {
+        TRY(excitation_kind(excitation)->make(excitation, &span, NULL, &base, problem));
+        still(&base);
+        regime = regime_find(plan, &base);
+        base_clear(&base);
+    }
+    if (omissions_tell(simulation, choice_solver(simulation), plan, is_known ? &regime : NULL,
+                       &plan->report.decisions) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
+    return STATUS_OK;
+}
+
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
     memset(report, 0, sizeof *report);
     if (aim_is_asked(simulation))
         return aim_plan(simulation, report, problem);
     TRY(make_plan(simulation, &plan, problem));
-    *report = plan->report;
-    memset(&plan->report, 0, sizeof plan->report);
+    const Status status = foretell(simulation, plan, problem);
+    if (status == STATUS_OK) {
+        *report = plan->report;
+        memset(&plan->report, 0, sizeof plan->report);
+    }
     plan_free(plan);
-    return STATUS_OK;
-}
-
-// A part of the journey tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
-static Watch stage_watch(Stage *stage) {
-    return (Watch){stage, stage_advance};
+    return status;
 }
 
 // The journey's luggage: everything that must be put down again at its end.
@@ -142,18 +173,25 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
                           stock(journey), &journey->outcome->spectrum, problem);
 }
 
+// Modes left out are wrong from the start; by how much is only foretold.
+static void add_given_up(const Plan *plan, Response *response) {
+    response->given_up = plan->given_up;
+    if (!plan->is_truncated || !response->has_trust)
+        return;
+    response->error_estimate = fmin(response->error_estimate + plan->given_up, 1);
+    if (plan->given_up > RESPONSE_PARTING)
+        response->trust_horizon = 0;
+}
+
 static void summarize(Outcome *outcome) {
     const Response *response = &outcome->response;
     const double count = (double)response->statistics_count;
-    uint64_t impacts = 0;
-    for (size_t i = 0; i < response->impacts.count; i++)
-        impacts += response->impacts.at[i].kind == IMPACT_IMPACT;
     outcome->summary =
         (Summary){.peak_displacement = response->peaks.displacement,
                   .rms_displacement = sqrt(response->sum_squares_displacement / count),
                   .peak_acceleration = response->peaks.acceleration,
                   .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
-                  .impacts = impacts,
+                  .impacts = response->impact_count,
                   .peak_contact_force = response->peaks.contact_force,
                   .energy_residual = response->energy.residual,
                   .error_estimate = response->has_trust ? response->error_estimate : NAN,
@@ -173,6 +211,43 @@ static Status check_finite(const Outcome *outcome, Problem *problem) {
                        "precision can hold");
 }
 
+// Where the speeds that meet a table's stops are counted.
+static Status make_approaches(const Scene *scene, Response *response, Problem *problem) {
+    bool has_table = false;
+    for (size_t i = 0; i < 2 * scene->dampers.count; i++)
+        has_table =
+            has_table || damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table.count > 0;
+    if (!has_table)
+        return STATUS_OK;
+    response->approaches = calloc(2 * scene->dampers.count, sizeof *response->approaches);
+    if (response->approaches == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
+    for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
+        const ContactRows *rows = &damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table;
+        if (rows->count > 0)
+            response->approaches[i] = (Approaches){.has_table = true,
+                                                   .from = rows->at[0].approach_speed,
+                                                   .to = rows->at[rows->count - 1].approach_speed};
+    }
+    return STATUS_OK;
+}
+
+// By the solver, or without it where nothing moves.
+static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *problem) {
+    const Solver *solver = choice_solver(journey->simulation);
+    Outcome *outcome = journey->outcome;
+    run->is_clear = regime->is_clear;
+    if (regime->is_at_rest)
+        rest_run(run, &outcome->response);
+    else
+        TRY(solver->run(run, &outcome->response, problem));
+    outcome->steps = run->steps;
+    outcome->work = run->work;
+    outcome->work.base_samples = journey->base.count;
+    outcome->work.channel_values = run->column_count * journey->plan->count;
+    return STATUS_OK;
+}
+
 static Status travel(Journey *journey, Problem *problem) {
     const Simulation *simulation = journey->simulation;
     const Scene *scene = &simulation->scene;
@@ -187,6 +262,8 @@ static Status travel(Journey *journey, Problem *problem) {
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
     TRY(excitation_kind(excitation)
             ->make(excitation, &span, &making_watch, &journey->base, problem));
+    still(&journey->base);
+    const Regime regime = regime_find(journey->plan, &journey->base);
     Run run = {.plan = journey->plan,
                .base = &journey->base,
                .watch = &solving_watch,
@@ -205,13 +282,20 @@ static Status travel(Journey *journey, Problem *problem) {
     TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
     run.columns = journey->wanted;
     run.column_count = journey->wanted_count;
-    TRY(choice_solver(simulation)->run(&run, &outcome->response, problem));
-    outcome->steps = run.steps;
+    outcome->response.is_unlisted = !simulation->output.impacts;
+    TRY(make_approaches(scene, &outcome->response, problem));
+    TRY(solve(journey, &run, &regime, problem));
+    add_given_up(journey->plan, &outcome->response);
     summarize(outcome);
     TRY(check_finite(outcome, problem));
     if (caution_warn(scene, outcome) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(make_spectrum(journey, problem));
+    outcome->work.spectrum_segments =
+        outcome->spectrum.segments * outcome->spectrum.densities.count;
+    if (omissions_tell(simulation, choice_solver(simulation), journey->plan, &regime,
+                       &journey->plan->report.decisions) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     outcome->plan = journey->plan->report;
     memset(&journey->plan->report, 0, sizeof journey->plan->report);
     return STATUS_OK;

@@ -7,6 +7,7 @@
 #include "core/plan/plan.h"
 #include "core/result/response.h"
 #include "core/result/spectrum.h"
+#include "core/result/work.h"
 #include "core/scene/scene.h"
 #include "core/solve/solver.h"
 #include "core/solve/workspace.h"
@@ -27,6 +28,7 @@ typedef struct SpectrumRequest {
 typedef struct Output {
     Texts channels;
     SpectrumRequest psd;
+    bool impacts;           // the ledger is kept
     double statistics_from; // [s]
 } Output;
 
@@ -88,6 +90,7 @@ struct Outcome {
     Summary summary;
     Warnings warnings; // what only the run could tell
     double steps;      // solver steps, counted
+    Work work;         // what was done, kind by kind
 };
 
 // Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT

@@ -28,7 +28,7 @@ static FrameEvent event_of(const Frame *frame, size_t d, int which) {
 // having been pressed, a stop that rounding or a miss has put behind the mass, a rest without a
 // push. A force may still be rounding's before the motion `has_moved`.
 static bool find_beyond(Frame *frame, bool has_moved, FrameEvent *event) {
-    for (size_t d = 0; d < frame->dampers; d++) {
+    for (size_t d = 0; d < frame->dampers && frame->has_stops; d++) {
         FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         if (damper->phase == FRAME_CONTACT && sign * damper->r < 0 && sign * damper->w < 0) {
@@ -93,8 +93,8 @@ static Status happen(Frame *frame, const FrameEvent *event) {
 enum { RATES = 13 };              // of an ordinary step
 static const double ADVANCE = 10; // solver steps of an advance beside its rates
 
-static double adaptive_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
-    const double n = (double)storeys, m = (double)dampers;
+static double adaptive_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+    const double n = (double)modes, m = (double)dampers;
     *making = 0;
     return 100 + 3 * n * (1 + m) + (is_coupled ? 0.1 * n * n : 0);
 }
@@ -104,7 +104,7 @@ static double take_cost(Adaptive *own) {
     const Frame *frame = &own->steps->frame;
     double making;
     const double usual =
-        adaptive_cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making);
+        adaptive_cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making);
     const double cost = ADVANCE + *own->rated * (usual - ADVANCE) / RATES;
     *own->rated = 0;
     return cost;
@@ -153,6 +153,7 @@ static Status advance(Adaptive *own, double length) {
     length = fmin(fmin(length, knot), steps->length);
     if (is_poised(own))
         length *= POISED;
+    frame->run->work.stop_searches += frame->has_stops;
     TRY(ode_step(own->ode, from + length, &to, own->y, &root, frame->problem));
     const double taken = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     own->at = to;
@@ -249,7 +250,7 @@ static double cost(const Accuracy *accuracy, double base_interval, const Plan *p
     steps = fmax(steps, each / steps_mode_time(plan)) +
             7 * 25 * each * sqrt((double)plan->damper_count);
     const double one =
-        adaptive_cost(plan->storeys, plan->damper_count, steps_may_couple(plan), &making);
+        adaptive_cost(plan_mode_count(plan), plan->damper_count, steps_may_couple(plan), &making);
     return 3 * one * steps * plan->duration; // the neighbour takes twice as many
 }
 

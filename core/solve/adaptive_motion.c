@@ -16,7 +16,7 @@ enum { TOTALS = 3 };
 
 // Where the parts of y begin.
 static size_t at_r(const Frame *frame) {
-    return 2 * frame->storeys;
+    return 2 * frame->mode_count;
 }
 static size_t at_impulse(const Frame *frame) {
     return at_r(frame) + 2 * frame->dampers;
@@ -29,7 +29,7 @@ static size_t at_totals(const Frame *frame) {
 static void feel(const Adaptive *own, const double *y, double ground) {
     Steps *steps = own->steps;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *r = y + at_r(frame), *w = r + m;
     if (frame->resting > 0)
         steps_elastic(frame, y, y + n, steps->elastic);
@@ -50,7 +50,7 @@ static void feel(const Adaptive *own, const double *y, double ground) {
 static void rate(const void *context, double t, const double *y, double *out) {
     const Adaptive *own = context;
     const Frame *frame = &own->steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *p = y + n, *w = y + at_r(frame) + m;
     double *impulse = out + at_impulse(frame), *total = out + at_totals(frame);
     const double ground = slice_at(&own->slice, t - own->at);
@@ -78,7 +78,7 @@ static void watch(const void *context, double t, const double *y, double *value,
     const size_t m = frame->dampers;
     const double *r = y + at_r(frame), *w = r + m;
     rate(context, t, y, own->rates);
-    for (size_t d = 0; d < m; d++) {
+    for (size_t d = 0; d < m && frame->has_stops; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double sign = frame_sign(damper->side);
         double *is = value + ADAPTIVE_WATCHED * d, *goes = slope + ADAPTIVE_WATCHED * d;
@@ -111,7 +111,7 @@ static void watch(const void *context, double t, const double *y, double *value,
 // What is large for each component; returns a first step.
 static double make_scale(Adaptive *own) {
     const Frame *frame = &own->steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *scale = own->scale, *r = scale + at_r(frame), *w = r + m;
     double *impulse = scale + at_impulse(frame), *totals = scale + at_totals(frame);
     const double push = fabs(own->slice.value) + fabs(own->slice.slope) * frame->interval;
@@ -152,7 +152,7 @@ static double make_scale(Adaptive *own) {
 
 Status adaptive_motion_start(Adaptive *own) {
     const Frame *frame = &own->steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *r = own->y + at_r(frame);
     memset(own->y, 0, own->size * sizeof *own->y);
     memcpy(own->y, frame->q, n * sizeof *own->y);
@@ -183,7 +183,7 @@ static void leave(Frame *frame, FrameDamper *damper) {
 
 void adaptive_motion_take(Adaptive *own, double length) {
     Frame *frame = &own->steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *y = own->y, *before = own->before, *r = y + at_r(frame);
     const size_t sums = at_impulse(frame), totals = at_totals(frame);
     memcpy(frame->q, y, n * sizeof *y);
@@ -219,7 +219,7 @@ Status adaptive_motion_make(Adaptive *own, Steps *steps) {
     own->block = calloc(4 * own->size + 2 * m + 1, sizeof *own->block);
     const OdeSystem system = {.context = own,
                               .size = own->size,
-                              .roots = ADAPTIVE_WATCHED * m,
+                              .roots = frame->has_stops ? ADAPTIVE_WATCHED * m : 0,
                               .tolerance = steps->tolerance,
                               .rate = rate,
                               .watch = watch};

@@ -11,20 +11,18 @@
 // interval is one matrix step if a bound on the gap's curvature allows it, and everything else goes
 // by arcs (arc.h), whose polynomials locate events to rounding. Time is a sample's number and an
 // offset from it, so that short contacts keep their digits late in a run.
-#include "core/solve/exact.h"
-
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
 #include "core/solve/frame.h"
-#include "core/solve/frame_ode.h"
 #include "core/solve/refine.h"
 #include "core/solve/solver.h"
 
@@ -119,6 +117,7 @@ static Status advance(Exact *exact, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&exact->base, exact->sample, exact->offset, &slice);
     length = fmin(length, knot);
+    exact->run->work.arcs++;
     if (exact->phase == CONTACT && ++exact->contact_arcs > HOLD_AFTER) {
         exact->run->steps += HOLD_STEPS;
         if (hold(exact, &slice, length))
@@ -169,7 +168,8 @@ static bool fly(Exact *exact) {
     ArcIntegrals integrals;
     integrals.ww = 0;
     const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
-    if (exact->plan->damper_count > 0) {
+    if (exact->has_stops) {
+        exact->run->work.stop_searches++;
         const double first = fabs(slice.value),
                      last = fabs(slice.value + slice.slope * exact->interval);
         const double most = slice.omega > 0 ? first + fabs(slice.slope)
@@ -186,6 +186,7 @@ static bool fly(Exact *exact) {
     take_integrals(exact, &integrals);
     exact->state = end;
     exact->run->steps++;
+    exact_count_flight(exact, 1);
     return true;
 }
 
@@ -236,6 +237,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     exact->damper = plan->dampers;
     exact->problem = problem;
     exact->interval = 1 / plan->sample_rate;
+    exact->has_stops = plan->damper_count > 0 && !run->is_clear;
     const double total = plan->mass[0] + exact->damper->mass;
     const double share = exact->damper->mass / total, mass = plan->mass[0] * share;
     Motion flying = {.omega2 = plan->stiffness[0] / plan->mass[0],
@@ -245,7 +247,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     flying.rate = fmax(own, 1e-300);
     exact->flying = exact->resting = flying;
     exact->resting.is_resting = true;
-    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && plan->damper_count > 0; side++) {
+    for (int side = 0; side < 2 && plan->form == CONTACT_LINEAR && exact->has_stops; side++) {
         Motion *touching = &exact->touching[side];
         *touching = flying;
         touching->contact_omega2 = exact->damper->stops[side].stiffness / mass;
@@ -330,7 +332,9 @@ static Status solve(Exact *exact) {
     trust_tell(&exact->trust, exact->ledger.response);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
-    return ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
+    const Status status = ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
+    ledger_count(&exact->ledger, &exact->run->work);
+    return status;
 }
 
 static Status start(Exact *exact, Run *run, Response *response, Problem *problem) {
@@ -365,7 +369,7 @@ static Status run_on_grid(Run *run, Response *response, Problem *problem) {
 }
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
-    if (!plan_is_single(run->plan))
+    if (!plan_is_single(run->plan) && !(run->is_clear && plan_is_single_in_flight(run->plan)))
         return frame_run(run, response, problem);
     // A base whose samples are further apart than the output's goes by strides once it has them.
     const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
@@ -378,51 +382,16 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     own.base = &refined;
     const Status status = run_on_grid(&own, response, problem);
     run->steps = own.steps;
+    run->work = own.work;
     workspace_tidy(workspace);
     workspace_clear(&none);
     return status;
 }
 
-double exact_tolerance(const Accuracy *accuracy) {
-    const double asked =
-        accuracy == NULL ? (double)NAN : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
-    return asked > FRAME_ODE_TOLERANCE ? asked : FRAME_ODE_TOLERANCE;
-}
-
-// Linear contacts and impulses have closed forms.
-static void forget_unused(Accuracy *accuracy, bool has_power_law) {
-    if (!has_power_law)
-        ((AccuracyExact *)(void *)accuracy)->tolerance = (double)NAN;
-}
-
-static Status decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
-    (void)base_interval;
-    (void)problem;
-    if (plan->form != CONTACT_POWER || plan->damper_count == 0)
-        return STATUS_OK;
-    const double tolerance = exact_tolerance(accuracy);
-    const bool is_asked = tolerance > FRAME_ODE_TOLERANCE;
-    return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
-                         tolerance, NULL,
-                         is_asked ? "relative error that a contact may end with; flight between "
-                                    "contacts is exact, and instants are found as well as these "
-                                    "contacts are known"
-                                  : "each contact as exact as rounding lets it be, for none asked "
-                                    "for less");
-}
-
-// clang-format off
-static const Field exact_fields[] = {
-    FIELD_BASE(AccuracyExact, accuracy, accuracy_fields),
-    FIELD_REAL(AccuracyExact, tolerance, NULL, WITHIN(1e-15, 1e-1), OPTIONAL, "relative error that a contact under a power law may end with; if absent none but rounding's; of no use to other laws, whose contacts have closed forms"),
-    FIELD_END
-};
-// clang-format on
-
 const Solver solver_exact = {
     .kind = {"exact", "each contact state propagated exactly, events located to rounding",
-             exact_fields, sizeof(AccuracyExact)},
+             accuracy_exact_fields, sizeof(AccuracyExact)},
     .run = exact_run,
-    .decide = decide,
-    .forget_unused = forget_unused,
+    .decide = exact_decide,
+    .forget_unused = exact_forget_unused,
 };

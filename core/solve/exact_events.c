@@ -122,7 +122,7 @@ void exact_release(Exact *exact) {
 }
 
 // Finds the first event on the arc. In flight `side` is the stop that is reached.
-bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side) {
+bool exact_find_event(Exact *exact, const Arc *arc, double *s, Side *side) {
     double gap[ROOT_DEGREE + 1] = {0};
     *side = exact->side;
     if (exact->phase == RESTING) {
@@ -141,8 +141,9 @@ bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side)
         return root_first_crossing(gap, arc->degree, s);
     }
     bool is_found = false;
-    if (exact->plan->damper_count == 0)
+    if (!exact->has_stops)
         return false;
+    exact->run->work.stop_searches++;
     for (int i = 0; i < 2; i++) {
         const double sign = exact_sign((Side)i);
         for (size_t k = 0; k <= arc->degree; k++)

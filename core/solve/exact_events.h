@@ -6,7 +6,7 @@
 #include "core/solve/exact_state.h"
 
 // Finds the first event on the arc, at s; in flight *side is the stop that is reached.
-bool exact_find_event(const Exact *exact, const Arc *arc, double *s, Side *side);
+bool exact_find_event(Exact *exact, const Arc *arc, double *s, Side *side);
 
 void exact_touch(Exact *exact, Side side); // flight ends
 void exact_release(Exact *exact);          // contact or rest ends

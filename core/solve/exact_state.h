@@ -39,6 +39,7 @@ typedef struct Exact {
     Problem *problem;
     Motion flying, touching[2], resting;
     Stretch stretch;
+    bool has_stops;    // that a mass may reach
     bool has_hops;     // intervals are short enough for hop.h
     double base_slope; // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
     size_t pending;    // samples whose sums wait in `stretch`
@@ -183,6 +184,12 @@ static inline void exact_slice(Exact *exact, Slice *slice) {
         }
         exact_turn(&exact->sine, exact->offset, slice);
     }
+}
+
+static inline void exact_count_flight(Exact *exact, size_t samples) {
+    Work *work = &exact->run->work;
+    *(exact->run->base->form == BASE_STILL ? &work->unforced_samples : &work->flight_samples) +=
+        samples;
 }
 
 static inline const Motion *exact_motion(const Exact *exact) {

@@ -114,11 +114,13 @@ static size_t fly(Exact *exact, size_t most) {
     // The sample where statistics begin is not for blocks: much begins anew there.
     if (exact->sample < exact->recorder.statistics_start)
         most = smaller(most, exact->recorder.statistics_start - 1 - exact->sample);
-    if (exact->plan->damper_count > 0) {
+    if (exact->has_stops) {
+        exact->run->work.stop_searches++;
         s->left = exact_room(exact, SIDE_LEFT);
         s->right = exact_room(exact, SIDE_RIGHT);
-        s->middle = exact_relative(exact) - exact->state.r;
     }
+    if (exact->plan->damper_count > 0)
+        s->middle = exact_relative(exact) - exact->state.r;
     const double z = exact->state.v + exact->state.w;
     s->x = exact->state.x;
     s->v = exact->state.v;
@@ -135,6 +137,7 @@ static size_t fly(Exact *exact, size_t most) {
     exact->pending += count;
     exact->sample += count;
     exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
+    exact_count_flight(exact, count);
     exact->recorder.last_velocity = s->v;
     if (exact->pending >= PENDING_MOST)
         exact_stride_enter(exact);
@@ -313,11 +316,12 @@ size_t exact_stride(Exact *exact, size_t most) {
     while (count < most) {
         const size_t flown = fly(exact, most - count);
         count += flown;
-        if (count == most || exact->plan->damper_count == 0)
+        if (count == most || !exact->has_stops)
             break;
         if (exact->sample + 1 == exact->recorder.statistics_start || !exact->has_hops)
             break;
         Side side;
+        exact->run->work.stop_searches++;
         const Way way = is_wide ? reach_wide(exact, &side) : reach(exact, &side);
         if (way == UNCLEAR)
             break;

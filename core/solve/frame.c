@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/exact.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/frame_neighbour.h"
 #include "core/solve/frame_record.h"
 

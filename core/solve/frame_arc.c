@@ -27,8 +27,8 @@ Status frame_arc_room(FrameArc *arc, const Frame *frame, Problem *problem) {
         frame_lanes_room((ROW + 1 + NODES + 2) * n + (2 * ROW + 1) * m + ARC_RULES * NODES * ROW),
         sizeof *arc->block);
     if (arc->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                           frame->storeys);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                           frame->mode_count);
     arc->q = frame_lanes_start(arc->block);
     arc->work = arc->q + (ROW + 1) * n; // an order more is written than is kept
     arc->r = arc->work + (NODES + 2) * n;
@@ -197,7 +197,8 @@ static void damping_power(const Frame *frame, const double *p, size_t count, dou
         return;
     }
     for (size_t j = 0; j < count; j++, p += n) {
-        frame->lanes->multiply(frame->coupled, n, p, frame->storeys + frame->storeys % 2, scratch);
+        frame->lanes->multiply(frame->coupled, n, p, frame->mode_count + frame->mode_count % 2,
+                               scratch);
         frame->lanes->dot(n, 1, scratch, p, &power[j]);
     }
 }

@@ -25,7 +25,7 @@ void frame_push(Frame *frame, const double *impulses) {
         if (impulse == 0)
             continue;
         const double *shape = frame->damper[d].shape;
-        for (size_t i = 0; i < frame->storeys; i++)
+        for (size_t i = 0; i < frame->mode_count; i++)
             frame->p[i] += shape[i] * impulse;
         for (size_t e = 0; e < frame->dampers; e++)
             frame->damper[e].w -= frame->yield[e * frame->dampers + d] * impulse;

@@ -13,7 +13,7 @@ enum { TERMS = 22, NODES = 8, WATCH_PRODUCTS = 1000000 };
 
 typedef long double Real;
 
-typedef struct Work {
+typedef struct DenseWork {
     const Frame *frame;
     const FrameDamper *contact; // or NULL
     size_t modes;
@@ -27,10 +27,10 @@ typedef struct Work {
     Real *speeds; // node after node, column after column, of all modes
     Real *pulls;  // D times those of one column
     size_t done;  // products since the watch was asked
-} Work;
+} DenseWork;
 
 // Coefficients in t / h of a_g for a unit of value or of slope.
-static void base_series(const Work *work, bool is_slope, Real *a) {
+static void base_series(const DenseWork *work, bool is_slope, Real *a) {
     memset(a, 0, TERMS * sizeof *a);
     if (!work->is_sine) {
         a[is_slope ? 1 : 0] = is_slope ? work->h : 1;
@@ -46,7 +46,7 @@ static void base_series(const Work *work, bool is_slope, Real *a) {
 }
 
 // Before so many products.
-static bool goes_on(Work *work, size_t products) {
+static bool goes_on(DenseWork *work, size_t products) {
     const Frame *frame = work->frame;
     if ((work->done += products) < WATCH_PRODUCTS)
         return true;
@@ -78,7 +78,8 @@ static Real dot_long(const Real *row, const Real *values, size_t count) {
 }
 
 // Of all freedoms.
-static void accelerate(const Work *work, const Real *at, const Real *speed, Real base, Real *out) {
+static void accelerate(const DenseWork *work, const Real *at, const Real *speed, Real base,
+                       Real *out) {
     const Frame *frame = work->frame;
     const FrameDamper *contact = work->contact;
     const size_t n = work->modes;
@@ -99,7 +100,7 @@ static void accelerate(const Work *work, const Real *at, const Real *speed, Real
 }
 
 // The freedoms' series from a unit of component j of y.
-static void column_series(Work *work, size_t j) {
+static void column_series(DenseWork *work, size_t j) {
     const size_t n = work->n;
     const Real h = work->h;
     Real a[TERMS] = {0}, *c = work->series, *speed = work->pulls;
@@ -135,7 +136,7 @@ static Real slope_at(const Real *c, size_t stride, Real s) {
 }
 
 // T over h, and the speeds of all columns at the nodes. False: cancelled.
-static bool make_small(Work *work, const Quadrature *rule) {
+static bool make_small(DenseWork *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size;
     memset(work->T, 0, size * size * sizeof *work->T);
     for (size_t j = 0; j < size; j++) {
@@ -167,7 +168,7 @@ static bool make_small(Work *work, const Quadrature *rule) {
 }
 
 // F, C and G over h. False: cancelled.
-static bool make_forms(Work *work, const Quadrature *rule) {
+static bool make_forms(DenseWork *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size, modes = work->modes;
     const Real viscous = work->contact == NULL ? 0 : work->contact->contact.damping;
     const double *damping = work->frame->damping;
@@ -210,7 +211,7 @@ static bool make_forms(Work *work, const Quadrature *rule) {
 }
 
 // out += a b. False: cancelled.
-static bool add_product(Work *work, const Real *a, const Real *b, size_t rows, Real *out) {
+static bool add_product(DenseWork *work, const Real *a, const Real *b, size_t rows, Real *out) {
     const size_t size = work->size;
     for (size_t i = 0; i < rows; i++) {
         if (!goes_on(work, size * size))
@@ -235,7 +236,7 @@ static void transpose(Real *matrix, size_t size) {
 }
 
 // form += (I + T)' form (I + T). False: cancelled.
-static bool form_twice(Work *work, Real *form) {
+static bool form_twice(DenseWork *work, Real *form) {
     const size_t size = work->size;
     Real *T = work->T, *product = work->product;
     memcpy(product, form, size * size * sizeof *product);
@@ -250,7 +251,7 @@ static bool form_twice(Work *work, Real *form) {
 }
 
 // Everything over twice the time. False: cancelled.
-static bool twice(Work *work) {
+static bool twice(DenseWork *work) {
     const size_t size = work->size, A = 2 * work->n, bytes = size * size * sizeof(Real);
     Real *T = work->T, *product = work->product;
     memcpy(product, work->G, 2 * size * sizeof *product);
@@ -274,7 +275,7 @@ static bool twice(Work *work) {
     return true;
 }
 
-static void fill(FrameDense *dense, const Work *work) {
+static void fill(FrameDense *dense, const DenseWork *work) {
     const size_t size = work->size, gains = 2 * work->n;
     for (size_t j = 0; j < size; j++) {
         for (size_t i = 0; i < gains; i++)
@@ -308,7 +309,7 @@ static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
     return STATUS_OK;
 }
 
-static Status make(FrameDense *dense, size_t levels, Work *work, Problem *problem) {
+static Status make(FrameDense *dense, size_t levels, DenseWork *work, Problem *problem) {
     const Frame *frame = work->frame;
     size_t left = 0; // doublings
     for (; work->h * rate_of(frame) > 0.5L; work->h /= 2)
@@ -318,8 +319,8 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
     for (; is_whole; left--) {
         if (left < levels) {
             if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
-                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                                   frame->storeys);
+                return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                                   frame->mode_count);
             fill(&dense[left], work);
         }
         if (left == 0)
@@ -331,21 +332,21 @@ static Status make(FrameDense *dense, size_t levels, Work *work, Problem *proble
 
 Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
                         const FrameDamper *contact, Problem *problem) {
-    const size_t n = frame->storeys + (contact != NULL), size = 2 * n + 2, square = size * size;
+    const size_t n = frame->mode_count + (contact != NULL), size = 2 * n + 2, square = size * size;
     memset(dense, 0, levels * sizeof *dense);
     Real *room =
         malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
     if (room == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                           frame->storeys);
-    Work work = {.frame = frame,
-                 .contact = contact,
-                 .modes = frame->storeys,
-                 .n = n,
-                 .size = size,
-                 .is_sine = frame->turning > 0,
-                 .omega = frame->turning,
-                 .h = frame->interval};
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                           frame->mode_count);
+    DenseWork work = {.frame = frame,
+                      .contact = contact,
+                      .modes = frame->mode_count,
+                      .n = n,
+                      .size = size,
+                      .is_sine = frame->turning > 0,
+                      .omega = frame->turning,
+                      .h = frame->interval};
     work.T = room;
     work.F = work.T + square;
     work.C = work.F + square;
@@ -356,11 +357,11 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
     const double mass = contact == NULL ? 0 : contact->plan->mass;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         work.share[i] =
             frame->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
     if (contact != NULL)
-        work.share[frame->storeys] = mass;
+        work.share[frame->mode_count] = mass;
     const Status status = make(dense, levels, &work, problem);
     free(room);
     return status;

@@ -7,10 +7,11 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "core/solve/frame_work.h"
 
-enum { STILL_EVENTS = 1000, STORM_EVENTS = 100 };
+enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
 // An arc this short would lose its speeds' digits below the smallest doubles: it takes no time.
 static const double SHORTEST = 1e-250; // [s]
@@ -25,7 +26,7 @@ Status frame_engine_check(FrameEngine *engine) {
     engine->work = 0;
     const EnergyState energy = frame_energy(frame);
     double sum = energy.kinetic + energy.strain;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         sum += fabs(frame->q[i]);
     for (size_t d = 0; d < frame->dampers; d++)
         sum += fabs(frame->damper[d].r);
@@ -45,7 +46,7 @@ Status frame_engine_check(FrameEngine *engine) {
 
 static double each(const FrameEngine *engine, FrameWorkKind kind) {
     const Frame *frame = &engine->frame;
-    return frame_work_steps(kind, frame->storeys, frame->dampers, frame->diagonal == NULL);
+    return frame_work_steps(kind, frame->mode_count, frame->dampers, frame->diagonal == NULL);
 }
 
 static Status count_steps(FrameEngine *engine, double steps) {
@@ -138,13 +139,19 @@ static Status press(FrameEngine *engine, const Slice *slice, double length) {
     frame_ode_step(&engine->ode, slice, length, &step);
     ledger_work(&frame->ledger, step.input, step.damping);
     engine->record.base_speed += step.ground;
+    const double before = frame->offset;
     frame->offset += step.length;
     frame->ground = slice_at(slice, step.length);
     frame->still_events = 0;
+    // A step may be shorter than what the clock tells, or end where it began; not very many in
+    // turn.
+    engine->idle = frame->offset > before ? 0 : engine->idle + 1;
+    frame->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
         TRY(happen(frame, &step.event));
     else
         frame_record_note(frame);
+    frame->run->work.steps++;
     return count_steps(engine, step.work / WORK_OF_STEP);
 }
 
@@ -193,6 +200,7 @@ static Status advance(FrameEngine *engine, double length) {
     const bool stays = is_stalled(frame);
     const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
     frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
+    frame->run->work.arcs++;
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event) &&
                           !(stays && event.s * arc->length <= frame_clock(frame));
@@ -256,12 +264,17 @@ static size_t fly(FrameEngine *engine, size_t until) {
         frame->sample + count >= record->statistics_start)
         count = record->statistics_start - 1 - frame->sample;
     count = engine->flight.length == 0 ? 0 : find_slices(frame, count, slices);
+    frame->run->work.stop_searches += count > 0 && frame->has_stops;
     if (count > 0)
         count = frame_flight_run(&engine->flight, &engine->trail, frame, slices, count,
                                  frame->is_shadow ? NULL : &work);
     frame->sample += count;
     if (count == 0 || frame->is_shadow)
         return count;
+    Work *done = &frame->run->work;
+    *(frame->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
+        count;
+    done->mode_samples += count * frame->mode_count;
     frame->ground = base_cursor_at(&frame->base, frame->sample);
     ledger_work(&frame->ledger, work.input, work.damping);
     FrameTrail *trail = &engine->trail;
@@ -308,6 +321,18 @@ void frame_engine_take_sample(FrameEngine *engine) {
     frame_record_peaks(frame);
 }
 
+// Notes the samples just passed: so many flown over, or the present one.
+static void track(FrameEngine *engine, size_t flown) {
+    const Frame *frame = &engine->frame;
+    const FrameTrail *trail = &engine->trail;
+    for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
+        const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
+        memcpy(engine->track + (sample - 1) % TRAIL_MOST * frame->padded,
+               flown > 0 ? trail->q + k * trail->padded : frame->q,
+               frame->mode_count * sizeof *engine->track);
+    }
+}
+
 Status frame_engine_step(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
     const size_t flown = fly(engine, until);
@@ -315,10 +340,13 @@ Status frame_engine_step(FrameEngine *engine, size_t until) {
         TRY(count_steps(engine, (double)flown * each(engine, FRAME_WORK_FLIGHT)));
     } else {
         TRY(frame_engine_cross(engine, frame->interval));
+        frame->run->work.mode_samples += frame->mode_count;
         frame->sample++;
         frame->offset = 0;
         frame_engine_take_sample(engine);
     }
+    if (engine->track != NULL)
+        track(engine, flown);
     balance(frame);
     return STATUS_OK;
 }

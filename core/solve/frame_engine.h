@@ -21,10 +21,14 @@ typedef struct FrameEngine {
     FrameOde ode;
     FrameTrail trail;
     FrameRecord record;
-    double work; // since the watch was asked
+    double work;   // since the watch was asked
+    size_t idle;   // steps of contact in a row that took no time
+    double *track; // of the last TRAIL_MOST samples, all modes: sample k at (k - 1) % TRAIL_MOST;
+                   // NULL: not wanted
 } FrameEngine;
 
-// `tolerance` is of contacts under a power law. Cleared by frame_engine_clear, also after a failure.
+// `tolerance` is of contacts under a power law. Cleared by frame_engine_clear, also after a
+// failure.
 Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Response *response,
                          Problem *problem);
 void frame_engine_clear(FrameEngine *engine);

@@ -325,6 +325,9 @@ static void find_end(const Frame *frame, const FrameArc *arc, size_t d, bool *is
 
 bool frame_find_event(const Frame *frame, const FrameArc *arc, FrameEvent *event) {
     bool is_found = false;
+    if (!frame->has_stops)
+        return false;
+    frame->run->work.stop_searches++;
     for (size_t d = 0; d < frame->dampers && !(is_found && event->s == 0); d++) {
         if (frame->damper[d].phase == FRAME_FLIGHT)
             find_touch(frame, arc, d, &is_found, event);

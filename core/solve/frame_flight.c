@@ -66,7 +66,7 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
 }
 
 Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     memset(flight, 0, sizeof *flight);
     if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
         return STATUS_OK; // a_g has its kinks inside the intervals
@@ -86,12 +86,12 @@ Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *probl
     for (size_t i = 0; i < FRAME_SUMS; i++)
         arrays[8 + i] = &flight->loss[i];
     const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
-    const size_t padded = frame_lanes_padded(n);
+    const size_t padded = frame->padded;
     const size_t starts = FRAME_FOUR * (2 * n + 2);
     const size_t ends = FRAME_FOUR * frame_lanes_padded(2 * n + 2);
     flight->block = calloc((count + FRAME_SUMS) * padded + starts + ends, sizeof *flight->block);
     if (flight->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + i * padded;
     flight->sums = flight->block + count * padded;
@@ -112,7 +112,7 @@ void frame_flight_clear(FrameFlight *flight) {
 // Rows 1 to count of the trail.
 static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
                       size_t count) {
-    const size_t n = frame->storeys, padded = trail->padded;
+    const size_t n = frame->mode_count, padded = trail->padded;
     double *start = flight->start, *gained = flight->gained;
     for (size_t k = 0; k < count; k++) {
         const size_t now = k * padded, next = now + padded;
@@ -132,7 +132,7 @@ static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame 
 
 static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
                 const Slice *slices, size_t count) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     memcpy(trail->q, frame->q, n * sizeof *trail->q);
     memcpy(trail->p, frame->p, n * sizeof *trail->p);
     for (size_t k = 0; k < count; k++) {
@@ -159,7 +159,7 @@ bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, do
 static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
                            size_t count, FrameWork *work) {
     const FrameDense *dense = &flight->dense;
-    const size_t n = frame->storeys, size = dense->size;
+    const size_t n = frame->mode_count, size = dense->size;
     for (size_t from = 0; from < count; from += FRAME_FOUR) {
         const size_t many = count - from < FRAME_FOUR ? count - from : FRAME_FOUR;
         for (size_t k = from; k < from + many; k++) {
@@ -181,7 +181,7 @@ static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, c
 
 static void add_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
                      size_t count, FrameWork *work) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     const size_t padded = trail->padded;
     double *sums = flight->sums;
     memset(sums, 0, FRAME_SUMS * padded * sizeof *sums);
@@ -212,7 +212,7 @@ static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *fr
     double moved[TRAIL_ROWS];
     frame->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
     r[0] = damper->r;
-    z[0] = frame_dot(damper->shape, trail->p, frame->storeys) + damper->w;
+    z[0] = frame_dot(damper->shape, trail->p, frame->mode_count) + damper->w;
     for (size_t k = 0; k < count; k++) {
         far += flight->length * z[k] -
                (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
@@ -272,19 +272,21 @@ static size_t guess(const FrameFlight *flight, const Frame *frame, size_t count)
 
 size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
                         size_t count, FrameWork *work) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     double shaken = 0;
-    count = guess(flight, frame, count);
+    if (frame->has_stops)
+        count = guess(flight, frame, count);
     fly(flight, trail, frame, slices, count);
     for (size_t k = 0; k < count; k++)
         shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
     const double most =
-        frame->dampers > 0 ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
+        frame->has_stops ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
         const double bend = damper->reach * most + fabs(damper->lean) * shaken;
         follow(flight, trail, frame, d, count, slices);
-        count = count_clear(flight, trail, frame, d, bend, slices, count);
+        if (frame->has_stops)
+            count = count_clear(flight, trail, frame, d, bend, slices, count);
     }
     if (count == 0)
         return 0;

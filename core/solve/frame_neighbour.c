@@ -8,7 +8,7 @@
 static const double NUDGE = 4 * DBL_EPSILON;
 static const double PARTED = 0.01; // of the largest displacement: what comes then is chance
 static const double FINER = 30;    // than the run's tolerance
-static const double CAUTION = 2;   // with what comes between two comparisons
+static const double CAUTION = 3;   // with what comes between two comparisons
 
 // Whether the run's contacts may be wrong by more than rounding.
 static bool is_loose(const FrameEngine *engine) {
@@ -18,7 +18,7 @@ static bool is_loose(const FrameEngine *engine) {
 // Some roundings more, of either sign.
 static void nudge(Frame *frame) {
     const double by = NUDGE;
-    for (size_t i = 0; i < frame->storeys; i++) {
+    for (size_t i = 0; i < frame->mode_count; i++) {
         const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
         frame->q[i] *= 1 + sign * by;
         frame->p[i] *= 1 - sign * by;
@@ -30,32 +30,34 @@ static double part_of(const FrameNeighbour *neighbour) {
     return neighbour->is_stepped ? CAUTION : 1;
 }
 
-// What a mode's difference comes to until it is looked at again: as far as it swings.
-static double swing(const FrameNeighbour *neighbour, const Frame *frame, size_t i, double apart) {
-    const double omega = sqrt(frame->omega2[i]), since = NEIGHBOUR_SAMPLES * frame->interval;
-    const double speed = frame->p[i] - neighbour->engine.frame.p[i];
-    return hypot(apart, speed * (omega * since > 1 ? 1 / omega : since));
-}
-
-static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
-    const size_t n = frame->storeys;
+// Of the modes' displacements at one sample.
+static void look(FrameNeighbour *neighbour, const Frame *frame, const double *run,
+                 const double *near) {
+    const size_t n = frame->mode_count;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
-        apart[i] = frame->q[i] - neighbour->engine.frame.q[i];
-        if (neighbour->is_stepped)
-            apart[i] = swing(neighbour, frame, i, apart[i]);
+        apart[i] = run[i] - near[i];
         bound += frame->widest[i] * fabs(apart[i]);
     }
-    neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
     if (bound <= neighbour->worst)
         return;
     const double *values = frame_spread(frame, apart);
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < frame->storey_count; j++)
         difference = fmax(difference, fabs(values[j]));
-    if (neighbour->is_stepped)
-        difference = bound; // swings need not be in step
     neighbour->worst = fmax(neighbour->worst, difference);
-    const double error = part_of(neighbour) * difference;
+}
+
+static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
+    neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
+    if (neighbour->is_stepped) {
+        // Such an error is no growing noise: it swings as the motion does.
+        const double *run = neighbour->tracks, *near = run + NEIGHBOUR_SAMPLES * frame->padded;
+        for (size_t k = 0; k < frame->sample - before; k++)
+            look(neighbour, frame, run + k * frame->padded, near + k * frame->padded);
+    } else {
+        look(neighbour, frame, frame->q, neighbour->engine.frame.q);
+    }
+    const double error = part_of(neighbour) * neighbour->worst;
     if (isnan(neighbour->horizon) && !(error <= RESPONSE_PARTING * neighbour->largest))
         neighbour->horizon = (double)before / frame->plan->sample_rate;
     neighbour->is_spent = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
@@ -71,6 +73,7 @@ bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     while (own->sample < frame->sample && neighbour->is_known)
         neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
     frame->run->steps = neighbour->run.steps;
+    frame->run->work.neighbour_samples += own->sample - from;
     if (neighbour->is_known)
         compare(neighbour, frame, from);
     else
@@ -78,28 +81,43 @@ bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     return neighbour->is_known;
 }
 
-void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine) {
+// The neighbour follows; progress is the run's.
+static bool ask(void *context, double fraction) {
+    const Frame *frame = context;
+    (void)fraction;
+    return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
+}
+
+void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     const Frame *frame = &engine->frame;
     memset(neighbour, 0, sizeof *neighbour);
     neighbour->horizon = NAN;
     neighbour->is_known = neighbour->is_spent = true;
-    if (frame->dampers == 0)
+    if (!frame->has_stops)
         return;
+    neighbour->watch = (Watch){&engine->frame, ask};
     neighbour->run = (Run){.plan = frame->plan,
                            .base = frame->run->base,
-                           .watch = frame->run->watch,
+                           .watch = &neighbour->watch,
                            .impacts_most = frame->run->impacts_most,
                            .steps_most = frame->run->steps_most};
+    neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;
+    neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
+    const size_t tracked = neighbour->is_stepped ? NEIGHBOUR_SAMPLES * frame->padded : 0;
+    neighbour->tracks = calloc(2 * tracked + 1, sizeof *neighbour->tracks);
     neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
     neighbour->is_known =
-        neighbour->apart != NULL &&
+        neighbour->apart != NULL && neighbour->tracks != NULL &&
         frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
                             fmax(engine->ode.tolerance / FINER, FRAME_ODE_TOLERANCE),
                             &neighbour->response) == STATUS_OK;
-    neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
     if (!neighbour->is_known)
         return;
+    if (neighbour->is_stepped) {
+        engine->track = neighbour->tracks;
+        neighbour->engine.track = neighbour->tracks + tracked;
+    }
     nudge(own);
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
@@ -128,4 +146,5 @@ void frame_neighbour_clear(FrameNeighbour *neighbour) {
     frame_clear(&neighbour->engine.frame);
     response_clear(&neighbour->response);
     free(neighbour->apart);
+    free(neighbour->tracks);
 }

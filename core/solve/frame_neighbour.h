@@ -6,12 +6,13 @@
 
 #include "core/solve/frame_engine.h"
 
-enum { NEIGHBOUR_SAMPLES = 16 };
+enum { NEIGHBOUR_SAMPLES = TRAIL_MOST };
 
 // All zero is empty.
 typedef struct FrameNeighbour {
     FrameEngine engine;
     Run run;
+    Watch watch; // the run's, told the run's own progress
     Response response;
     bool is_spent;         // parted, or failed: nothing is left to follow
     bool is_known;         // never failed
@@ -19,11 +20,12 @@ typedef struct FrameNeighbour {
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
     double *apart;         // scratch, of all modes
+    double *tracks;        // of both runs, where every sample is compared
 } FrameNeighbour;
 
 // Beside an engine that has settled. A failure only leaves the run without an estimate. Cleared by
 // frame_neighbour_clear, also if it was never started.
-void frame_neighbour_start(FrameNeighbour *neighbour, const FrameEngine *engine);
+void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine);
 void frame_neighbour_clear(FrameNeighbour *neighbour);
 
 // Follows the run to the sample it has just reached, NEIGHBOUR_SAMPLES on or fewer; its steps are

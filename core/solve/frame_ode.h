@@ -17,6 +17,7 @@ typedef struct FrameOdeContact {
     double depth;         // p that such a speed comes to [m]
     double push;          // p'' without N [m/s^2]
     double negligible;    // N is, below this p [m]
+    int passed;           // the kink at the end of the last step: 1 upwards, -1 downwards, 0 none
     double strain;        // at the start of a step [J]
     double impulse, work; // of N over it [N s], [J]
 } FrameOdeContact;

@@ -26,14 +26,14 @@ static const double SHORT_ARC = 0.25; // steps beyond SOFT_LEVEL are no shorter,
 static const double RIPPLE_MOST = 1e-9;
 
 Status frame_press_make(FramePress *press, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, size = frame_lanes_padded(2 * (n + 1) + 2);
+    const size_t n = frame->mode_count, size = frame_lanes_padded(2 * (n + 1) + 2);
     memset(press, 0, sizeof *press);
     if (frame->plan->form != CONTACT_LINEAR || frame->dampers == 0)
         return STATUS_OK;
     press->stops = calloc(2 * frame->dampers, sizeof *press->stops);
     press->block = calloc(3 * size + frame->padded, sizeof *press->block);
     if (press->stops == NULL || press->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     press->count = 2 * frame->dampers;
     press->start = press->block;
     press->gained = press->start + size;
@@ -75,7 +75,7 @@ static FrameDamper *find_alone(const Frame *frame) {
 
 // A step takes some products for each two modes, an arc more of them for each mode.
 static bool is_worth(const Frame *frame, double arcs) {
-    return frame->storeys <= FEW_STOREYS || arcs > 2 + (double)frame->storeys / 30;
+    return frame->mode_count <= FEW_STOREYS || arcs > 2 + (double)frame->mode_count / 30;
 }
 
 static double size_of(const double *values, size_t count) {
@@ -84,37 +84,37 @@ static double size_of(const double *values, size_t count) {
 
 // Tables of many storeys are large.
 static size_t levels_of(const Frame *frame) {
-    return frame->storeys <= FEW_STOREYS ? PRESS_LEVELS : 3;
+    return frame->mode_count <= FEW_STOREYS ? PRESS_LEVELS : 3;
 }
 
 // Makes the stop's transitions when arcs have cost about as much as it does. False: there is none.
 static bool prepare(FramePressStop *stop, const Frame *frame, const FrameDamper *damper) {
     if (stop->levels[0].block != NULL)
         return true;
-    const double n = (double)frame->storeys, arcs = frame->interval * frame_rate(frame);
+    const double n = (double)frame->mode_count, arcs = frame->interval * frame_rate(frame);
     if (stop->is_given_up || !isfinite(damper->plan->stops[damper->side].stiffness) ||
         !is_worth(frame, arcs) || !(arcs < 0x1p20))
         return false;
     if ((stop->spent += n) < 4 * n * n * n)
         return false;
-    stop->damped = calloc(2 * frame->storeys, sizeof *stop->damped);
+    stop->damped = calloc(2 * frame->mode_count, sizeof *stop->damped);
     if (stop->damped == NULL ||
         frame_dense_make(stop->levels, levels_of(frame), frame, damper, NULL) != STATUS_OK) {
         clear_stop(stop);
         *stop = (FramePressStop){.is_given_up = true};
         return false;
     }
-    stop->bent = stop->damped + frame->storeys;
-    for (size_t l = 0; l < frame->storeys; l++) // D' shape: D need not be symmetric
-        for (size_t i = 0; i < frame->storeys; i++)
-            stop->damped[i] += frame->modes->damping[l * frame->storeys + i] * damper->shape[l];
-    for (size_t i = 0; i < frame->storeys; i++)
+    stop->bent = stop->damped + frame->mode_count;
+    for (size_t l = 0; l < frame->mode_count; l++) // D' shape: D need not be symmetric
+        for (size_t i = 0; i < frame->mode_count; i++)
+            stop->damped[i] += frame->modes->damping[l * frame->mode_count + i] * damper->shape[l];
+    for (size_t i = 0; i < frame->mode_count; i++)
         stop->bent[i] = frame->omega2[i] * damper->shape[i];
-    stop->wide = size_of(damper->shape, frame->storeys);
-    stop->most_damped = size_of(stop->damped, frame->storeys);
-    stop->most_bent = size_of(stop->bent, frame->storeys);
-    stop->coupling = frame_dot(damper->shape, stop->damped, frame->storeys);
-    stop->bending = frame_dot(damper->shape, stop->bent, frame->storeys);
+    stop->wide = size_of(damper->shape, frame->mode_count);
+    stop->most_damped = size_of(stop->damped, frame->mode_count);
+    stop->most_bent = size_of(stop->bent, frame->mode_count);
+    stop->coupling = frame_dot(damper->shape, stop->damped, frame->mode_count);
+    stop->bending = frame_dot(damper->shape, stop->bent, frame->mode_count);
     return true;
 }
 
@@ -148,7 +148,7 @@ static double change_now(const FramePressStop *stop, const Frame *frame, const F
     const double *share = frame->modes->participation;
     const double rate = slice->omega > 0 ? slice->omega * slice->slope : slice->slope;
     double sum = damper->lean * rate + coupled_force;
-    for (size_t i = 0; i < frame->storeys; i++)
+    for (size_t i = 0; i < frame->mode_count; i++)
         sum +=
             stop->bent[i] * frame->p[i] - stop->damped[i] * (elastic[i] + share[i] * slice->value);
     return sum;
@@ -256,7 +256,7 @@ static bool soft_lasts(const FramePressStop *stop, const Frame *frame, const Fra
 // Whether all others stay in flight; they are ready to be moved then.
 static bool others_are_clear(const FramePress *press, Frame *frame, const FrameDamper *alone,
                              const Bounds *at, double length, double fallen) {
-    const size_t n = frame->storeys, a = (size_t)(alone - frame->damper);
+    const size_t n = frame->mode_count, a = (size_t)(alone - frame->damper);
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         if (d == a)
@@ -274,7 +274,7 @@ static bool others_are_clear(const FramePress *press, Frame *frame, const FrameD
 
 static void add_work(const FramePress *press, const FrameDense *dense, Frame *frame,
                      FrameDamper *alone, const Slice *slice, double length, FrameWork *work) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     const double *start = press->start, *gained = press->gained;
     work->damping = frame_dense_form(dense, frame->lanes, dense->loss, start, press->pulled);
     work->input = -(slice->value * frame_dot(dense->input[0], start, dense->size) +
@@ -298,7 +298,7 @@ static void add_work(const FramePress *press, const FrameDense *dense, Frame *fr
 // What (q, r, p, w) gain over one level's length.
 static void find_gained(FramePress *press, const FrameDense *dense, const Frame *frame,
                         const FrameDamper *alone, const Slice *slice) {
-    const size_t n = frame->storeys, freedoms = n + 1;
+    const size_t n = frame->mode_count, freedoms = n + 1;
     double *start = press->start;
     memcpy(start, frame->q, n * sizeof *start);
     memcpy(start + freedoms, frame->p, n * sizeof *start);
@@ -310,7 +310,7 @@ static void find_gained(FramePress *press, const FrameDense *dense, const Frame 
 }
 
 static void move(const FramePress *press, Frame *frame, FrameDamper *alone, double ground) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     const double *gained = press->gained, *speed = gained + n + 1;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
@@ -345,7 +345,7 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
     frame_elastic(frame, frame->q, frame->p, press->elastic);
     const Start from = {slice, press->elastic,
                         alone->lean * slice->value +
-                            frame_dot(alone->shape, press->elastic, frame->storeys)};
+                            frame_dot(alone->shape, press->elastic, frame->mode_count)};
     const double rate = frame_rate(frame);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
     for (size_t i = 0; i < levels_of(frame) && is_worth(frame, press->length[i] * rate); i++) {
@@ -362,8 +362,8 @@ double frame_press_step(FramePress *press, Frame *frame, const Slice *slice, dou
         if (!is_soft && !stiff_lasts(stop, frame, alone, &from, h, &at))
             continue;
         find_gained(press, dense, frame, alone, slice);
-        if (is_soft && !soft_lasts(stop, frame, alone, &from, press->gained[frame->storeys],
-                                   press->gained[2 * frame->storeys + 1], h, &at))
+        if (is_soft && !soft_lasts(stop, frame, alone, &from, press->gained[frame->mode_count],
+                                   press->gained[2 * frame->mode_count + 1], h, &at))
             continue;
         const double *ground = press->ground[i], *fall = press->fall[i];
         const double fallen = fall[0] * slice->value + fall[1] * slice->slope;

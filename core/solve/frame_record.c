@@ -15,7 +15,7 @@ static const double *shape_of(const Frame *frame, const RunColumn *column) {
     case CHANNEL_VELOCITY:
     case CHANNEL_ACCELERATION:
     case CHANNEL_MEAN_ACCELERATION:
-        return frame->modes->shapes + column->number * frame->storeys;
+        return frame->modes->shapes + column->number * frame->mode_count;
     case CHANNEL_BASE_ACCELERATION:
         return frame->modes->shapes; // of no use
     default:
@@ -25,13 +25,13 @@ static const double *shape_of(const Frame *frame, const RunColumn *column) {
 
 Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Frame *frame,
                           Response *response, Problem *problem) {
-    const size_t n = frame->storeys, columns = frame->run->column_count, padded = trail->padded;
+    const size_t n = frame->mode_count, columns = frame->run->column_count, padded = trail->padded;
     const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
     record->block =
         calloc(2 * (square + TRAIL_MOST * padded) + columns * (1 + padded), sizeof *record->block);
     if (record->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     record->trail = trail;
     for (size_t k = 0; k < 2; k++) {
         record->squares[k] = record->block + k * square;
@@ -39,9 +39,12 @@ Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Fr
     }
     record->shapes = record->batch[1] + TRAIL_MOST * padded;
     record->last_velocity = record->shapes + columns * padded;
-    for (size_t i = 0; i < columns; i++)
-        memcpy(record->shapes + i * padded, shape_of(frame, &frame->run->columns[i]),
-               n * sizeof *record->shapes);
+    for (size_t i = 0; i < columns; i++) {
+        const RunColumn *column = &frame->run->columns[i];
+        memcpy(record->shapes + i * padded, shape_of(frame, column), n * sizeof *record->shapes);
+        if (frame->unmoved != NULL && column->channel == CHANNEL_ACCELERATION)
+            record->shapes[i * padded + n] = -frame->unmoved[column->number];
+    }
     record->statistics_start =
         (size_t)ceil(frame->run->statistics_from * frame->plan->sample_rate * (1 - 1e-12));
     response->sample_rate = frame->plan->sample_rate;
@@ -84,7 +87,7 @@ static void take_storey(FrameRecord *record, const Frame *frame, size_t column, 
         return;
     double push = 0;
     for (size_t d = 0; d < frame->dampers; d++)
-        push += frame->mobility[d * frame->storeys + storey] * frame->damper[d].force;
+        push += frame->mobility[d * frame->storey_count + storey] * frame->damper[d].force;
     for (size_t k = 0; k < count; k++)
         values[k] = push - values[k];
 }
@@ -134,7 +137,7 @@ static void take_column(FrameRecord *record, const Frame *frame, size_t column, 
 static void add_batch(FrameRecord *record, const Frame *frame, size_t count) {
     const FrameTrail *trail = record->trail;
     for (size_t k = 0; k < 2; k++)
-        frame->lanes->square(frame->storeys, trail->padded, count, record->batch[k],
+        frame->lanes->square(frame->slot_count, trail->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
@@ -146,7 +149,7 @@ static void add_squares(FrameRecord *record, const Frame *frame, size_t row) {
     memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
     for (size_t d = 0; d < frame->dampers; d++) {
         const double force = frame->damper[d].force, *shape = frame->damper[d].shape;
-        for (size_t i = 0; i < frame->storeys && force != 0; i++)
+        for (size_t i = 0; i < frame->mode_count && force != 0; i++)
             pull[i] -= shape[i] * force;
     }
     if (at + 1 == TRAIL_MOST)
@@ -162,16 +165,20 @@ void frame_record_take(FrameRecord *record, Frame *frame, size_t count) {
     record->base_speed = 0;
 }
 
-// The largest shape' squares shape of any storey.
+// The largest shape' squares shape of any storey, over all slots.
 static double largest_sum(const FrameRecord *record, const double *squares, const Frame *frame) {
-    const size_t n = frame->storeys, padded = record->trail->padded;
+    const size_t n = frame->mode_count, padded = record->trail->padded;
     double most = 0;
-    for (size_t j = 0; j < n; j++) {
+    for (size_t j = 0; j < frame->storey_count; j++) {
         const double *shape = frame->modes->shapes + j * n;
         double sum = 0;
         for (size_t i = 0; i < n; i++) {
             const double *row = squares + i * padded;
             sum += shape[i] * (2 * frame_dot(row, shape, i) + row[i] * shape[i]);
+        }
+        if (frame->unmoved != NULL) {
+            const double *row = squares + n * padded, own = -frame->unmoved[j];
+            sum += own * (2 * frame_dot(row, shape, n) + row[n] * own);
         }
         most = fmax(most, sum);
     }
@@ -192,16 +199,20 @@ static double bound(const Frame *frame, const double *modal) {
     return most;
 }
 
+// Eight at a time: behind `count` values come zeros to whole vectors.
 static double largest_of(const double *values, size_t count) {
-    double most[2] = {0, 0};
-    for (size_t j = 0; j < count; j++)
-        most[j % 2] = ledger_larger(most[j % 2], fabs(values[j]));
-    return ledger_larger(most[0], most[1]);
+    double most[FRAME_LANES] = {0};
+    for (size_t j = 0; j < count; j += FRAME_LANES)
+        for (size_t i = 0; i < FRAME_LANES; i++)
+            most[i] = ledger_larger(most[i], fabs(values[j + i]));
+    for (size_t i = 1; i < FRAME_LANES; i++)
+        most[0] = ledger_larger(most[0], most[i]);
+    return most[0];
 }
 
 // The largest of all storeys.
 static double largest(const Frame *frame, const double *modal) {
-    return largest_of(frame_spread(frame, modal), frame->storeys);
+    return largest_of(frame_spread(frame, modal), frame->storey_count);
 }
 
 void frame_record_acceleration(Frame *frame) {
@@ -211,10 +222,10 @@ void frame_record_acceleration(Frame *frame) {
     if (!(most > frame->ledger.response->peaks.acceleration))
         return;
     const double *pull = frame_spread(frame, frame->elastic);
-    for (size_t j = 0; j < frame->storeys; j++) {
+    for (size_t j = 0; j < frame->storey_count; j++) {
         double sum = -pull[j];
         for (size_t d = 0; d < frame->dampers; d++)
-            sum += frame->mobility[d * frame->storeys + j] * frame->damper[d].force;
+            sum += frame->mobility[d * frame->storey_count + j] * frame->damper[d].force;
         at = ledger_larger(at, fabs(sum));
     }
     ledger_acceleration(&frame->ledger, at);
@@ -254,7 +265,8 @@ static double rise(const Frame *frame, const double *rows, size_t count, double 
         // Of rows behind the last one no use is made.
         const double *values = frame_spread_four(frame, rows + (k + 1) * padded);
         for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
-            least = ledger_larger(least, largest_of(values + (j - k) * padded, frame->storeys));
+            least = ledger_larger(least,
+                                  largest_of(values + (j - k) * frame->tall, frame->storey_count));
     }
     return least;
 }
@@ -276,7 +288,7 @@ void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count) 
             if (far[k] + fabs(middle + r[k]) > at.damper_x)
                 at.damper_x = fmax(at.damper_x,
                                    fabs(frame_dot(damper->shape, trail->q + (k + 1) * trail->padded,
-                                                  frame->storeys) +
+                                                  frame->mode_count) +
                                         (middle + r[k])));
     }
     ledger_peaks(&frame->ledger, &at);
@@ -307,6 +319,7 @@ Status frame_record_ledger(Frame *frame) {
     const EnergyState energy = frame_energy(frame);
     const Status status =
         ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
+    ledger_count(&frame->ledger, &frame->run->work);
     free(rows);
     return status;
 }

@@ -20,44 +20,11 @@ typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
 #define TWO(values) (*(const Two *)(values))
 #define PUT_TWO(values, two) (*(Two *)(values) = (two))
 
-enum { ROOTS = 4, POWER_MOST = 18, GAP_LEAST = 3 };
+enum { GAP_LEAST = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
-static bool is_near_whole(double value) {
-    return fabs(value - nearbyint(value)) <= 1e-12 * value;
-}
-
-// The number of Y^power; it is made if it is not there.
-static int need(SeriesLaw *law, int power) {
-    for (int i = 0; i < law->count; i++)
-        if (law->power[i] == power)
-            return i;
-    const int left = need(law, power - power / 2), right = need(law, power / 2);
-    law->power[law->count] = power;
-    law->left[law->count] = left;
-    law->right[law->count] = right;
-    return law->count++;
-}
-
-void series_law_make(SeriesLaw *law, const ContactTerms *terms) {
-    const double n = terms->exponent, own = terms->viscous > 0 ? terms->viscous_exponent : n;
-    *law = (SeriesLaw){.exponents = {n, own}, .count = 2, .power = {0, 1}};
-    for (law->root = 1; law->root <= ROOTS; law->root++)
-        if (is_near_whole(law->root * n) && is_near_whole(law->root * own) &&
-            law->root * n <= POWER_MOST)
-            break;
-    law->is_whole = law->root <= ROOTS;
-    if (!law->is_whole)
-        law->root = n < 3.5 ? ROOTS : n < 8 ? 2 : 1;
-    law->pace = need(law, law->root - 1);
-    if (!law->is_whole)
-        return;
-    law->spring = need(law, (int)nearbyint(law->root * n));
-    law->viscous = need(law, (int)nearbyint(law->root * own));
-}
-
 Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *problem) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memset(series, 0, sizeof *series);
     series->modes = n;
     series->dampers = m;
@@ -89,21 +56,32 @@ void frame_series_clear(FrameSeries *series) {
     free(series->block);
 }
 
-INLINE void put(Series *series, size_t k, double value) {
-    series->up[k] = value;
-    series->down[SERIES_ROW - 1 - k] = value;
+// What is computed of an order goes into its series when the order is over: until then it stands
+// beside them in `now`, for a processor is slow to read as a pair what was written singly a moment
+// ago.
+INLINE void put(Series *series, size_t k) {
+    series->up[k] = series->down[SERIES_ROW - 1 - k] = series->now;
+}
+
+// Zeros behind order 0.
+INLINE void begin(Series *series, double first) {
+    memset(series->up, 0, sizeof series->up);
+    memset(series->down, 0, sizeof series->down);
+    series->now = first;
 }
 
 // Order k of a product.
 INLINE double product(const Series *a, const Series *b, size_t k) {
+    if (k == 0)
+        return a->now * b->now;
     const double *up = a->up, *down = b->down + SERIES_ROW - 1 - k;
     Two sum[2] = {{0}};
-    for (size_t j = 0; j <= k; j += 4) {
+    for (size_t j = 0; j < k; j += 4) {
         sum[0] += TWO(up + j) * TWO(down + j);
         sum[1] += TWO(up + j + 2) * TWO(down + j + 2);
     }
     sum[0] += sum[1];
-    return sum[0][0] + sum[0][1];
+    return (sum[0][0] + sum[0][1]) + (a->up[0] * b->now + a->now * b->up[0]);
 }
 
 // Order k of b^exponent, b[0] > 0, from the orders before.
@@ -122,31 +100,39 @@ INLINE void contact_order(FrameSeries *series, SeriesContact *contact, size_t k,
         contact->force[k] = 0;
         return;
     }
-    const double *row = series->z + k * series->stride;
-    const Series *spring = &contact->spring, *viscous = &contact->viscous;
+    Series *spring = &contact->spring, *viscous = &contact->viscous;
+    contact->speed.now = contact->sign * series->z[k * series->stride + contact->damper];
     if (is_leader && law->is_whole) {
         spring = &series->powers[law->spring];
         viscous = &series->powers[law->viscous];
     } else {
         double own[SERIES_ROW];
         const double root = is_leader ? law->root : 1;
+        for (size_t j = 0; j < k && is_leader; j++)
+            own[j] = series->powers[1].up[j];
+        if (is_leader)
+            own[k] = series->powers[1].now;
         for (size_t j = 0; j <= k && !is_leader; j++)
             own[j] = contact->sign * series->z[j * series->stride + series->at_r + contact->damper];
-        const double *of = is_leader ? series->powers[1].up : own;
-        put(&contact->spring, k, power_order(of, root * law->exponents[0], spring->up, k));
-        if (law->exponents[1] == law->exponents[0])
-            viscous = spring;
-        else
-            put(&contact->viscous, k, power_order(of, root * law->exponents[1], viscous->up, k));
+        spring->now = power_order(own, root * law->exponents[0], spring->up, k);
+        viscous->now = law->exponents[1] == law->exponents[0]
+                           ? spring->now
+                           : power_order(own, root * law->exponents[1], viscous->up, k);
     }
-    double force = contact->terms.stiffness * spring->up[k];
-    if (contact->is_damped && contact->terms.viscous > 0) {
-        put(&contact->speed, k, contact->sign * row[contact->damper]);
+    double force = contact->terms.stiffness * spring->now;
+    if (contact->is_damped && contact->terms.viscous > 0)
         force += contact->terms.viscous * product(&contact->speed, viscous, k);
-    } else if (!contact->is_damped && !contact->terms.is_elastic_below) {
+    else if (!contact->is_damped && !contact->terms.is_elastic_below)
         force = 0;
-    }
     contact->force[k] = force;
+}
+
+INLINE void put_contact(SeriesContact *contact, size_t k, bool is_whole) {
+    put(&contact->speed, k);
+    if (is_whole)
+        return;
+    put(&contact->spring, k);
+    put(&contact->viscous, k);
 }
 
 // D p + W^2 q.
@@ -211,23 +197,35 @@ INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *sli
 INLINE void state_order(FrameSeries *series, const Series *pace, size_t k, size_t stride) {
     const double scale = series->length * series->root / (double)(k + 1);
     double *restrict next = series->z + (k + 1) * stride;
-    const double *rate = series->rate, *down = pace->down + SERIES_ROW - 1 - k;
-    if (series->root == 1) {
+    const double *rate = series->rate, *last = rate + k * stride;
+    const double *down = pace->down + SERIES_ROW - 1 - k;
+    if (series->root == 1 || k == 0) {
+        const double times = series->root == 1 ? scale : scale * pace->now;
         for (size_t i = 0; i < stride; i++)
-            next[i] = scale * rate[k * stride + i];
+            next[i] = times * last[i];
         return;
     }
+    const double first = pace->up[0], now = pace->now;
     for (size_t i = 0; i < stride; i += 4) {
-        Two sum[4] = {{0}};
         const double *at = rate + i;
-        for (size_t j = 0; j <= k; j += 2, at += 2 * stride) {
+        Two sum[4] = {now * TWO(at), now * TWO(at + 2), {0}, {0}};
+        size_t j = 1;
+        for (at += stride; j + 2 <= k; j += 2, at += 2 * stride) {
             sum[0] += down[j] * TWO(at);
             sum[1] += down[j] * TWO(at + 2);
             sum[2] += down[j + 1] * TWO(at + stride);
             sum[3] += down[j + 1] * TWO(at + stride + 2);
         }
-        PUT_TWO(next + i, scale * (sum[0] + sum[2]));
-        PUT_TWO(next + i + 2, scale * (sum[1] + sum[3]));
+        if (j < k) {
+            sum[2] += down[j] * TWO(at);
+            sum[3] += down[j] * TWO(at + 2);
+        }
+        sum[0] += sum[2];
+        sum[1] += sum[3];
+        next[i] = scale * (sum[0][0] + first * last[i]);
+        next[i + 1] = scale * (sum[0][1] + first * last[i + 1]);
+        next[i + 2] = scale * (sum[1][0] + first * last[i + 2]);
+        next[i + 3] = scale * (sum[1][1] + first * last[i + 3]);
     }
 }
 
@@ -235,11 +233,16 @@ INLINE void state_order(FrameSeries *series, const Series *pace, size_t k, size_
 INLINE double size_of(const FrameSeries *series, const SeriesScale *scale, size_t k, size_t n,
                       size_t m) {
     const double *row = series->z + k * series->stride;
-    double most = ledger_larger(fabs(series->powers[1].up[k]) * scale->per_root,
+    double most = ledger_larger(fabs(series->powers[1].now) * scale->per_root,
                                 fabs(row[series->at_t]) * scale->per_time);
     for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
         const size_t d = series->contact[c].damper;
         most = ledger_larger(most, fabs(row[d]) * scale->per_speed[d]);
+        // Powers that follow from those before them spread their rounding, of which w need not
+        // tell.
+        if (c > 0 || !series->contact[c].law->is_whole)
+            most = ledger_larger(most, fabs(series->contact[c].force[k - 1]) *
+                                           series->contact[c].per_force);
     }
     for (size_t i = 0; i < n; i++)
         most = ledger_larger(most, fabs(row[series->at_p + i]) * scale->per_modal[i]);
@@ -256,23 +259,36 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
                            ? (size_t)(law->power[law->spring] + law->root)
                            : GAP_LEAST;
     const size_t window =
-        series->powers[1].up[0] * scale->per_root > NEAR || gap < GAP_LEAST ? GAP_LEAST : gap;
+        series->powers[1].now * scale->per_root > NEAR || gap < GAP_LEAST ? GAP_LEAST : gap;
     const size_t order = scale->order > window ? scale->order : window + 1;
     size_t small = 0; // orders in a row
     double size[SERIES_ROW];
+    const int powers = leader->is_felt ? law->count : 2;
+    for (int i = 2; i < powers; i++)
+        begin(&series->powers[i], 0);
+    for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
+        begin(&series->contact[c].speed, 0);
+        if (c == 0 && law->is_whole)
+            continue; // its powers are those of Y
+        begin(&series->contact[c].spring, 0);
+        begin(&series->contact[c].viscous, 0);
+    }
     size_t k = 0;
     for (; k < order; k++) {
-        for (int i = 2; i < law->count && leader->is_felt; i++)
-            put(&series->powers[i], k,
-                product(&series->powers[law->left[i]], &series->powers[law->right[i]], k));
+        for (int i = 2; i < powers; i++)
+            series->powers[i].now =
+                product(&series->powers[law->left[i]], &series->powers[law->right[i]], k);
         for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++)
             contact_order(series, &series->contact[c], k, c == 0);
         rate_order(series, frame, slice, k, n, m);
         state_order(series, pace, k, stride);
-        put(&series->powers[0], k + 1, 0);
-        put(&series->powers[1], k + 1,
-            series->length / (double)(k + 1) * leader->sign *
-                series->z[k * stride + leader->damper]);
+        for (int i = 0; i < powers; i++)
+            put(&series->powers[i], k);
+        for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++)
+            put_contact(&series->contact[c], k, c == 0 && law->is_whole);
+        series->powers[0].now = 0;
+        series->powers[1].now = series->length / (double)(k + 1) * leader->sign *
+                                series->z[k * stride + leader->damper];
         size[k + 1] = size_of(series, scale, k + 1, n, m);
         small = size[k + 1] <= scale->error ? small + 1 : 0;
         if (small >= window) {
@@ -280,6 +296,7 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
             break;
         }
     }
+    put(&series->powers[1], k);
     series->degree = k;
     // Coefficients fall as powers of 1 / R; the first one left out is to be small enough.
     double wide = INFINITY;
@@ -305,8 +322,8 @@ double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *s
         row[series->at_a] = slice->value;
         row[series->at_a + 1] = slice->slope;
     }
-    put(&series->powers[0], 0, 1);
-    put(&series->powers[1], 0, Y);
+    begin(&series->powers[0], 1);
+    begin(&series->powers[1], Y);
     // The usual case is made for its own numbers.
     if (n == 1 && m == 1 && series->stride == 4)
         return make(series, frame, slice, scale, 1, 1, 4);

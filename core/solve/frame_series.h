@@ -5,27 +5,17 @@
 #define CORE_SOLVE_FRAME_SERIES_H
 
 #include "core/contact/contact.h"
+#include "core/solve/frame_series_law.h"
 #include "core/solve/frame_state.h"
 
-enum { SERIES_DEGREE = 26, SERIES_ROW = 28, SERIES_POWERS = 20, SERIES_NODES = 8 };
+enum { SERIES_DEGREE = 26, SERIES_ROW = 28, SERIES_NODES = 8 };
 
 // A series from order 0 on and, for products, from its last order back to 0 at the end of
 // SERIES_ROW, with zeros behind.
 typedef struct Series {
     double up[SERIES_ROW + 4], down[SERIES_ROW + 4];
+    double now; // of the order that is being computed
 } Series;
-
-// How N follows from Y = p^(1/root), where all of its exponents times root are whole numbers, and
-// else only as far as Y > 0.
-typedef struct SeriesLaw {
-    double exponents[2]; // of p: N's own, and that of what damps it
-    int root;
-    bool is_whole;
-    // Powers of Y: each is a product of two before; 0 is 1 and 1 is Y itself.
-    int count, power[SERIES_POWERS], left[SERIES_POWERS], right[SERIES_POWERS];
-    int pace, spring, viscous; // which of them are Y^(root - 1), and N's two
-} SeriesLaw;
-void series_law_make(SeriesLaw *law, const ContactTerms *terms);
 
 // One damper in contact.
 typedef struct SeriesContact {
@@ -35,6 +25,7 @@ typedef struct SeriesContact {
     const SeriesLaw *law;
     bool is_felt;                  // else N is left out, being too small to matter
     bool is_damped;                // p' is above its turn
+    double per_force;              // 1 / what is large for N
     Series speed, spring, viscous; // p', and powers of p
     double force[SERIES_ROW];      // N
 } SeriesContact;

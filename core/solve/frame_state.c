@@ -41,7 +41,7 @@ void frame_elastic(const Frame *frame, const double *q, const double *p, double 
         frame->lanes->mix(padded, 1, frame->diagonal, p, frame->omega2, q, out);
         return;
     }
-    frame->lanes->multiply(frame->coupled, padded, p, even(frame->storeys), out);
+    frame->lanes->multiply(frame->coupled, padded, p, even(frame->mode_count), out);
     for (size_t i = 0; i < padded; i++)
         out[i] += frame->omega2[i] * q[i];
 }
@@ -54,6 +54,8 @@ static ContactForce power_now(const Frame *frame, const FrameDamper *damper) {
 
 void frame_feel(Frame *frame) {
     frame_elastic(frame, frame->q, frame->p, frame->elastic);
+    if (frame->unmoved != NULL)
+        frame->elastic[frame->mode_count] = frame->ground;
     for (size_t d = 0; d < frame->dampers; d++) {
         FrameDamper *damper = &frame->damper[d];
         damper->force = 0;
@@ -68,54 +70,58 @@ void frame_feel(Frame *frame) {
             if (frame->damper[e].phase == FRAME_RESTING)
                 damper->force +=
                     frame->hold[d * frame->dampers + e] *
-                    (frame_dot(frame->damper[e].shape, frame->elastic, frame->storeys) +
+                    (frame_dot(frame->damper[e].shape, frame->elastic, frame->mode_count) +
                      frame->damper[e].lean * frame->ground);
     }
 }
 
 const double *frame_spread_four(const Frame *frame, const double *modal) {
-    frame->lanes->multiply_four(frame->spread, frame->padded, modal, frame->padded,
-                                even(frame->storeys), frame->seen);
+    frame->lanes->multiply_four(frame->spread, frame->tall, modal, frame->padded,
+                                even(frame->slot_count), frame->seen);
     return frame->seen;
 }
 
 const double *frame_spread(const Frame *frame, const double *modal) {
-    frame->lanes->multiply(frame->spread, frame->padded, modal, even(frame->storeys), frame->seen);
+    frame->lanes->multiply(frame->spread, frame->tall, modal, even(frame->slot_count), frame->seen);
     return frame->seen;
 }
 
 double frame_displacement(const Frame *frame, size_t storey) {
-    return frame_dot(frame->modes->shapes + storey * frame->storeys, frame->q, frame->storeys);
+    return frame_dot(frame->modes->shapes + storey * frame->mode_count, frame->q,
+                     frame->mode_count);
 }
 
 double frame_velocity(const Frame *frame, size_t storey) {
-    return frame_dot(frame->modes->shapes + storey * frame->storeys, frame->p, frame->storeys);
+    return frame_dot(frame->modes->shapes + storey * frame->mode_count, frame->p,
+                     frame->mode_count);
 }
 
 double frame_storey_acceleration(const Frame *frame, size_t storey) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     double sum = -frame_dot(frame->modes->shapes + storey * n, frame->elastic, n);
+    if (frame->unmoved != NULL)
+        sum += frame->unmoved[storey] * frame->ground;
     for (size_t d = 0; d < frame->dampers; d++)
-        sum += frame->mobility[d * n + storey] * frame->damper[d].force;
+        sum += frame->mobility[d * frame->storey_count + storey] * frame->damper[d].force;
     return sum;
 }
 
 double frame_acceleration(const Frame *frame, size_t d) {
     const FrameDamper *damper = &frame->damper[d];
     double sum =
-        damper->lean * frame->ground + frame_dot(damper->shape, frame->elastic, frame->storeys);
+        damper->lean * frame->ground + frame_dot(damper->shape, frame->elastic, frame->mode_count);
     for (size_t e = 0; e < frame->dampers; e++)
         sum -= frame->yield[d * frame->dampers + e] * frame->damper[e].force;
     return sum;
 }
 
 EnergyState frame_energy(const Frame *frame) {
-    EnergyState energy = {0.5 * frame_dot(frame->p, frame->p, frame->storeys), 0};
-    for (size_t i = 0; i < frame->storeys; i++)
+    EnergyState energy = {0.5 * frame_dot(frame->p, frame->p, frame->mode_count), 0};
+    for (size_t i = 0; i < frame->mode_count; i++)
         energy.strain += 0.5 * frame->omega2[i] * frame->q[i] * frame->q[i];
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];
-        const double z = frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
+        const double z = frame_dot(damper->shape, frame->p, frame->mode_count) + damper->w;
         energy.kinetic += 0.5 * damper->plan->mass * z * z;
         if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
             energy.strain += power_now(frame, damper).strain;
@@ -128,12 +134,12 @@ EnergyState frame_energy(const Frame *frame) {
 double frame_size_of(const Frame *frame, const double *q, const double *p) {
     double squares[4] = {0, 0, 0, 0};
     size_t i = 0;
-    for (; i + 2 <= frame->storeys; i += 2)
+    for (; i + 2 <= frame->mode_count; i += 2)
         for (size_t j = 0; j < 2; j++) {
             squares[j] += p[i + j] * p[i + j];
             squares[2 + j] += frame->omega2[i + j] * q[i + j] * q[i + j];
         }
-    if (i < frame->storeys)
+    if (i < frame->mode_count)
         squares[0] += p[i] * p[i] + frame->omega2[i] * q[i] * q[i];
     return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
 }
@@ -211,21 +217,22 @@ static double mobility(const Modes *modes, size_t j, size_t k) {
 
 static void make_damper(Frame *frame, size_t d) {
     const Plan *plan = frame->plan;
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count, storeys = frame->storey_count;
     FrameDamper *damper = &frame->damper[d];
     const PlanDamper *planned = &plan->dampers[d];
     *damper = (FrameDamper){.plan = planned,
                             .shape = frame->shapes + d * frame->padded,
-                            .lean = plan->influence[planned->storey] - 1,
+                            .lean = plan->influence[planned->storey] - 1 -
+                                    (frame->unmoved != NULL ? frame->unmoved[planned->storey] : 0),
                             .phase = FRAME_FLIGHT,
                             .origin = FRAME_FROM_MIDDLE,
                             .r = planned->position,
                             .w = planned->velocity};
     memcpy(frame->shapes + d * frame->padded, frame->modes->shapes + planned->storey * n,
            n * sizeof *frame->shapes);
-    for (size_t j = 0; j < n; j++) {
-        frame->mobility[d * n + j] = mobility(frame->modes, planned->storey, j);
-        damper->thrust = fmax(damper->thrust, fabs(frame->mobility[d * n + j]));
+    for (size_t j = 0; j < storeys; j++) {
+        frame->mobility[d * storeys + j] = mobility(frame->modes, planned->storey, j);
+        damper->thrust = fmax(damper->thrust, fabs(frame->mobility[d * storeys + j]));
     }
     for (size_t e = 0; e < frame->dampers; e++)
         frame->yield[d * frame->dampers + e] =
@@ -259,7 +266,7 @@ static double find_growth(const double *even_part, size_t n) {
 
 // D, which need not be symmetric, its norm and how far it is from only taking energy.
 static Status make_damping(Frame *frame) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     const double *damping = frame->damping = frame->modes->damping;
     double *even_part = calloc(n * n, sizeof *even_part);
     if (even_part == NULL)
@@ -296,15 +303,15 @@ static Status make_damping(Frame *frame) {
 // q = shapes' M x: the modes are normal. `carried` is scratch.
 static void make_modal(const Frame *frame, const double *values, long double *carried,
                        double *modal) {
-    const size_t n = frame->storeys;
-    for (size_t j = 0; j < n; j++) {
+    const size_t n = frame->mode_count, storeys = frame->storey_count;
+    for (size_t j = 0; j < storeys; j++) {
         carried[j] = 0;
-        for (size_t k = 0; k < n; k++)
-            carried[j] += (long double)frame->plan->mass[j * n + k] * values[k];
+        for (size_t k = 0; k < storeys; k++)
+            carried[j] += (long double)frame->plan->mass[j * storeys + k] * values[k];
     }
     for (size_t i = 0; i < n; i++) {
         long double sum = 0;
-        for (size_t j = 0; j < n; j++)
+        for (size_t j = 0; j < storeys; j++)
             sum += frame->modes->shapes[j * n + i] * carried[j];
         modal[i] = (double)sum;
     }
@@ -315,10 +322,11 @@ static Status make_room(Frame *frame) {
     double **const arrays[] = {&frame->omega2, &frame->diagonal, &frame->carry,   &frame->share,
                                &frame->q,      &frame->p,        &frame->elastic, &frame->widest,
                                &frame->shapes, &frame->spread,   &frame->seen,    &frame->mobility,
-                               &frame->yield,  &frame->hold,     &frame->scratch};
-    const size_t all = even(frame->storeys) * n;
-    const size_t sizes[] = {n,     n,     n,     n,    n, n, n, n, m * n, all, FRAME_FOUR * n,
-                            m * n, m * m, m * m, m * m};
+                               &frame->yield,  &frame->hold,     &frame->scratch, &frame->unmoved};
+    const size_t tall = frame->tall, all = even(frame->slot_count) * tall;
+    const size_t sizes[] = {
+        n, n, n, n, n, n, n, n, m * n, all, FRAME_FOUR * tall, m * tall, m * m, m * m, m * m, tall,
+    };
     size_t total = frame_lanes_room(0);
     for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];
@@ -334,37 +342,77 @@ static Status make_room(Frame *frame) {
     return STATUS_OK;
 }
 
-Status frame_make(Frame *frame, Run *run, Problem *problem) {
+// What the base does to storeys through modes that are left out; 0 where it is no more than
+// rounding.
+static void make_unmoved(Frame *frame) {
+    const size_t n = frame->mode_count;
+    double most = 0;
+    for (size_t j = 0; j < frame->storey_count; j++) {
+        const double own = frame->plan->influence[j];
+        long double sum = own, size = fabs(own);
+        for (size_t i = 0; i < n; i++) {
+            const long double term =
+                (long double)frame->modes->shapes[j * n + i] * frame->modes->participation[i];
+            sum -= term;
+            size += fabsl(term);
+        }
+        frame->unmoved[j] = fabsl(sum) <= 8 * DBL_EPSILON * size ? 0 : (double)sum;
+        frame->spread[n * frame->tall + j] = -frame->unmoved[j];
+        most = fmax(most, fabs(frame->unmoved[j]));
+    }
+    frame->widest[n] = most;
+}
+
+// Shapes and what is made of them.
+static void make_modes(Frame *frame) {
+    const size_t n = frame->mode_count;
+    const Modes *modes = frame->modes;
+    for (size_t i = 0; i < n; i++) {
+        frame->omega2[i] = modes->omega[i] * modes->omega[i];
+        frame->stiff = fmax(frame->stiff, frame->omega2[i]);
+        frame->share[i] = frame->carry[i] = modes->participation[i];
+        for (size_t j = 0; j < frame->storey_count; j++) {
+            const double shape = modes->shapes[j * n + i];
+            frame->widest[i] = fmax(frame->widest[i], fabs(shape));
+            frame->spread[i * frame->tall + j] = shape;
+        }
+    }
+    if (frame->slot_count > n)
+        make_unmoved(frame);
+    else
+        frame->unmoved = NULL;
+}
+
+static void frame_of(Frame *frame, Run *run, Problem *problem) {
     const Plan *plan = run->plan;
-    const size_t n = plan->storeys;
     memset(frame, 0, sizeof *frame);
     frame->run = run;
+    frame->has_stops = run->plan->damper_count > 0 && !run->is_clear;
     frame->plan = plan;
     frame->problem = problem;
-    frame->storeys = n;
-    frame->padded = frame_lanes_padded(n);
+    frame->modes = plan->modes.count == 0 ? &frame->own_modes : &plan->modes;
     frame->lanes = &frame_lanes_kinds[frame_lanes_widest()];
     frame->dampers = plan->damper_count;
     frame->interval = 1 / plan->sample_rate;
-    frame->modes = &plan->modes;
-    if (plan->modes.count == 0) {
+    frame->storey_count = plan->storeys;
+    frame->tall = frame_lanes_padded(plan->storeys);
+    frame->mode_count = plan->modes.count == 0 ? plan->storeys : plan->modes.count;
+    frame->slot_count = frame->mode_count + plan->is_truncated;
+    frame->padded = frame_lanes_padded(frame->slot_count);
+}
+
+Status frame_make(Frame *frame, Run *run, Problem *problem) {
+    const Plan *plan = run->plan;
+    const size_t n = plan->storeys;
+    frame_of(frame, run, problem);
+    if (plan->modes.count == 0)
         TRY(modes_make(&frame->own_modes, n, plan->mass, plan->stiffness, plan->damping,
                        plan->influence, problem));
-        frame->modes = &frame->own_modes;
-    }
     if (make_room(frame) != STATUS_OK || make_damping(frame) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys", n);
-    for (size_t i = 0; i < n; i++) {
-        frame->omega2[i] = frame->modes->omega[i] * frame->modes->omega[i];
-        frame->stiff = fmax(frame->stiff, frame->omega2[i]);
-        frame->share[i] = frame->carry[i] = frame->modes->participation[i];
-        for (size_t j = 0; j < n; j++) {
-            const double shape = frame->modes->shapes[j * n + i];
-            frame->widest[i] = fmax(frame->widest[i], fabs(shape));
-            frame->spread[i * frame->padded + j] = shape;
-        }
-    }
-    frame->drive = sqrt(frame_dot(frame->modes->participation, frame->modes->participation, n));
+    make_modes(frame);
+    frame->drive = sqrt(
+        frame_dot(frame->modes->participation, frame->modes->participation, frame->mode_count));
     frame->rate = fmax(fmax(sqrt(frame->stiff), frame->viscous), 1e-300);
     // A pulse that is over sooner is flown through by arcs alone.
     frame->turning = run->base->omega * frame->interval <= 4 || run->base->form == BASE_SINE

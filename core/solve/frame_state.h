@@ -21,8 +21,8 @@ typedef enum FrameOrigin {
 typedef struct FrameDamper {
     const PlanDamper *plan;
     const double *shape;   // of its storey, mode after mode
-    double lean;           // r_j - 1: a_g's part in r''
-    double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj) [kg]
+    double lean;           // a_g's part in r''
+    double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj), of the modes kept [kg]
     double thrust;         // a force N on its storey accelerates none by more than this N [1/kg]
     double reach;          // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
 
@@ -51,7 +51,12 @@ typedef struct FrameDamper {
 
 // In modal coordinates, x = shapes q:
 //   q'' = -(D q' + W^2 q) - participation a_g + sum of shape_d N_d
-//   r_d'' = (r_j - 1) a_g + shape_d . (D q' + W^2 q) - sum over e of yield_de N_e
+//   r_d'' = lean_d a_g + shape_d . (D q' + W^2 q) - sum over e of yield_de N_e
+// with lean_d = shape_d . participation - 1, which is r_j - 1 where all modes are kept. Where they
+// are not, what the base does to the others is theirs: a storey's absolute acceleration is
+//   unmoved_j a_g - shape_j . (D q' + W^2 q) + ...,   unmoved_j = r_j - shape_j . participation,
+// and arrays over modes have a_g in one slot more behind `elastic`, which the storeys see with
+// -unmoved.
 typedef struct Frame {
     Run *run;
     const Plan *plan;
@@ -59,20 +64,24 @@ typedef struct Frame {
     Modes own_modes; // where the plan has none
     Problem *problem;
 
+    bool has_stops; // that a mass may reach
     bool is_shadow; // only the motion is wanted: no peaks, no energies
 
-    size_t storeys;          // and modes
-    size_t padded;           // and values of each array over modes here, zeros behind them
+    size_t storey_count, mode_count;
+    size_t slot_count;       // mode_count, and a_g's slot where modes are left out
+    size_t padded;           // values of each array over modes here, zeros behind the slots
+    size_t tall;             // likewise of an array over storeys
     const FrameLanes *lanes; // what this processor has
     double *omega2;          // [1/s^2]
-    const double *damping;   // D, storeys x storeys
+    const double *damping;   // D, modes x modes
     double *diagonal;        // of D, where it is diagonal; else NULL
     double *coupled;         // D, where it is not: columns of `padded` values; else NULL
     double *share;           // participation
     double *shapes;          // of the dampers' storeys
-    double *spread;          // of all storeys: columns of `padded` values, one a mode
+    double *spread;          // of all storeys: columns of `tall` values, one a slot
     double *seen;            // scratch of frame_spread
-    double *widest;          // of each mode, the largest |shape| of any storey
+    double *widest;          // of each slot, the largest |shape| of any storey
+    double *unmoved;         // of the storeys; NULL where all modes are kept [-]
     double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
     double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
@@ -84,9 +93,10 @@ typedef struct Frame {
     size_t dampers;
     FrameDamper *damper;
     double *yield; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
-    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]
-    double *hold;     // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
-    size_t resting;   // how many are
+    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]; as `yield`
+                      // of the modes kept
+    double *hold;   // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
+    size_t resting; // how many are
 
     double *q, *p;   // modal displacements and speeds
     double *elastic; // D p + W^2 q, as of the last frame_feel
@@ -141,7 +151,7 @@ void frame_elastic(const Frame *frame, const double *q, const double *p, double 
 void frame_feel(Frame *frame);
 // Values of all storeys from those of all modes, until the next call.
 const double *frame_spread(const Frame *frame, const double *modal);
-// Likewise of FRAME_FOUR rows of modes, one after the other.
+// Likewise of FRAME_FOUR rows of modes, one after the other; `tall` values of each.
 const double *frame_spread_four(const Frame *frame, const double *modal);
 // Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
 double frame_displacement(const Frame *frame, size_t storey);

@@ -9,8 +9,8 @@ Status frame_trail_make(FrameTrail *trail, const Frame *frame, Problem *problem)
     trail->block =
         calloc(frame_lanes_room((5 * padded + 2 * m + 3) * TRAIL_ROWS), sizeof *trail->block);
     if (trail->block == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                           frame->storeys);
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                           frame->mode_count);
     double *at = frame_lanes_start(trail->block);
     double **const stretches[] = {&trail->q, &trail->p, &trail->moved, &trail->sped,
                                   &trail->elastic};
@@ -36,6 +36,9 @@ void frame_trail_feel(FrameTrail *trail, const Frame *frame, size_t count) {
                           trail->elastic + padded);
     for (size_t at = padded; at <= count * padded && frame->diagonal == NULL; at += padded)
         frame_elastic(frame, trail->q + at, trail->p + at, trail->elastic + at);
+    for (size_t k = 1; k <= count && frame->unmoved != NULL; k++)
+        trail->elastic[k * padded + frame->mode_count] =
+            base_cursor_at(&frame->base, frame->sample - count + k);
 }
 
 void frame_trail_take(FrameTrail *trail, const Frame *frame, double ground) {
@@ -48,6 +51,6 @@ void frame_trail_take(FrameTrail *trail, const Frame *frame, double ground) {
         const FrameDamper *damper = &frame->damper[d];
         trail->r[d * TRAIL_ROWS + 1] = damper->r;
         trail->z[d * TRAIL_ROWS + 1] =
-            frame_dot(damper->shape, frame->p, frame->storeys) + damper->w;
+            frame_dot(damper->shape, frame->p, frame->mode_count) + damper->w;
     }
 }

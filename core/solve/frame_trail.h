@@ -24,7 +24,7 @@ typedef struct FrameTrail {
 Status frame_trail_make(FrameTrail *trail, const Frame *frame, Problem *problem);
 void frame_trail_clear(FrameTrail *trail);
 
-// The elastic forces of rows 1 to `count`.
+// The elastic forces of rows 1 to `count`, the last of them being the present sample.
 void frame_trail_feel(FrameTrail *trail, const Frame *frame, size_t count);
 
 // Row 1 becomes the present state, after frame_feel.

@@ -8,10 +8,36 @@ void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyS
     ledger->largest_energy = ledger->energy.initial;
 }
 
+static void meet(Approaches *met, double speed) {
+    met->least = met->count == 0 ? speed : fmin(met->least, speed);
+    met->most = met->count == 0 ? speed : fmax(met->most, speed);
+    met->count++;
+    met->outside += speed < met->from || speed > met->to;
+}
+
+// What is told of an impact whether or not it is listed.
+static void count(Ledger *ledger, const Impact *impact) {
+    Response *response = ledger->response;
+    const size_t damper = (size_t)impact->damper - 1;
+    if (impact->kind != IMPACT_IMPACT) {
+        response->resting_count++;
+    } else {
+        response->impact_count++;
+        if (response->approaches != NULL && !impact->is_resumed &&
+            response->approaches[2 * damper + (size_t)impact->side].has_table)
+            meet(&response->approaches[2 * damper + (size_t)impact->side], impact->approach_speed);
+    }
+    ledger->impulse[damper] = ledger_larger(ledger->impulse[damper], impact->impulse);
+}
+
 static void add(Ledger *ledger, const Impact *impact) {
     Impacts *impacts = &ledger->response->impacts;
     if (ledger->status != STATUS_OK)
         return;
+    if (ledger->response->is_unlisted) {
+        count(ledger, impact);
+        return;
+    }
     if (ledger->most > 0 && impacts->count >= ledger->most) {
         ledger->status = STATUS_LIMIT;
         return;
@@ -27,6 +53,7 @@ static void add(Ledger *ledger, const Impact *impact) {
         ledger->room = wanted;
     }
     impacts->at[impacts->count++] = *impact;
+    count(ledger, impact);
 }
 
 void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Side side,
@@ -68,6 +95,7 @@ void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double
                            .energy_lost =
                                0.5 * mass * (approach - separation) * (approach + separation)};
     ledger->energy.contact += impact.energy_lost;
+    ledger->bounces++;
     add(ledger, &impact);
 }
 
@@ -80,6 +108,14 @@ void ledger_balance(Ledger *ledger, const EnergyState *state) {
         ledger_larger(ledger->largest_energy, ledger_larger(held, fabs(energy->input)));
     ledger->largest_balance = ledger_larger(ledger->largest_balance, fabs(balance));
     ledger->largest_gain = ledger_larger(ledger->largest_gain, balance);
+}
+
+void ledger_count(const Ledger *ledger, Work *work) {
+    const Response *response = ledger->response;
+    work->contacts = response->impact_count - ledger->bounces;
+    work->bounces = ledger->bounces;
+    work->rests = response->resting_count;
+    work->ledger_rows = response->impacts.count;
 }
 
 void ledger_forget_peaks(Ledger *ledger, const Moment *at) {

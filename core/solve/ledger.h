@@ -6,7 +6,8 @@
 #include <math.h>
 
 #include "core/result/response.h"
-#include "core/scene/damper.h"
+#include "core/result/work.h"
+#include "core/scene/scene.h"
 
 // What can be seen at one instant.
 typedef struct Moment {
@@ -32,6 +33,8 @@ typedef struct Ledger {
     Response *response;
     size_t room, most;
     Status status;
+    uint64_t bounces;              // rows without a length
+    double impulse[SCENE_DAMPERS]; // largest of each damper's impacts [N s]
     Energy energy;
     double largest_energy, largest_balance;
     double largest_gain; // energy held that nothing accounts for [J]
@@ -105,6 +108,9 @@ static inline void ledger_acceleration(Ledger *ledger, double acceleration) {
     Peaks *peaks = &ledger->response->peaks;
     peaks->acceleration = ledger_larger(peaks->acceleration, fabs(acceleration));
 }
+
+// What the ledger has counted, at the end.
+void ledger_count(const Ledger *ledger, Work *work);
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept, STATUS_UNSTABLE once more energy
 // came out of nothing than gain_most allows.

@@ -36,13 +36,13 @@ static void swap(double *a, double *b) {
 }
 
 static Status no_memory(const Steps *steps) {
-    return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run of %zu storeys",
-                       steps->frame.storeys);
+    return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                       steps->frame.mode_count);
 }
 
 static Status newmark_make(Steps *steps) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers, size = steps->size;
+    const size_t n = frame->mode_count, m = frame->dampers, size = steps->size;
     const size_t square = frame->diagonal != NULL ? n : n * n;
     Newmark *own = calloc(1, sizeof *own);
     steps->own = own;
@@ -113,7 +113,7 @@ static bool eliminate(double *left, double *right, size_t n, size_t columns) {
 static Status invert(const Steps *steps, double length) {
     const Newmark *own = steps->own;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     const double half = length / 2, quarter = length * length / 4;
     if (frame->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
@@ -141,7 +141,7 @@ static Status invert(const Steps *steps, double length) {
 // out = G^-1 in.
 static void solve(const Steps *steps, const double *in, double *restrict out) {
     const Newmark *own = steps->own;
-    const size_t n = steps->frame.storeys;
+    const size_t n = steps->frame.mode_count;
     for (size_t i = 0; i < n; i++)
         out[i] = steps->frame.diagonal != NULL ? own->inverse[i] * in[i]
                                                : frame_dot(own->inverse + i * n, in, n);
@@ -150,7 +150,7 @@ static void solve(const Steps *steps, const double *in, double *restrict out) {
 static Status make_tables(Steps *steps, double length) {
     Newmark *own = steps->own;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     TRY(invert(steps, length));
     own->length = length;
     for (size_t d = 0; d < m; d++) {
@@ -210,7 +210,7 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
 static Status newmark_step(Steps *steps, double length) {
     Newmark *own = steps->own;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double half = length / 2, quarter = length * length / 4, ground = steps->ground[2];
     if (length != own->length)
         TRY(make_tables(steps, length));
@@ -251,8 +251,8 @@ static Status newmark_step(Steps *steps, double length) {
     return STATUS_OK;
 }
 
-static double newmark_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
-    const double n = (double)storeys, m = (double)dampers;
+static double newmark_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+    const double n = (double)modes, m = (double)dampers;
     *making = is_coupled ? n * n * n / 20 : 0;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }

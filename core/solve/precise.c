@@ -37,7 +37,7 @@ typedef struct Precise {
 
 static Status no_memory(const Steps *steps) {
     return problem_set(steps->frame.problem, STATUS_NO_MEMORY,
-                       "no memory for the exponentials of %zu storeys", steps->frame.storeys);
+                       "no memory for the exponentials of %zu modes", steps->frame.mode_count);
 }
 
 static Status precise_make(Steps *steps) {
@@ -85,7 +85,7 @@ static void precise_clear(Steps *steps) {
 static void make_system(Steps *steps, double *A) {
     Precise *own = steps->own;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers, size = steps->size, wide = own->wide;
+    const size_t n = frame->mode_count, m = frame->dampers, size = steps->size, wide = own->wide;
     for (size_t column = 0; column <= size; column++) {
         memset(own->y, 0, size * sizeof *own->y);
         if (column < size)
@@ -174,7 +174,7 @@ static Status find_table(Steps *steps, double length, const Table **table) {
     if (at == own->count)
         own->count++;
     double making;
-    (void)steps->stepper->cost(frame->storeys, m, frame->diagonal == NULL, &making);
+    (void)steps->stepper->cost(frame->mode_count, m, frame->diagonal == NULL, &making);
     frame->run->steps += making / 2; // two are in what was foretold
     own->last = at;
     *table = &own->tables[at];
@@ -201,8 +201,8 @@ static Status precise_step(Steps *steps, double length) {
 }
 
 // Two tables at least are made, mostly of zeros where modes do not couple.
-static double precise_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
-    const double n = (double)storeys, m = (double)dampers, size = 2 * (n + m);
+static double precise_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+    const double n = (double)modes, m = (double)dampers, size = 2 * (n + m);
     *making = 2 * (is_coupled ? 0.15 : 0.05) * size * size * size;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.052 : 0.012) * n * n;
 }

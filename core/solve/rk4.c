@@ -63,7 +63,7 @@ static double feel(const Steps *steps, size_t d, double r, double w, double appr
 static void slope(Steps *steps, const double *y, double ground, double *restrict out) {
     const Rk4 *own = steps->own;
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *p = y + n, *r = y + 2 * n, *w = r + m, *approach = steps->y + 2 * n + m;
     double *totals = out + steps->size, momentum = frame_dot(frame->carry, p, n), loss = 0;
     for (size_t d = 0; d < m; d++) {
@@ -82,7 +82,7 @@ static void slope(Steps *steps, const double *y, double ground, double *restrict
 static Status rk4_step(Steps *steps, double length) {
     static const double nodes[STAGES] = {0, 0.5, 0.5, 1};
     const Rk4 *own = steps->own;
-    const size_t size = steps->size, row = own->row, n = steps->frame.storeys,
+    const size_t size = steps->size, row = own->row, n = steps->frame.mode_count,
                  m = steps->frame.dampers;
     for (size_t k = 0; k < STAGES; k++) {
         const double *last = own->slopes + (k - 1) * row, part = nodes[k] * length;
@@ -109,8 +109,8 @@ static Status rk4_step(Steps *steps, double length) {
     return STATUS_OK;
 }
 
-static double rk4_cost(size_t storeys, size_t dampers, bool is_coupled, double *making) {
-    const double n = (double)storeys, m = (double)dampers;
+static double rk4_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+    const double n = (double)modes, m = (double)dampers;
     *making = 0;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }

@@ -8,13 +8,20 @@
 #include "core/excite/base.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
+#include "core/result/work.h"
 #include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.
 typedef struct Accuracy {
     Variant variant; // kind is a Solver's
+    uint64_t modes;  // of a structure with several storeys, the lowest; COUNT_ABSENT: all
 } Accuracy;
 extern const Field accuracy_fields[]; // the rows that every solver has
+
+// How many modes a run keeps of a structure with so many storeys.
+static inline size_t accuracy_modes(const Accuracy *accuracy, size_t storeys) {
+    return accuracy == NULL || accuracy->modes >= storeys ? storeys : (size_t)accuracy->modes;
+}
 
 // Of "auto", which has no run of its own.
 typedef struct AccuracyAuto {
@@ -50,7 +57,9 @@ typedef struct Run {
     double statistics_from; // [s]
     size_t impacts_most;    // ledger rows; 0: no limit
     double steps_most;      // solver steps; 0: no limit
+    bool is_clear;          // no mass comes to a stop: none has to be searched for
     double steps;           // out: work counted, in solver steps of SOLVER_STEP
+    Work work;              // out: what was done, kind by kind, but for what is not the solver's
 } Run;
 
 typedef struct Solver {

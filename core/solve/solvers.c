@@ -2,7 +2,12 @@
 
 #include "core/result/metric.h"
 
-const Field accuracy_fields[] = {FIELD_END};
+// clang-format off
+const Field accuracy_fields[] = {
+    FIELD_COUNT(Accuracy, modes, NULL, AT_LEAST(1), OPTIONAL, "natural modes of a structure with several storeys that move, the slowest; all if absent"),
+    FIELD_END
+};
+// clang-format on
 
 // clang-format off
 static const Field auto_fields[] = {

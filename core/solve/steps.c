@@ -16,7 +16,7 @@ static const double GROWN = 1e6;
 static const double POWER_STEPS = 8;
 
 void steps_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
-    const size_t n = frame->storeys;
+    const size_t n = frame->mode_count;
     for (size_t i = 0; i < n; i++)
         out[i] = frame->omega2[i] * q[i];
     if (frame->diagonal != NULL) {
@@ -31,7 +31,7 @@ void steps_elastic(const Frame *frame, const double *q, const double *p, double 
 void steps_rate(Steps *steps, const double *y, double ground, const double *force,
                 double *restrict out) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     double *p1 = out + n, *w1 = out + 2 * n + m;
     steps_elastic(frame, y, y + n, steps->elastic);
     memcpy(out, y + n, n * sizeof *y);
@@ -72,7 +72,7 @@ typedef struct End {
 static End look(Steps *steps, const double *y, double ground, double slope, double *forces,
                 double *rates) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double *p = y + n, *r = y + 2 * n, *w = r + m;
     for (size_t d = 0; d < m; d++)
         forces[d] =
@@ -98,7 +98,7 @@ static End look(Steps *steps, const double *y, double ground, double slope, doub
 void steps_sum(Steps *steps, const double *from, const double *to, double length,
                bool is_corrected) {
     const Frame *frame = &steps->frame;
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     const double slope = (steps->ground[2] - steps->ground[0]) / length;
     const double half = length / 2, twelfth = is_corrected ? length * length / 12 : 0;
     const double *const states[2] = {from, to};
@@ -213,13 +213,14 @@ static Status note(Steps *steps) {
 
 Status steps_note(Steps *steps, double cost) {
     TRY(note(steps));
+    steps->frame.run->work.steps++;
     steps->frame.run->steps += cost;
     steps->watched += 20 * cost;
     return steps->watched > WATCH_WORK ? steps_check(steps) : STATUS_OK;
 }
 
 static void gather(const Frame *frame, double *y) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memcpy(y, frame->q, n * sizeof *y);
     memcpy(y + n, frame->p, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
@@ -229,7 +230,7 @@ static void gather(const Frame *frame, double *y) {
 }
 
 static void scatter(Frame *frame, const double *y) {
-    const size_t n = frame->storeys, m = frame->dampers;
+    const size_t n = frame->mode_count, m = frame->dampers;
     memcpy(frame->q, y, n * sizeof *y);
     memcpy(frame->p, y + n, n * sizeof *y);
     for (size_t d = 0; d < m; d++) {
@@ -252,13 +253,14 @@ static Status step(Steps *steps, double length, double offset) {
     Frame *frame = &steps->frame;
     const size_t m = frame->dampers;
     double making;
-    const double cost = steps->stepper->cost(frame->storeys, m, frame->diagonal == NULL, &making);
+    const double cost =
+        steps->stepper->cost(frame->mode_count, m, frame->diagonal == NULL, &making);
     StepSums *sums = &steps->sums;
     read_base(steps, length);
     gather(frame, steps->y);
     sums->input = sums->damping = 0;
     memset(sums->impulse, 0, 2 * m * sizeof *sums->impulse);
-    for (size_t d = 0; d < m; d++)
+    for (size_t d = 0; d < m && frame->has_stops; d++)
         steps->before[d] = frame->damper[d].phase == FRAME_CONTACT
                                ? steps_contact(frame, d, frame->damper[d].r, 0).strain
                                : 0;
@@ -270,7 +272,10 @@ static Status step(Steps *steps, double length, double offset) {
     frame->ground = steps->ground[2];
     ledger_work(&frame->ledger, sums->input, sums->damping);
     steps->record.base_speed += gain;
-    steps_turn(steps, length);
+    if (frame->has_stops) {
+        frame->run->work.stop_searches++;
+        steps_turn(steps, length);
+    }
     return steps_note(steps, cost + contact_cost(steps));
 }
 
@@ -295,6 +300,7 @@ Status steps_interval(Steps *steps) {
         TRY(step(steps, steps->length, (double)k * steps->length));
     frame->sample++;
     frame->offset = 0;
+    frame->run->work.mode_samples += frame->mode_count;
     steps_take_sample(steps);
     return STATUS_OK;
 }
@@ -328,7 +334,8 @@ static Status check_reach(const Steps *steps) {
                            steps->stepper->name, steps->length, frame->rate,
                            steps->stepper->reach / frame->rate);
     double rate = 0;
-    for (size_t d = 0; d < frame->dampers && frame->plan->form == CONTACT_LINEAR; d++)
+    for (size_t d = 0;
+         d < frame->dampers && frame->has_stops && frame->plan->form == CONTACT_LINEAR; d++)
         for (int side = 0; side < 2; side++) {
             const double mass = frame->damper[d].effective_mass;
             const PlanStop *stop = &frame->damper[d].plan->stops[side];
@@ -349,13 +356,13 @@ static Status check_reach(const Steps *steps) {
 }
 
 static Status make_room(Steps *steps) {
-    const size_t n = steps->frame.storeys, m = steps->frame.dampers;
+    const size_t n = steps->frame.mode_count, m = steps->frame.dampers;
     steps->size = 2 * (n + m);
     // y; impulse and work; before; force and rates behind it; elastic
     steps->block = calloc(2 * steps->size + 4 * m + n + 1, sizeof *steps->block);
     if (steps->block == NULL)
         return problem_set(steps->frame.problem, STATUS_NO_MEMORY,
-                           "no memory for a run of %zu storeys", n);
+                           "no memory for a run of %zu modes", n);
     steps->y = steps->block;
     steps->sums.impulse = steps->y + steps->size;
     steps->sums.work = steps->sums.impulse + m;
@@ -384,7 +391,7 @@ Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, 
     const EnergyState energy = frame_energy(frame);
     ledger_start(&frame->ledger, response, run->impacts_most, &energy);
     double making = 0;
-    (void)stepper->cost(frame->storeys, frame->dampers, frame->diagonal == NULL, &making);
+    (void)stepper->cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making);
     run->steps += making;
     return stepper->make != NULL ? stepper->make(steps) : STATUS_OK;
 }

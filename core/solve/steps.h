@@ -27,7 +27,7 @@ typedef struct Stepper {
     Status (*cross)(Steps *steps, double length);
     void (*clear)(Steps *steps);
     // How much a step costs, in steps of the single engine, and the making of its tables.
-    double (*cost)(size_t storeys, size_t dampers, bool is_coupled, double *making);
+    double (*cost)(size_t modes, size_t dampers, bool is_coupled, double *making);
 } Stepper;
 
 // What a step adds up to.

@@ -22,9 +22,9 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
     if (cost.steps <= study_runs * limits->steps)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
-                       "would take about %.2g s of CPU in all, at most %.4g s are allowed: ask for "
-                       "fewer solvers or repeats, or lower point_steps",
-                       cost.cpu_seconds, study_runs * limits->steps * SOLVER_STEP);
+                       "would take about %.2g s of CPU in all, at most %.4g s are allowed: %s",
+                       cost.cpu_seconds, study_runs * limits->steps * SOLVER_STEP,
+                       study_kind(inquiry->study)->lessen);
 }
 
 Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,

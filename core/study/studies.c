@@ -3,6 +3,7 @@
 
 const StudyKind *const studies[] = {
     &study_tradeoff,
+    &study_ensemble,
     NULL,
 };
 

@@ -35,6 +35,7 @@ typedef struct TradeoffPoint {
     char *contact_model;
     double sample_rate, duration;
     uint64_t segment;
+    uint64_t modes;
 
     int status;                     // TradeoffStatus
     char *why;                      // of one that was not measured

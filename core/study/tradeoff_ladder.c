@@ -14,6 +14,7 @@ enum {
     SEGMENT_LEAST = 16, // samples of a segment
     RATES = 3,
     SHARES = 2,
+    STOREYS_LEAST = 4, // of a structure whose modes are worth leaving out
 };
 // The finest step wanted: this part of the shortest contact, or of a radian of the fastest mode.
 static const double contact_part = 3e-3, radian_part = 1e-3;
@@ -140,6 +141,19 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
     return true;
 }
 
+// Half the modes, and half of these, down to one.
+static bool add_modes(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    for (size_t modes = storeys / 2; storeys >= STOREYS_LEAST && modes > 0; modes /= 2) {
+        TradeoffPoint *point =
+            add(points, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s");
+        if (point == NULL)
+            return false;
+        point->modes = modes;
+    }
+    return true;
+}
+
 static bool has_power_law(const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
@@ -183,7 +197,7 @@ static bool add_reference(TradeoffPoints *points, const Kind *solver,
         if (point == NULL || (point->contact_model = strdup(model)) == NULL)
             return false;
     }
-    return add_output(points, solver, simulation);
+    return add_modes(points, solver, simulation) && add_output(points, solver, simulation);
 }
 
 Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
@@ -207,6 +221,13 @@ static void set_real(Variant *variant, const char *name, double value) {
         *(double *)(void *)((char *)variant + offset + row->offset) = value;
 }
 
+static void set_count(Variant *variant, const char *name, uint64_t value) {
+    size_t offset = 0;
+    const Field *row = row_of(variant->kind, name, &offset);
+    if (row != NULL && value != COUNT_ABSENT)
+        *(uint64_t *)(void *)((char *)variant + offset + row->offset) = value;
+}
+
 static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
     const Kind *kind = kind_find(&solver_kinds, point->solver);
     Variant *accuracy = variant_new(kind);
@@ -216,6 +237,7 @@ static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
     target->accuracy = accuracy;
     set_real(accuracy, "step", point->step);
     set_real(accuracy, "tolerance", point->tolerance);
+    set_count(accuracy, "modes", point->modes);
     return STATUS_OK;
 }
 
@@ -267,6 +289,7 @@ static void apply_output(const TradeoffPoint *point, Simulation *target) {
         if (psd->overlap >= psd->segment)
             psd->overlap = psd->segment - 1;
     }
+    target->output.impacts = true; // errors are counted from ledgers
     const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
                         target->scene.sample_rate;
     target->output.statistics_from = fmin(target->output.statistics_from, last);

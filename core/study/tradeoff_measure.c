@@ -29,22 +29,11 @@ typedef struct Session {
     Problem *fault;   // of a point
 } Session;
 
-// A run tells its own 0 to 1; the watcher sees the whole.
-typedef struct Stage {
-    const Watch *whole;
-    double from, share;
-} Stage;
-
-static bool stage_advance(void *context, double fraction) {
-    const Stage *stage = context;
-    return watch_advance(stage->whole, stage->from + stage->share * fraction);
-}
-
 // Runs within the study's progress, of which it is `steps`.
 static Status run(Session *session, const Simulation *simulation, const SimulationLimits *limits,
                   double steps, Outcome **outcome, Problem *problem) {
     Stage stage = {session->tools->watch, session->done / session->all, steps / session->all};
-    const Watch watch = {&stage, stage_advance};
+    const Watch watch = stage_watch(&stage);
     return simulation_run(simulation, limits, &watch, session->tools->workspace, outcome, problem);
 }
 

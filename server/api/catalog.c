@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/study/inquiry.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/base/embedded.h"
@@ -41,17 +42,17 @@ static Status show_file(const Request *request, Reply *reply, const EmbeddedFile
 }
 
 static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
-    Simulation simulation;
+    Inquiry inquiry;
     const bool is_read =
-        read_json(file->bytes, file->size, simulation_fields, &simulation, NULL) == STATUS_OK;
+        read_json(file->bytes, file->size, inquiry_fields, &inquiry, NULL) == STATUS_OK;
     bytes_text(bytes, "{\"name\": ");
     bytes_json_string(bytes, name);
     bytes_text(bytes, ", \"title\": ");
-    bytes_json_string(bytes, is_read ? simulation.title : NULL);
+    bytes_json_string(bytes, is_read ? inquiry.simulation.title : NULL);
     bytes_format(bytes, ", \"links\": {\"self\": \"/v1/examples/%s\"}, \"scene\": ", name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
-    simulation_clear(&simulation);
+    inquiry_clear(&inquiry);
 }
 
 Status examples_list(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -46,6 +46,7 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     if (parts & JOB_PUT_WHOLE) {
         write_raw(bytes, "plan", show->plan);
         write_raw(bytes, "summary", show->summary);
+        write_raw(bytes, "work", show->work);
         bytes_text(bytes, ", \"warnings\": ");
         document_join(bytes, show->warnings, show->notes);
     }

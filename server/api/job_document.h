@@ -8,7 +8,7 @@
 
 enum {
     JOB_PUT_WHOLE =
-        1, // with plan, summary and warnings, as one job is shown; without, as in a list
+        1, // with plan, summary, work and warnings, as one job is shown; without, as in a list
     JOB_PUT_LINKS = 2, // where a server has it; without, "links" is empty
 };
 

@@ -37,6 +37,11 @@ static const Step steps[] = {
     {"What speed costs in accuracy on this scene, as a chart:",
      "R=$(curl -s -H 'Prefer: wait=30' --json '" SCENE ", " STUDY "}' @/v1/jobs | " RESULT ")"},
     {NULL, "curl -s -O @/v1/results/$R/tradeoff.svg"},
+    {"Many seeds of a random base: means with their confidence, and every run:",
+     "R=$(curl -s @/v1/examples/ensemble_random_sponge | curl -s -H 'Prefer: wait=30' --json @- "
+     "@/v1/jobs | " RESULT ")"},
+    {NULL, "curl -s -O @/v1/results/$R/ensemble.svg"},
+    {NULL, "curl -s @/v1/results/$R/ensemble.csv"},
     {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
     {NULL, "curl -s @/v1/materials"},
     {NULL, "curl -s @/v1/examples"},

@@ -11,8 +11,13 @@
 #include "server/base/clock.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
+#include "server/encode/answer.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
+
+const char no_impacts[] =
+    "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
+    "energy.json; with \"output\": {\"impacts\": true} they are listed";
 
 // The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
 // case.
@@ -70,8 +75,11 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
     }
     if (answer->study != NULL) {
         const char *name = answer->study->kind->name;
+        const AnswerFormat *format = answer_formats(answer->study->kind);
         bytes_format(bytes, ", \"%s\": \"/v1/results/%s/%s.json\"", name, id, name);
-        bytes_format(bytes, ", \"%s.svg\": \"/v1/results/%s/%s.svg\"", name, id, name);
+        while ((++format)->extension != NULL)
+            bytes_format(bytes, ", \"%s.%s\": \"/v1/results/%s/%s.%s\"", name, format->extension,
+                         id, name, format->extension);
     }
     bytes_text(bytes, "}");
 }
@@ -90,6 +98,8 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_text(bytes, json_or(row->plan, "null"));
     bytes_text(bytes, ", \"summary\": ");
     bytes_text(bytes, json_or(row->summary, "null"));
+    bytes_text(bytes, ", \"work\": ");
+    bytes_text(bytes, json_or(row->work, "null"));
     bytes_text(bytes, ", \"units\": ");
     write_units(bytes, simulation);
     bytes_text(bytes, ", \"channels\": [");
@@ -203,7 +213,7 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
                    "\"why\": \"the same "
                    "scene and engine give the same id and the same bytes");
         // It is measured once and then kept; elsewhere it comes out a little differently.
-        if (row.study != NULL)
+        if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
             bytes_text(&bytes, ", but for the CPU time that a study measures and what follows of "
                                "it");
         bytes_text(&bytes, "\"}}\n");
@@ -228,7 +238,9 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     const char *const texts[] = {row.psd, row.impacts, row.energy};
     const char *text = texts[document];
     Status answered = STATUS_OK;
-    if (text == NULL || strcmp(text, "null") == 0) {
+    if (document == DOCUMENT_IMPACTS && text != NULL && strcmp(text, "null") == 0) {
+        answered = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
+    } else if (text == NULL || strcmp(text, "null") == 0) {
         answered =
             problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no %s", names[document]);
     } else if (!reply_immutable(reply, request, tag)) {

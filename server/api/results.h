@@ -11,4 +11,7 @@ typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Docume
 Status results_document(App *app, const Request *request, Reply *reply, Document document,
                         Problem *problem);
 
+// Why a result has no ledger.
+extern const char no_impacts[];
+
 #endif

@@ -265,7 +265,9 @@ Status results_impacts(App *app, const Request *request, Reply *reply, Problem *
     TRY(get_outcome(app, request, reply, "impacts", "csv", &outcome, problem));
     if (outcome == NULL)
         return STATUS_OK;
-    const Status status = impacts_csv(app, reply, &outcome->response.impacts, problem);
+    const Status status = outcome->response.is_unlisted
+                              ? problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts)
+                              : impacts_csv(app, reply, &outcome->response.impacts, problem);
     outcome_drop(outcome);
     return status;
 }

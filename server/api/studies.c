@@ -1,18 +1,16 @@
-// Studies: the answer as JSON and as a chart. Both are drawn of what was kept when it was measured,
-// so that they never change.
+// Studies: the answer as JSON, as a chart and what other formats it has. All are made of what was
+// kept when the study was, so that they never change.
 #include "server/api/studies.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/tradeoff.h"
 #include "server/api/app.h"
 #include "server/codec/read.h"
-#include "server/encode/chart.h"
+#include "server/encode/answer.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
-#include "server/jobs/documents.h"
 
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
@@ -28,51 +26,74 @@ Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
 }
 
-static Status write_tradeoff(const ResultRow *row, bool is_chart, Bytes *bytes, Problem *problem) {
-    StudyAnswer answer;
+static Status refuse_other(const StudyKind *kind, Problem *problem) {
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "the scene asked for no study \"%s\": submit it with a member study",
+                       kind->kind.name);
+}
+
+static Status answer_read(const ResultRow *row, const StudyKind *kind, StudyAnswer *answer,
+                          Problem *problem) {
+    *answer = (StudyAnswer){NULL};
     if (row->study == NULL)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "the scene asked for no study \"tradeoff\": submit it with a member "
-                           "study");
-    const Status status = study_read(row, &answer, problem);
-    if (status == STATUS_OK && is_chart)
-        chart_tradeoff((const Tradeoff *)(const void *)answer.study, bytes);
-    else if (status == STATUS_OK) {
-        document_answer(bytes, answer.study);
-        bytes_text(bytes, "\n");
+        return refuse_other(kind, problem);
+    TRY(study_read(row, answer, problem));
+    return answer->study->kind == kind->answer ? STATUS_OK : refuse_other(kind, problem);
+}
+
+// By the extension in the path, else by Accept.
+static Status choose_format(const Request *request, const AnswerFormat *formats, Reply *reply,
+                            const AnswerFormat **format, Problem *problem) {
+    const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
+    char names[64];
+    answer_formats_name(formats, "", names, sizeof names);
+    reply->varies_by_accept = extension == NULL;
+    if (extension != NULL) {
+        *format = answer_format_find(formats, extension);
+        return *format != NULL
+                   ? STATUS_OK
+                   : problem_set(problem, STATUS_NOT_FOUND,
+                                 "there is no format \"%.20s\"; there are %s", extension, names);
+    }
+    for (size_t i = 0; formats[i].extension != NULL; i++)
+        types[i] = formats[i].content_type;
+    const int choice = header_accept(request->accept, types);
+    if (choice < 0)
+        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
+                           "none of the formats fits Accept; there are %s, by extension too",
+                           names);
+    *format = &formats[choice];
+    return STATUS_OK;
+}
+
+static Status show(App *app, const Request *request, const StudyKind *kind, Reply *reply,
+                   Problem *problem) {
+    const AnswerFormat *format;
+    TRY(choose_format(request, answer_formats(kind->answer), reply, &format, problem));
+    ResultRow row = {0};
+    StudyAnswer answer = {NULL};
+    Bytes bytes = {.most = app->reply_most};
+    char tag[128];
+    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK)
+        status = answer_read(&row, kind, &answer, problem);
+    if (status == STATUS_OK) {
+        snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
+        if (!reply_immutable(reply, request, tag)) {
+            format->write(answer.study, &bytes);
+            status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
+        }
     }
     fields_clear(study_answer_fields, &answer);
+    bytes_clear(&bytes);
+    result_row_clear(&row);
     return status;
 }
 
 Status results_tradeoff(App *app, const Request *request, Reply *reply, Problem *problem) {
-    static const char *const types[] = {"application/json", chart_type, NULL};
-    const char *extension = request->parameters[1];
-    const int choice = extension == NULL                ? header_accept(request->accept, types)
-                       : strcmp(extension, "json") == 0 ? 0
-                       : strcmp(extension, "svg") == 0  ? 1
-                                                        : -2;
-    reply->varies_by_accept = extension == NULL;
-    if (choice == -2)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is no format \"%.20s\"; there are json, svg", extension);
-    if (choice == -1)
-        return problem_set(
-            problem, STATUS_NOT_ACCEPTABLE,
-            "none of the formats fits Accept; there are json, svg, by extension too");
-    ResultRow row = {0};
-    Bytes bytes = {.most = app->reply_most};
-    char tag[104];
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
-    if (status == STATUS_OK) {
-        snprintf(tag, sizeof tag, "%.72s-tradeoff.%s", row.id, choice == 0 ? "json" : "svg");
-        if (row.study == NULL || !reply_immutable(reply, request, tag)) {
-            status = write_tradeoff(&row, choice == 1, &bytes, problem);
-            if (status == STATUS_OK)
-                status = reply_bytes(reply, 200, types[choice], &bytes, problem);
-        }
-    }
-    bytes_clear(&bytes);
-    result_row_clear(&row);
-    return status;
+    return show(app, request, &study_tradeoff, reply, problem);
+}
+
+Status results_ensemble(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return show(app, request, &study_ensemble, reply, problem);
 }

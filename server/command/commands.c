@@ -6,6 +6,7 @@
 #include "core/simulation/simulation.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
+#include "server/command/ensemble.h"
 #include "server/command/import.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
@@ -30,8 +31,9 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,  &command_run,  &command_check,   &command_tradeoff,
-    &command_import, &command_help, &command_version, NULL,
+    &command_serve,    &command_run,      &command_check,
+    &command_tradeoff, &command_ensemble, &command_import,
+    &command_help,     &command_version,  NULL,
 };
 
 static const char overview[] =
@@ -42,6 +44,7 @@ static const char overview[] =
     "  impactd run scene.json -o out.csv    write its time series (json, csv, npy)\n"
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
+    "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "\n"
     "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"

@@ -54,7 +54,7 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
     bytes_text(bytes, ",\n\"series\": ");
     TRY(series_write(&outcome->response, encoder_find("json"), bytes));
     bytes_text(bytes, ",\n\"impacts\": ");
-    document_impacts(bytes, &outcome->response.impacts);
+    document_impacts(bytes, &outcome->response);
     bytes_text(bytes, ",\n\"psd\": ");
     document_psd(bytes, &outcome->spectrum);
     bytes_text(bytes, "}\n");
@@ -64,9 +64,10 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
 // A job of nobody's queue, finished.
 static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const Outcome *outcome,
                         const int64_t began_unix_ms, double took, Bytes *bytes) {
-    Bytes plan = {0}, summary = {0}, told = {0}, notes = {0};
+    Bytes plan = {0}, summary = {0}, work = {0}, told = {0}, notes = {0};
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
+    document_work(&work, &outcome->work);
     document_warnings(&told, warnings);
     document_warnings(&notes, &outcome->warnings);
     JobShow show = {.id = "j-local",
@@ -79,15 +80,18 @@ static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const 
                     .total = took,
                     .plan = plan.at,
                     .summary = summary.at,
+                    .work = work.at,
                     .warnings = told.at,
                     .notes = notes.at,
                     .title = inquiry->simulation.title};
     intake_result_id(inquiry, show.result);
-    const bool is_failed = plan.is_failed || summary.is_failed || told.is_failed || notes.is_failed;
+    const bool is_failed =
+        plan.is_failed || summary.is_failed || work.is_failed || told.is_failed || notes.is_failed;
     if (!is_failed)
         job_put(bytes, &show, JOB_PUT_WHOLE);
     bytes_clear(&plan);
     bytes_clear(&summary);
+    bytes_clear(&work);
     bytes_clear(&told);
     bytes_clear(&notes);
     return is_failed || bytes->is_failed ? STATUS_NO_MEMORY : STATUS_OK;
@@ -146,8 +150,9 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text,
     store_close(store);
     if (status == STATUS_OK && inquiry.study != NULL)
         status = problem_add(problem, STATUS_INVALID, "/study",
-                             "is not for `run`, which runs the scene alone: `impactd tradeoff` "
-                             "makes the study, or the daemon");
+                             "is not for `run`, which runs the scene alone: `impactd %s` makes the "
+                             "study, or the daemon",
+                             inquiry.study->kind->name);
     if (status == STATUS_OK) {
         scene_file_warn(path, &warnings);
         // Before the run, so that a wrong folder is told now and not after it.

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char chart_type[] = "image/svg+xml";
+#include "server/encode/svg.h"
 
 enum { GROUPS = 12, NAME = 32, DECADES_LABELLED = 7 };
 
@@ -45,24 +45,10 @@ typedef struct Chart {
     Bytes *bytes;
 } Chart;
 
-static void put_text(Bytes *bytes, const char *text) {
-    for (const char *c = text; *c != '\0'; c++) {
-        if (*c == '&')
-            bytes_text(bytes, "&amp;");
-        else if (*c == '<')
-            bytes_text(bytes, "&lt;");
-        else if (*c == '>')
-            bytes_text(bytes, "&gt;");
-        else if (*c == '"')
-            bytes_text(bytes, "&quot;");
-        else
-            bytes_put(bytes, (unsigned char)*c < ' ' ? " " : c, 1);
-    }
-}
-
 static const char *group_name(const TradeoffPoint *point) {
     return point->contact_model != NULL     ? point->contact_model
            : !isnan(point->sample_rate)     ? "fewer samples"
+           : point->modes != COUNT_ABSENT   ? "fewer modes"
            : point->segment != COUNT_ABSENT ? "shorter segments"
            : !isnan(point->duration)        ? "shorter run"
                                             : point->solver;
@@ -87,13 +73,6 @@ static size_t group_of(Chart *chart, const TradeoffPoint *point) {
     return at < GROUPS ? at : GROUPS - 1;
 }
 
-static void widen(double least, double most, int *from, int *to) {
-    *from = (int)floor(log10(least));
-    *to = (int)ceil(log10(most));
-    if (*to <= *from)
-        *to = *from + 1;
-}
-
 static void scale(Chart *chart) {
     double x_least = DBL_MAX, x_most = 0, y_least = DBL_MAX, y_most = 0;
     for (size_t i = 0; i < chart->tradeoff->points.count; i++) {
@@ -115,8 +94,8 @@ static void scale(Chart *chart) {
         y_least = fmin(y_least, wanted);
         y_most = fmax(y_most, wanted);
     }
-    widen(x_most > 0 ? x_least : 1e-6, x_most > 0 ? x_most : 1, &chart->x_from, &chart->x_to);
-    widen(y_most > 0 ? y_least : 0.1, y_most > 0 ? y_most : 1, &chart->y_from, &chart->y_to);
+    svg_decades(x_most > 0 ? x_least : 1e-6, x_most > 0 ? x_most : 1, &chart->x_from, &chart->x_to);
+    svg_decades(y_most > 0 ? y_least : 0.1, y_most > 0 ? y_most : 1, &chart->y_from, &chart->y_to);
     if (chart->has_floor)
         chart->y_from--;
 }
@@ -154,13 +133,6 @@ static void put_style(Bytes *bytes) {
     bytes_text(bytes, "}\n</style>\n");
 }
 
-static void put_power(Bytes *bytes, int decade) {
-    if (decade >= -1 && decade <= 3)
-        bytes_format(bytes, "%g", pow(10, decade));
-    else
-        bytes_format(bytes, "10<tspan dy=\"-5\" font-size=\"9\">%d</tspan>", decade);
-}
-
 static int label_every(int decades) {
     return (decades + DECADES_LABELLED - 1) / DECADES_LABELLED;
 }
@@ -175,7 +147,7 @@ static void put_axes(const Chart *chart) {
         if ((chart->x_to - d) % x_every != 0)
             continue;
         bytes_format(bytes, "<text x=\"%.1f\" y=\"%.0f\" text-anchor=\"middle\">", x, bottom + 18);
-        put_power(bytes, d);
+        svg_power(bytes, d);
         bytes_text(bytes, "</text>\n");
     }
     for (int d = chart->y_from; d <= chart->y_to; d++) {
@@ -188,7 +160,7 @@ static void put_axes(const Chart *chart) {
         if (is_floor)
             bytes_text(bytes, "0");
         else
-            put_power(bytes, d);
+            svg_power(bytes, d);
         bytes_text(bytes, "</text>\n");
     }
     bytes_format(bytes,
@@ -239,7 +211,7 @@ static void put_point(Chart *chart, const TradeoffPoint *point) {
                  group, x_of(chart, point->cpu_minimum), y_of(chart, error_of(chart, point)),
                  marks[group]);
     bytes_text(bytes, "<title>");
-    put_text(bytes, point->name);
+    svg_text(bytes, point->name);
     bytes_format(bytes, ": %.2g%s in %.3g s%s</title></path>\n", error_of(chart, point),
                  metric_units[chart->tradeoff->metric], point->cpu_minimum,
                  point->is_best ? ", none is cheaper and closer" : "");
@@ -282,7 +254,7 @@ static void put_legend(const Chart *chart) {
                      "<path class=\"mark s%zu\" transform=\"translate(%.0f %.0f)\" d=\"%s\"/>", i,
                      right + 18, y, marks[i]);
         bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\">", right + 30, y + 4);
-        put_text(bytes, chart->groups[i]);
+        svg_text(bytes, chart->groups[i]);
         bytes_text(bytes, "</text>\n");
     }
     bytes_format(bytes, "<path class=\"best\" d=\"M%.0f %.0fh16\"/>", right + 10, y);
@@ -305,17 +277,17 @@ static void put_description(const Chart *chart) {
     const TradeoffPoints *points = &chart->tradeoff->points;
     bytes_text(bytes, "<desc>");
     if (chart->tradeoff->recommendation.why != NULL)
-        put_text(bytes, chart->tradeoff->recommendation.why);
+        svg_text(bytes, chart->tradeoff->recommendation.why);
     bytes_text(bytes, ".");
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
         if (is_drawn(chart, point))
             continue;
         bytes_text(bytes, " Not drawn: ");
-        put_text(bytes, point->name);
+        svg_text(bytes, point->name);
         bytes_text(bytes, point->why != NULL ? ", because: " : ", whose error is not known");
         if (point->why != NULL)
-            put_text(bytes, point->why);
+            svg_text(bytes, point->why);
         bytes_text(bytes, ".");
     }
     bytes_text(bytes, "</desc>\n");

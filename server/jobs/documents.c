@@ -12,6 +12,10 @@ void document_summary(Bytes *bytes, const Summary *summary) {
     write_item(bytes, summary_fields, summary, WRITE_REPORT);
 }
 
+void document_work(Bytes *bytes, const Work *work) {
+    write_item(bytes, work_fields, work, WRITE_REPORT);
+}
+
 void document_warnings(Bytes *bytes, const Warnings *warnings) {
     write_list(bytes, warning_fields, warnings->at, warnings->count, sizeof *warnings->at,
                WRITE_REPORT);
@@ -38,12 +42,15 @@ void document_energy(Bytes *bytes, const Energy *energy) {
     bytes_text(bytes, "}");
 }
 
-void document_impacts(Bytes *bytes, const Impacts *impacts) {
-    size_t count = 0;
-    for (size_t i = 0; i < impacts->count; i++)
-        count += impacts->at[i].kind == IMPACT_IMPACT;
-    bytes_format(bytes, "{\"count\": %zu, \"resting\": %zu, \"impacts\": ", count,
-                 impacts->count - count);
+void document_impacts(Bytes *bytes, const Response *response) {
+    const Impacts *impacts = &response->impacts;
+    if (response->is_unlisted) {
+        bytes_text(bytes, "null");
+        return;
+    }
+    bytes_format(bytes, "{\"count\": %llu, \"resting\": %llu, \"impacts\": ",
+                 (unsigned long long)response->impact_count,
+                 (unsigned long long)response->resting_count);
     write_list(bytes, impact_fields, impacts->at, impacts->count, sizeof *impacts->at,
                WRITE_REPORT);
     bytes_text(bytes, "}");

@@ -1,5 +1,6 @@
-// The JSON documents of a result: what API.md calls plan, summary, warnings, energy, impacts.json
-// and psd.json. Not the series: those are the encoders'. Used by worker.c and by `impactd run`.
+// The JSON documents of a result: what API.md calls plan, summary, work, warnings, energy,
+// impacts.json and psd.json. Not the series: those are the encoders'. Used by worker.c and by
+// `impactd run`.
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 
@@ -8,11 +9,13 @@
 
 void document_plan(Bytes *bytes, const PlanReport *plan);
 void document_summary(Bytes *bytes, const Summary *summary);
+void document_work(Bytes *bytes, const Work *work);
 void document_warnings(Bytes *bytes, const Warnings *warnings);
 // Two such arrays as one; NULL is an empty one.
 void document_join(Bytes *bytes, const char *first, const char *second);
 void document_energy(Bytes *bytes, const Energy *energy);
-void document_impacts(Bytes *bytes, const Impacts *impacts);
+// Where the scene asked for none: null.
+void document_impacts(Bytes *bytes, const Response *response);
 // Without any density: null.
 void document_psd(Bytes *bytes, const Spectrum *spectrum);
 // The scene as it can be submitted again, with its study, without its notes.

@@ -241,8 +241,9 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
         store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK) {
         job->plan = result.plan;
         job->summary = result.summary;
+        job->work = result.work;
         job->notes = result.notes;
-        result.plan = result.summary = result.notes = NULL;
+        result.plan = result.summary = result.work = result.notes = NULL;
     }
     result_row_clear(&result);
     *found = job;

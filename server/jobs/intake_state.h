@@ -39,10 +39,10 @@ struct Job {
     JobRow row;     // `state` and all else as seen by others
     JobRow closing; // as it will be once the store has it; borrows row's texts, owns `problem`
     bool is_closing;
-    size_t scene_size;            // in bytes, counted while it is live
-    bool is_counted;              // takes a place in the queue
-    char *plan, *summary, *notes; // of the result
-    Computation *computation;     // NULL: not yet or no more
+    size_t scene_size;                   // in bytes, counted while it is live
+    bool is_counted;                     // takes a place in the queue
+    char *plan, *summary, *work, *notes; // of the result
+    Computation *computation;            // NULL: not yet or no more
     Job *next_shared;
     int64_t submitted_ns, started_ns;
     Wakers wakers;

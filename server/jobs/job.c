@@ -62,6 +62,7 @@ void job_drop(Job *job) {
     job_row_clear(&job->row);
     free(job->plan);
     free(job->summary);
+    free(job->work);
     free(job->notes);
     free(job->wakers.at);
     intake_drop(job->intake);
@@ -116,8 +117,9 @@ Status job_show(Job *job, JobShow *show) {
         show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
     const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
-                          copy(&show->summary, job->summary) && copy(&show->notes, job->notes) &&
-                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title);
+                          copy(&show->summary, job->summary) && copy(&show->work, job->work) &&
+                          copy(&show->notes, job->notes) && copy(&show->warnings, row->warnings) &&
+                          copy(&show->title, row->title);
     unlock(job);
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
@@ -127,6 +129,7 @@ void job_show_clear(JobShow *show) {
     free(show->plan);
     free(show->summary);
     free(show->warnings);
+    free(show->work);
     free(show->notes);
     free(show->title);
     *show = (JobShow){0};

@@ -37,6 +37,7 @@ typedef struct JobShow {
     char *problem;  // problem+json of a failed job; NULL
     char *plan;     // JSON; NULL while unknown
     char *summary;  // JSON; NULL while unknown
+    char *work;     // JSON; NULL while unknown
     char *warnings; // JSON array, of the scene
     char *notes;    // JSON array, of the run; NULL: none
     char *title;    // NULL if none

@@ -22,18 +22,20 @@ static Status make_id(char id[40]) {
     return STATUS_OK;
 }
 
-// Plan, summary and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
+// Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
 static Status find_known(Intake *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     Outcome *outcome = cache_find(intake->cache, job->row.result);
     pthread_mutex_unlock(&intake->lock);
     if (outcome != NULL) {
-        Bytes plan = {0}, summary = {0}, notes = {0};
+        Bytes plan = {0}, summary = {0}, work = {0}, notes = {0};
         document_plan(&plan, &outcome->plan);
         document_summary(&summary, &outcome->summary);
+        document_work(&work, &outcome->work);
         document_warnings(&notes, &outcome->warnings);
         job->plan = bytes_take(&plan, NULL);
         job->summary = bytes_take(&summary, NULL);
+        job->work = bytes_take(&work, NULL);
         job->notes = bytes_take(&notes, NULL);
         outcome_drop(outcome);
         return STATUS_OK;
@@ -43,8 +45,9 @@ static Status find_known(Intake *intake, Job *job, Problem *problem) {
     if (status == STATUS_OK) {
         job->plan = row.plan;
         job->summary = row.summary;
+        job->work = row.work;
         job->notes = row.notes;
-        row.plan = row.summary = row.notes = NULL;
+        row.plan = row.summary = row.work = row.notes = NULL;
     }
     result_row_clear(&row);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)

@@ -58,14 +58,15 @@ static char *take(Bytes *bytes, Status *status) {
 static Status describe(const Computation *computation, Findings *findings) {
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
-    Bytes plan = {0}, summary = {0}, notes = {0}, energy = {0};
+    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0};
     Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, &outcome->summary);
+    document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);
-    document_impacts(&impacts, &outcome->response.impacts);
+    document_impacts(&impacts, &outcome->response);
     if (outcome->spectrum.densities.count > 0)
         document_psd(&psd, &outcome->spectrum);
     text_fit(row->id, sizeof row->id, computation->result);
@@ -74,6 +75,7 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->warnings = strdup(computation->warnings);
     row->plan = take(&plan, &status);
     row->summary = take(&summary, &status);
+    row->work = take(&work, &status);
     row->notes = take(&notes, &status);
     row->energy = take(&energy, &status);
     row->impacts = take(&impacts, &status);
@@ -198,6 +200,7 @@ static void publish(const Findings *findings, Job **jobs, size_t count, Status s
             job->plan = findings->result.plan == NULL ? NULL : strdup(findings->result.plan);
             job->summary =
                 findings->result.summary == NULL ? NULL : strdup(findings->result.summary);
+            job->work = findings->result.work == NULL ? NULL : strdup(findings->result.work);
             job->notes = findings->result.notes == NULL ? NULL : strdup(findings->result.notes);
         }
         if (saved != STATUS_OK) {

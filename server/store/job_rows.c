@@ -51,7 +51,7 @@ static Status add(Database *database, const void *work, Problem *problem) {
         "INSERT INTO jobs (" JOB_SHORT
         ", scene) VALUES (:id, :state, :result, :is_cached, :created_unix_ms, "
         ":started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, :problem, :warnings, "
-        ":scene)";
+        "CASE :state WHEN 2 THEN '' ELSE :scene END)"; // its result has it
     return database_change(database, sql, job_columns, work, NULL, problem);
 }
 
@@ -63,7 +63,9 @@ Status job_row_update(Database *database, const JobRow *row, Problem *problem) {
     static const char sql[] = "UPDATE jobs SET state = :state, result = :result, is_cached = "
                               ":is_cached, started_unix_ms = :started_unix_ms, "
                               "finished_unix_ms = :finished_unix_ms, queued = :queued, run = :run, "
-                              "total = :total, problem = :problem "
+                              "total = :total, problem = :problem, "
+                              // Its result has it.
+                              "scene = CASE :state WHEN 2 THEN '' ELSE scene END "
                               "WHERE id = :id";
     int changes;
     TRY(database_change(database, sql, job_columns, row, &changes, problem));

@@ -15,6 +15,7 @@ static const RowColumn result_columns[] = {
     ROW_COLUMN(ResultRow, summary, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, plan, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, warnings, COLUMN_TEXT),
+    ROW_COLUMN(ResultRow, work, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, notes, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, energy, COLUMN_TEXT),
     ROW_COLUMN(ResultRow, scene, COLUMN_TEXT),
@@ -38,9 +39,9 @@ typedef struct Finish {
 static Status finish(Database *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO results (id, engine, sample_rate, count, "
-        "created_unix_ms, summary, plan, warnings, notes, energy, scene, "
-        "impacts, psd, study) VALUES (:id, :engine, :sample_rate, :count, "
-        ":created_unix_ms, :summary, :plan, :warnings, :notes, "
+        "created_unix_ms, summary, plan, warnings, work, notes, energy, "
+        "scene, impacts, psd, study) VALUES (:id, :engine, :sample_rate, :count, "
+        ":created_unix_ms, :summary, :plan, :warnings, :work, :notes, "
         ":energy, :scene, :impacts, :psd, :study) ON CONFLICT (id) DO NOTHING";
     const Finish *both = work;
     if (both->result != NULL)
@@ -72,15 +73,15 @@ static Status load(Store *store, const char *sql, const char *id, ResultRow *row
 
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
-        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, notes, "
-        "energy, scene, impacts, psd, study FROM results WHERE id = :id";
+        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
+        "notes, energy, scene, impacts, psd, study FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem) {
     static const char sql[] =
-        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, notes "
-        "FROM results WHERE id = :id";
+        "SELECT id, engine, sample_rate, count, created_unix_ms, summary, plan, warnings, work, "
+        "notes FROM results WHERE id = :id";
     return load(store, sql, id, row, problem);
 }
 

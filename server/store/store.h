@@ -70,6 +70,7 @@ typedef struct ResultRow {
     char id[72];
     char *engine;
     char *scene, *plan, *summary, *warnings, *energy, *impacts; // JSON documents
+    char *work;                                                 // JSON document; NULL: not known
     char *notes;    // JSON array, what the run itself warned of; NULL: nothing
     char *psd;      // JSON; NULL where none was asked for
     char *study;    // JSON, the answer of the scene's study; NULL: none

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/math/fourier.h"
-#include "core/solve/exact.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/frame.h"
 #include "core/solve/solvers.h"
 #include "core/solve/steps_run.h"

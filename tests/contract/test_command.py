@@ -33,7 +33,7 @@ def test_help_leads_with_examples():
     assert code == 0 and errors == ""
     lines = [line.strip() for line in out.splitlines() if line.strip()]
     assert lines[1].startswith("impactd serve"), lines[:3]
-    for command in ("serve", "run", "check", "tradeoff", "import", "help", "version"):
+    for command in ("serve", "run", "check", "tradeoff", "ensemble", "import", "help", "version"):
         assert any(line.startswith(command + " ") for line in lines), command
         pages = [program.run("help", command), program.run(command, "--help"), program.run(command, "-h")]
         assert pages[0] == pages[1] == pages[2], command

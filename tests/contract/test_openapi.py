@@ -99,7 +99,10 @@ def test_real_answers_have_the_promised_shapes():
         job = program.finished(daemon, program.scene("paper_free_sponge"))
         study = program.finished(daemon, {**program.scene("paper_free_sponge"), "study": {"solvers": ["exact", "rk4"]}})
         tradeoff = {"id": study["result"]}
+        many = program.finished(daemon, program.scene("ensemble_random_sponge"))
+        ensemble = {"id": many["result"]}
         values = {"/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
+                  "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
@@ -136,6 +139,7 @@ def test_real_answers_have_the_promised_shapes():
                 call(method, path, target, headers={"If-None-Match": "*"})
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
+        call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
         scene = program.scene("paper_random_sponge")
         slow = program.scene("paper_sine_aluminium")
         slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})

@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -47,6 +48,45 @@ static void a_pair_is_box_and_mullers_of_the_counters_words(void **state) {
     noise_normal_pair(UINT64_C(3) << 32 | 11, UINT64_C(2) << 32 | 9, UINT64_C(1) << 32 | 7, pair);
     assert_true(fabsl(pair[0] - radius * cosl(angle)) < 1e-15L * radius);
     assert_true(fabsl(pair[1] - radius * sinl(angle)) < 1e-15L * radius);
+}
+
+static void rows_are_as_good_as_the_c_library_in_long_double(void **state) {
+    (void)state;
+    enum { PAIRS = 100000 };
+    double *pairs = malloc(2 * PAIRS * sizeof *pairs);
+    assert_non_null(pairs);
+    noise_normal_pairs(17, 4, 3, PAIRS, pairs);
+    for (uint32_t i = 0; i < PAIRS; i++) {
+        const uint32_t counter[4] = {3 + i, 0, 4, 0}, key[2] = {17, 0};
+        uint32_t word[4];
+        noise_philox(counter, key, word);
+        const uint64_t a = (uint64_t)word[1] << 32 | word[0];
+        const uint64_t b = (uint64_t)word[3] << 32 | word[2];
+        const long double u = ldexpl((long double)(a >> 11) + 1, -53);
+        const long double angle = 2 * acosl(-1) * ldexpl((long double)(b >> 11), -53);
+        const long double radius = sqrtl(-2 * logl(u));
+        assert_true(fabsl(pairs[2 * i] - radius * cosl(angle)) <= 8e-16L * radius);
+        assert_true(fabsl(pairs[2 * i + 1] - radius * sinl(angle)) <= 8e-16L * radius);
+    }
+    free(pairs);
+}
+
+static void a_row_has_the_bits_of_its_pairs(void **state) {
+    (void)state;
+    enum { MOST = 100 };
+    double row[2 * MOST + 1];
+    for (uint64_t count = 0; count <= MOST; count++) {
+        // Across the 32nd bit of the index.
+        const uint64_t first = UINT64_C(0xffffffff) - count / 2;
+        row[2 * count] = 7;
+        noise_normal_pairs(1, 2, first, count, row);
+        assert_true(row[2 * count] == 7);
+        for (uint64_t i = 0; i < count; i++) {
+            double pair[2];
+            noise_normal_pair(1, 2, first + i, pair);
+            assert_memory_equal(pair, row + 2 * i, sizeof pair);
+        }
+    }
 }
 
 static uint32_t inverse(uint32_t odd) {
@@ -133,6 +173,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_generator_gives_the_published_integers),
         cmocka_unit_test(a_pair_is_box_and_mullers_of_the_counters_words),
+        cmocka_unit_test(rows_are_as_good_as_the_c_library_in_long_double),
+        cmocka_unit_test(a_row_has_the_bits_of_its_pairs),
         cmocka_unit_test(even_the_rarest_words_make_finite_numbers),
         cmocka_unit_test(the_normal_numbers_have_a_normal_distributions_moments),
         cmocka_unit_test(seed_stream_and_index_each_matter_in_both_halves),

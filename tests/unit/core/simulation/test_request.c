@@ -9,6 +9,7 @@
 
 #include "core/base/canonical.h"
 #include "core/simulation/simulation.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
@@ -375,6 +376,33 @@ static int teardown(void **state) {
     return 0;
 }
 
+// What no law of the scene uses is left out, and so is no other scene.
+static void a_tolerance_is_for_power_laws_alone(void **state) {
+    (void)state;
+    static const char *const models[] = {"spring_damper", "impulse", "auto", "hunt_crossley",
+                                         "jankowski"};
+    for (size_t i = 0; i < COUNT(models); i++) {
+        CanonicalBytes bytes[2];
+        for (int has = 0; has < 2; has++) {
+            Simulation simulation;
+            scene_with_damper(&simulation, 0.61, 0.025);
+            scene_choose(&simulation.scene.contact, &contact_kinds, models[i]);
+            scene_choose(&simulation.accuracy, &solver_kinds, "exact");
+            AccuracyExact *exact = (AccuracyExact *)(void *)simulation.accuracy;
+            assert_true(isnan(exact->tolerance));
+            if (has == 1)
+                exact->tolerance = 1e-6;
+            Problem problem;
+            problem_clear(&problem);
+            assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
+            assert_int_equal(isnan(exact->tolerance), has == 0 || i < 3);
+            bytes[has] = canonical(&simulation);
+            simulation_clear(&simulation);
+        }
+        assert_int_equal(same(&bytes[0], &bytes[1]), i < 3);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_papers_scene_is_sound_and_complete),
@@ -393,6 +421,7 @@ int main(void) {
         cmocka_unit_test(titles_and_labels_have_their_limits),
         cmocka_unit_test(sixty_four_dampers_are_the_most),
         cmocka_unit_test(accuracy_is_chosen_by_its_solver),
+        cmocka_unit_test(a_tolerance_is_for_power_laws_alone),
     };
     return cmocka_run_group_tests(tests, NULL, teardown);
 }

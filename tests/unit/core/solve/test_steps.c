@@ -37,8 +37,9 @@ static Problem problem;
 
 static Answer solve(const Solver *solver, double knob, const Plan *plan, const Base *base) {
     RunColumn columns[8];
-    const AccuracyStep step = {.accuracy = {{&solver->kind}}, .step = knob};
-    const AccuracyTolerance tolerance = {.accuracy = {{&solver->kind}}, .tolerance = knob};
+    const AccuracyStep step = {.accuracy = {{&solver->kind}, COUNT_ABSENT}, .step = knob};
+    const AccuracyTolerance tolerance = {.accuracy = {{&solver->kind}, COUNT_ABSENT},
+                                         .tolerance = knob};
     Answer answer = {.count = plan->storeys * plan->count};
     answer.values = calloc(answer.count, sizeof *answer.values);
     assert_non_null(answer.values);

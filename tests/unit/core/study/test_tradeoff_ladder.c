@@ -5,13 +5,17 @@
 
 #include <cmocka.h>
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/excite/random.h"
 #include "core/math/fourier.h"
 #include "core/simulation/compare.h"
+#include "core/solve/exact_accuracy.h"
+#include "core/solve/solver.h"
 #include "core/study/tradeoff_ladder.h"
+#include "tests/support/document.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
@@ -114,6 +118,40 @@ static void only_what_the_scene_has_can_be_given_up(void **state) {
     simulation_clear(&simulation);
 }
 
+static void a_frame_may_keep_half_its_modes_and_half_of_these(void **state) {
+    (void)state;
+    static const struct {
+        const char *masses, *stiffnesses;
+        size_t count;
+    } cases[] = {{"1, 1, 1", "9, 9, 9", 0},
+                 {"1, 1, 1, 1", "9, 9, 9, 9", 2},
+                 {"1, 1, 1, 1, 1, 1, 1, 1, 1", "9, 9, 9, 9, 9, 9, 9, 9, 9", 3}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Simulation simulation;
+        char members[256];
+        snprintf(members, sizeof members,
+                 "\"structure\": {\"kind\": \"frame\", \"masses\": [%s], \"stiffnesses\": [%s]}",
+                 cases[i].masses, cases[i].stiffnesses);
+        document_pass(&simulation, members);
+        TradeoffPoints points = make(&simulation);
+        assert_int_equal(count_named(&points, " mode"), cases[i].count);
+        for (size_t k = 0; k < points.count; k++) {
+            const TradeoffPoint *point = &points.at[k];
+            if (point->modes == COUNT_ABSENT)
+                continue;
+            Simulation target;
+            assert_int_equal(ladder_apply(&simulation, point, NULL, &target, &problem), STATUS_OK);
+            const Accuracy *accuracy = (const Accuracy *)(const void *)target.accuracy;
+            assert_int_equal(accuracy->modes, point->modes);
+            assert_string_equal(accuracy->variant.kind->name, "exact");
+            assert_true(ladder_cost(&simulation, point) < simulation_cost(&simulation).steps);
+            simulation_clear(&target);
+        }
+        forget(&points);
+        simulation_clear(&simulation);
+    }
+}
+
 static TradeoffPoint exact(void) {
     TradeoffPoint point;
     assert_int_equal(fields_default(tradeoff_point_fields, &point), STATUS_OK);
@@ -126,6 +164,42 @@ static Simulation apply(const Simulation *simulation, const TradeoffPoint *point
     if (ladder_apply(simulation, point, NULL, &target, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return target;
+}
+
+// Closed forms have nothing to trade, contacts under a power law their tolerance.
+static void tolerances_of_the_exact_solver_are_for_power_laws(void **state) {
+    (void)state;
+    static const char *const models[] = {"spring_damper", "impulse", "hunt_crossley", "jankowski"};
+    for (size_t i = 0; i < COUNT(models); i++) {
+        Simulation simulation = scene_make(0.025, 0.001);
+        paper_model(&simulation, models[i]);
+        complete(&simulation);
+        TradeoffPoints points = make(&simulation);
+        size_t whole = 0, traded = 0;
+        double last = 1;
+        for (size_t k = 0; k < points.count; k++) {
+            const TradeoffPoint *point = &points.at[k];
+            if (strcmp(point->solver, "exact") != 0 || point->contact_model != NULL)
+                continue;
+            *(isnan(point->tolerance) ? &whole : &traded) += 1;
+            if (isnan(point->tolerance))
+                continue;
+            assert_true(point->tolerance < last);
+            last = point->tolerance;
+            // It is the tolerance that the point's own simulation keeps, for less.
+            Simulation target = {0};
+            assert_int_equal(ladder_apply(&simulation, point, NULL, &target, &problem), STATUS_OK);
+            assert_true(exact_tolerance((const Accuracy *)(const void *)target.accuracy) ==
+                        point->tolerance);
+            assert_true(ladder_cost(&simulation, point) < simulation_cost(&simulation).steps);
+            simulation_clear(&target);
+        }
+        assert_int_equal(whole, 1);
+        assert_int_equal(traded, i < 2 ? 0 : 6);
+        assert_true(i < 2 || last < 2e-13);
+        forget(&points);
+        simulation_clear(&simulation);
+    }
 }
 
 static void fewer_samples_leave_the_base_as_it_is(void **state) {
@@ -218,6 +292,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(steps_go_by_decades_from_the_sample_interval_into_the_contact),
         cmocka_unit_test(only_what_the_scene_has_can_be_given_up),
+        cmocka_unit_test(tolerances_of_the_exact_solver_are_for_power_laws),
+        cmocka_unit_test(a_frame_may_keep_half_its_modes_and_half_of_these),
         cmocka_unit_test(fewer_samples_leave_the_base_as_it_is),
         cmocka_unit_test(what_a_point_does_not_name_stays_the_scenes),
         cmocka_unit_test(a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse),

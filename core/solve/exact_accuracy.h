@@ -1,7 +1,7 @@
 // What the exact solver may be asked for: its "accuracy" object. Not its engines (exact*.c,
 // frame*.c). Used by exact.c, frame.c, simulation/ and tests.
-#ifndef CORE_SOLVE_EXACT_H
-#define CORE_SOLVE_EXACT_H
+#ifndef CORE_SOLVE_EXACT_ACCURACY_H
+#define CORE_SOLVE_EXACT_ACCURACY_H
 
 #include "core/solve/solver.h"
 
@@ -9,8 +9,13 @@ typedef struct AccuracyExact {
     Accuracy accuracy;
     double tolerance; // relative error of a contact under a power law; NAN: none but rounding's
 } AccuracyExact;
+extern const Field accuracy_exact_fields[];
 
 // What a contact under a power law may be wrong by; `accuracy` is the exact solver's, or NULL.
 double exact_tolerance(const Accuracy *accuracy);
+
+// Solver.decide and .forget_unused of the exact solver.
+Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem);
+void exact_forget_unused(Accuracy *accuracy, bool has_power_law);
 
 #endif

@@ -1,0 +1,12 @@
+// A run in which nothing moves: the answer without any solver. Not a mass at rest at its stop: that
+// is the solvers'. Used by simulation/.
+#ifndef CORE_SOLVE_REST_H
+#define CORE_SOLVE_REST_H
+
+#include "core/solve/solver.h"
+
+// For a plan whose structure and masses start without motion, off their stops, over a still base.
+// Fills all of `response` but its series.
+void rest_run(Run *run, Response *response);
+
+#endif

@@ -1,0 +1,145 @@
+#include "server/command/study.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "core/study/inquiry.h"
+#include "server/base/clock.h"
+#include "server/command/bar.h"
+#include "server/command/command.h"
+#include "server/command/output.h"
+#include "server/command/scene_file.h"
+#include "server/encode/answer.h"
+#include "server/jobs/intake.h"
+
+const char *study_number(char text[24], const char *format, double value) {
+    if (isnan(value))
+        snprintf(text, 24, "-");
+    else
+        snprintf(text, 24, format, value);
+    return text;
+}
+
+// The format that a path ends in, NULL if there is none.
+static const AnswerFormat *format_of(const StudyCommand *command, const char *path) {
+    const char *extension = strrchr(path, '.');
+    if (extension == NULL || extension == path || extension[-1] == '/')
+        return NULL;
+    return answer_format_find(answer_formats(command->kind->answer), extension + 1);
+}
+
+static Status check_outputs(const StudyCommand *command, const Texts *outputs, Problem *problem) {
+    Status status = STATUS_OK;
+    char names[64];
+    answer_formats_name(answer_formats(command->kind->answer), ".", names, sizeof names);
+    for (size_t i = 0; i < outputs->count; i++)
+        if (format_of(command, outputs->at[i]) == NULL)
+            status = problem_add(problem, STATUS_USAGE, "--output",
+                                 "must end in one of %s, is %.200s", names, outputs->at[i]);
+    return status;
+}
+
+static Status file_write(const StudyCommand *command, const char *path, const Variant *answer,
+                         Problem *problem) {
+    Bytes bytes = {0};
+    format_of(command, path)->write(answer, &bytes);
+    Status status = bytes.is_failed
+                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
+                        : output_open(path, problem);
+    if (status == STATUS_OK)
+        status = output_write(bytes.at, bytes.count, problem);
+    if (status == STATUS_OK)
+        status = output_close(problem);
+    output_drop();
+    bytes_clear(&bytes);
+    return status;
+}
+
+static double thread_cpu(void *context) {
+    (void)context;
+    return 1e-9 * (double)clock_thread_cpu_ns();
+}
+
+static Status study_make(const StudyCommand *command, const Inquiry *inquiry, const Texts *outputs,
+                         Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(SIMULATION_CPU_SECONDS);
+    Bar bar;
+    Workspace workspace = {0};
+    Variant *answer = NULL;
+    bar_start(&bar);
+    const Watch watch = bar_watch(&bar);
+    const StudyTools tools = {
+        .limits = &limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
+    Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &answer, problem);
+    bar_stop(&bar);
+    workspace_clear(&workspace);
+    if (status == STATUS_OK)
+        command->print(answer);
+    for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
+        status = file_write(command, outputs->at[i], answer, problem);
+    variant_free(answer);
+    return status;
+}
+
+// The document's own study, or a new one, with what the flags say.
+static Status study_choose(const StudyCommand *command, Inquiry *inquiry, void *settings,
+                           Problem *problem) {
+    if (inquiry->study != NULL && inquiry->study->kind != &command->kind->kind) {
+        variant_free(inquiry->study);
+        inquiry->study = NULL;
+    }
+    if (inquiry->study == NULL)
+        inquiry->study = variant_new(&command->kind->kind);
+    if (inquiry->study == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+    command->choose((Study *)(void *)inquiry->study, settings);
+    return STATUS_OK;
+}
+
+static Status scene_study(const StudyCommand *command, const char *path, const Bytes *text,
+                          const Texts *outputs, void *settings, Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(SIMULATION_CPU_SECONDS);
+    Store *store = NULL;
+    Inquiry inquiry = {0};
+    Warnings warnings = {0};
+    TRY(store_open(NULL, &store, problem));
+    Status status =
+        intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
+    store_close(store);
+    if (status == STATUS_OK)
+        scene_file_warn(path, &warnings);
+    if (status == STATUS_OK)
+        status = study_choose(command, &inquiry, settings, problem);
+    if (status == STATUS_OK)
+        status = inquiry_complete(&inquiry, &limits, NULL, problem);
+    // Before the runs, so that a wrong folder is told now and not after them.
+    for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++) {
+        status = output_open(outputs->at[i], problem);
+        output_drop();
+    }
+    if (status == STATUS_OK)
+        status = study_make(command, &inquiry, outputs, problem);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+    return status;
+}
+
+int study_command_run(const StudyCommand *command, const Texts *outputs, void *settings,
+                      const Options *options, Problem *problem) {
+    Status status = check_outputs(command, outputs, problem);
+    if (status == STATUS_OK && options->operand_count != 1)
+        status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
+                             options->operand_count);
+    if (status != STATUS_OK)
+        return command_refuse(command->name, problem);
+    const char *path = options->operands[0];
+    Bytes text;
+    output_guard();
+    status = scene_file_read(path, &text, problem);
+    if (status == STATUS_OK)
+        status = scene_study(command, path, &text, outputs, settings, problem);
+    bytes_clear(&text);
+    if (status != STATUS_OK)
+        scene_file_refuse(path, problem);
+    return command_exit(status);
+}

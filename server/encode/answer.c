@@ -1,0 +1,67 @@
+#include "server/encode/answer.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "server/encode/chart.h"
+#include "server/encode/chart_ensemble.h"
+#include "server/encode/ensemble_csv.h"
+#include "server/encode/svg.h"
+#include "server/jobs/documents.h"
+
+static void json_write(const Variant *answer, Bytes *bytes) {
+    document_answer(bytes, answer);
+    bytes_text(bytes, "\n");
+}
+
+static void tradeoff_chart(const Variant *answer, Bytes *bytes) {
+    chart_tradeoff((const Tradeoff *)(const void *)answer, bytes);
+}
+
+static void ensemble_chart(const Variant *answer, Bytes *bytes) {
+    chart_ensemble((const Ensemble *)(const void *)answer, bytes);
+}
+
+static void ensemble_table(const Variant *answer, Bytes *bytes) {
+    ensemble_csv((const Ensemble *)(const void *)answer, bytes);
+}
+
+static const struct {
+    const StudyKind *study;
+    AnswerFormat formats[ANSWER_FORMATS];
+} all[] = {
+    {&study_tradeoff,
+     {{"json", "application/json", json_write},
+      {"svg", svg_type, tradeoff_chart},
+      {NULL, NULL, NULL}}},
+    {&study_ensemble,
+     {{"json", "application/json", json_write},
+      {"csv", "text/csv; charset=utf-8", ensemble_table},
+      {"svg", svg_type, ensemble_chart},
+      {NULL, NULL, NULL}}},
+};
+
+static const AnswerFormat none[] = {{"json", "application/json", json_write}, {NULL, NULL, NULL}};
+
+const AnswerFormat *answer_formats(const Kind *kind) {
+    for (size_t i = 0; i < COUNT(all); i++)
+        if (all[i].study->answer == kind)
+            return all[i].formats;
+    return none;
+}
+
+const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *extension) {
+    while (formats->extension != NULL && strcmp(formats->extension, extension) != 0)
+        formats++;
+    return formats->extension != NULL ? formats : NULL;
+}
+
+void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
+                         size_t size) {
+    *target = '\0';
+    for (size_t length = 0; formats->extension != NULL && length < size; formats++) {
+        snprintf(target + length, size - length, "%s%s%s", length > 0 ? ", " : "", before,
+                 formats->extension);
+        length = strlen(target);
+    }
+}

@@ -1,0 +1,25 @@
+// In what formats the answer of ONE kind of study can be had; answer.c lists all. Not the encoders
+// of series and spectra (encoder.h). Used by api/studies.c, api/results.c and the commands.
+#ifndef SERVER_ENCODE_ANSWER_H
+#define SERVER_ENCODE_ANSWER_H
+
+#include "core/study/study.h"
+#include "server/base/bytes.h"
+
+enum { ANSWER_FORMATS = 4 }; // at most, with the end
+
+typedef struct AnswerFormat {
+    const char *extension; // "svg"; NULL: the end
+    const char *content_type;
+    void (*write)(const Variant *answer, Bytes *bytes); // appends the whole document
+} AnswerFormat;
+
+// All formats of an answer of this kind, json first.
+const AnswerFormat *answer_formats(const Kind *kind);
+const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *extension);
+
+// "json, svg", each behind `before`.
+void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
+                         size_t size);
+
+#endif

@@ -1,0 +1,328 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/canonical.h"
+#include "core/excite/random.h"
+#include "core/math/fourier.h"
+#include "core/study/ensemble.h"
+#include "core/study/inquiry.h"
+#include "tests/support/paper.h"
+#include "tests/support/scenes.h"
+
+static Problem problem;
+
+static EnsembleStudy *study_of(Inquiry *inquiry) {
+    return (EnsembleStudy *)(void *)inquiry->study;
+}
+
+// The paper's random scene with seed 5 and an ensemble of so many runs; completed by the caller.
+static Inquiry inquiry_make(double duration, uint64_t runs) {
+    Inquiry inquiry = {0};
+    paper_scene(&inquiry.simulation, 0.61, 0.025, duration);
+    paper_random(&inquiry.simulation, 1, 5);
+    inquiry.study = variant_new(&study_ensemble.kind);
+    assert_non_null(inquiry.study);
+    study_of(&inquiry)->runs = runs;
+    problem_clear(&problem);
+    return inquiry;
+}
+
+static void complete(Inquiry *inquiry) {
+    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
+        fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
+}
+
+static Status run(const Inquiry *inquiry, const Watch *watch, const SimulationLimits *limits,
+                  Workspace *workspace, Ensemble **answer) {
+    const StudyTools tools = {.limits = limits, .watch = watch, .workspace = workspace};
+    Variant *made = NULL;
+    const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &made, &problem);
+    *answer = (Ensemble *)(void *)made;
+    return status;
+}
+
+static Ensemble *make(const Inquiry *inquiry, const SimulationLimits *limits) {
+    Ensemble *answer;
+    if (run(inquiry, NULL, limits, NULL, &answer) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return answer;
+}
+
+static void each_row_is_the_scene_with_its_seed(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(4, 5);
+    complete(&inquiry);
+    assert_int_equal(study_of(&inquiry)->first_seed, 5); // the scene's own
+    Ensemble *answer = make(&inquiry, NULL);
+    assert_true(answer->made == 5 && answer->failed == 0 && answer->table.count == 5);
+    double steps = 0;
+    for (size_t i = 0; i < 5; i++) {
+        Simulation *simulation = &inquiry.simulation;
+        ((ExcitationRandom *)(void *)simulation->scene.excitation)->seed = 5 + i;
+        Outcome *outcome;
+        assert_int_equal(simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem),
+                         STATUS_OK);
+        const EnsembleRun *row = &answer->table.at[i];
+        assert_true(row->seed == 5 + i && row->steps == outcome->steps && row->why == NULL);
+        assert_memory_equal(&row->summary, &outcome->summary, sizeof outcome->summary);
+        steps += outcome->steps;
+        outcome_drop(outcome);
+    }
+    assert_true(answer->steps == steps);
+    assert_true(answer->target.why == NULL && answer->target.predicted_runs == COUNT_ABSENT);
+    const EnsembleStatistic *impacts = &answer->statistics.impacts;
+    assert_true(impacts->count == 5 && impacts->low < impacts->mean);
+    assert_int_equal(answer->spectra.count, 1);
+    assert_string_equal(answer->spectra.at[0].channel, "mean_acceleration");
+    assert_true(answer->spectra.at[0].low.at[40] < answer->spectra.at[0].mean.at[40]);
+    variant_free(&answer->variant);
+    inquiry_clear(&inquiry);
+}
+
+static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
+    (void)state;
+    static const double targets[] = {0.5, 0.1, 1e-9};
+    Inquiry inquiry = inquiry_make(4, 60);
+    double made[COUNT(targets)];
+    for (int metric = 0; metric <= ENSEMBLE_PSD; metric += ENSEMBLE_PSD) {
+        for (size_t i = 0; i < COUNT(targets); i++) {
+            study_of(&inquiry)->target = targets[i];
+            study_of(&inquiry)->metric = metric;
+            complete(&inquiry);
+            Ensemble *answer = make(&inquiry, NULL);
+            const EnsembleTarget *target = &answer->target;
+            made[i] = (double)answer->made;
+            assert_true(answer->table.count == answer->made && target->metric == metric);
+            assert_true(target->is_kept && target->estimated_error <= targets[i]);
+            assert_true(target->pilot == 8 && target->predicted_runs >= 8);
+            assert_true(target->confidence == 0.99 && target->error == targets[i]);
+            variant_free(&answer->variant);
+        }
+        assert_true(made[0] < made[1] && made[1] <= made[2] && made[2] == 60);
+    }
+    inquiry_clear(&inquiry);
+}
+
+static void all_are_made_where_none_differs(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(1, 30);
+    study_of(&inquiry)->target = 0.5;
+    study_of(&inquiry)->metric = ENSEMBLE_IMPACTS;
+    // Nothing reaches the stops: a rare seed might.
+    ((ExcitationRandom *)(void *)inquiry.simulation.scene.excitation)->rms = 1e-6;
+    complete(&inquiry);
+    Ensemble *answer = make(&inquiry, NULL);
+    assert_true(answer->made == 30 && answer->target.is_kept &&
+                answer->target.estimated_error == 0);
+    assert_true(answer->statistics.impacts.mean == 0 && answer->statistics.impacts.high == 0);
+    variant_free(&answer->variant);
+    inquiry_clear(&inquiry);
+}
+
+static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(4, 20);
+    complete(&inquiry);
+    Ensemble *whole = make(&inquiry, NULL);
+    const SimulationLimits limits = {.impacts = (size_t)whole->statistics.impacts.median};
+    Ensemble *answer = make(&inquiry, &limits);
+    assert_true(answer->made == 20 && answer->failed > 0 && answer->failed < 20);
+    assert_int_equal(answer->failures.count, 1);
+    assert_string_equal(answer->failures.at[0].reason, "limit");
+    assert_true(answer->failures.at[0].count == answer->failed);
+    assert_true(answer->statistics.rms_displacement.count == 20 - answer->failed);
+    bool is_first = true;
+    for (size_t i = 0; i < 20; i++) {
+        const EnsembleRun *row = &answer->table.at[i];
+        assert_true((row->why != NULL) == (whole->table.at[i].summary.impacts > limits.impacts));
+        if (row->why == NULL)
+            continue;
+        assert_true(isnan(row->steps) && isnan(row->summary.rms_displacement));
+        assert_non_null(strstr(row->why, "impacts"));
+        if (is_first)
+            assert_int_equal(answer->failures.at[0].first_seed, row->seed);
+        is_first = false;
+    }
+    variant_free(&answer->variant);
+    variant_free(&whole->variant);
+    inquiry_clear(&inquiry);
+}
+
+static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(4, 10);
+    study_of(&inquiry)->target = 0.1;
+    complete(&inquiry);
+    const SimulationLimits limits = {.impacts = 1};
+    Ensemble *answer = make(&inquiry, &limits);
+    assert_true(answer->made == 10 && answer->failed == 10 && !answer->target.is_kept);
+    assert_true(isnan(answer->target.estimated_error));
+    assert_true(isnan(answer->statistics.rms_displacement.mean) && answer->spectra.count == 0);
+    assert_non_null(strstr(answer->target.why, "no run of 10"));
+    variant_free(&answer->variant);
+    inquiry_clear(&inquiry);
+}
+
+static void what_is_not_known_is_not_told(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(2, 3);
+    paper_model(&inquiry.simulation, "impulse");
+    paper_no_psd(&inquiry.simulation);
+    complete(&inquiry);
+    Ensemble *answer = make(&inquiry, NULL);
+    assert_true(isnan(answer->statistics.peak_contact_force.mean));
+    assert_true(answer->statistics.impacts.mean > 0);
+    assert_true(answer->spectra.count == 0 && answer->frequency.count == 0);
+    variant_free(&answer->variant);
+    inquiry_clear(&inquiry);
+}
+
+typedef struct Patience {
+    int left, asked;
+    double last;
+} Patience;
+
+static bool lose(void *context, double fraction) {
+    Patience *patience = context;
+    assert_true(fraction >= patience->last - 1e-12 && fraction <= 1 + 1e-9);
+    patience->last = fraction;
+    patience->asked++;
+    return patience->left-- > 0;
+}
+
+static void it_tells_its_progress_and_can_be_stopped_wherever_it_is(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(1, 40);
+    study_of(&inquiry)->target = 0.1;
+    complete(&inquiry);
+    Ensemble *answer;
+    Patience patience = {.left = 1 << 30};
+    const Watch watch = {&patience, lose};
+    assert_int_equal(run(&inquiry, &watch, NULL, NULL, &answer), STATUS_OK);
+    const int whole = patience.asked;
+    assert_true(whole >= (int)answer->made && patience.last > 0.5);
+    variant_free(&answer->variant);
+    for (int left = 0; left < whole; left += 1 + whole / 40) {
+        patience = (Patience){.left = left};
+        problem_clear(&problem);
+        assert_int_equal(run(&inquiry, &watch, NULL, NULL, &answer), STATUS_CANCELLED);
+        assert_null(answer);
+        assert_int_equal(patience.asked, left + 1); // and asks no more
+    }
+    inquiry_clear(&inquiry);
+}
+
+typedef struct Taken {
+    unsigned char *bytes;
+    size_t count;
+} Taken;
+
+static void take(void *context, const void *bytes, size_t size) {
+    Taken *taken = context;
+    taken->bytes = realloc(taken->bytes, taken->count + size);
+    assert_non_null(taken->bytes);
+    memcpy(taken->bytes + taken->count, bytes, size);
+    taken->count += size;
+}
+
+static void the_same_study_has_the_same_bytes_in_any_workspace(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(3, 20);
+    study_of(&inquiry)->target = 0.08;
+    study_of(&inquiry)->metric = ENSEMBLE_PSD;
+    complete(&inquiry);
+    Workspace workspace = {0};
+    Taken taken[3] = {{NULL, 0}};
+    for (size_t i = 0; i < 3; i++) {
+        Ensemble *answer;
+        assert_int_equal(run(&inquiry, NULL, NULL, i > 0 ? &workspace : NULL, &answer), STATUS_OK);
+        canonical_write(study_ensemble.answer->fields, answer, take, &taken[i]);
+        variant_free(&answer->variant);
+    }
+    for (size_t i = 1; i < 3; i++) {
+        assert_int_equal(taken[i].count, taken[0].count);
+        assert_memory_equal(taken[i].bytes, taken[0].bytes, taken[0].count);
+    }
+    for (size_t i = 0; i < 3; i++)
+        free(taken[i].bytes);
+    workspace_clear(&workspace);
+    inquiry_clear(&inquiry);
+}
+
+static void assert_refused(Inquiry *inquiry, const SimulationLimits *limits, const char *pointer,
+                           const char *says) {
+    problem_clear(&problem);
+    assert_int_equal(inquiry_complete(inquiry, limits, NULL, &problem), STATUS_INVALID);
+    if (!problem_concerns(&problem, pointer) || strstr(problem.faults[0].detail, says) == NULL)
+        fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
+    inquiry_clear(inquiry);
+}
+
+static void what_cannot_be_answered_is_refused(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(1, 20);
+    paper_free(&inquiry.simulation, 0.015);
+    assert_refused(&inquiry, NULL, "/study/kind", "must be random, is free");
+
+    inquiry = inquiry_make(1, 1);
+    assert_refused(&inquiry, NULL, "/study/runs", "must be within [2, 10000]");
+
+    inquiry = inquiry_make(1, 20);
+    study_of(&inquiry)->target = 0;
+    assert_refused(&inquiry, NULL, "/study/target", "must be above 0");
+
+    inquiry = inquiry_make(1, 20);
+    study_of(&inquiry)->first_seed = (UINT64_C(1) << 53) - 19;
+    assert_refused(&inquiry, NULL, "/study/first_seed", "must be at most 9007199254740972");
+
+    inquiry = inquiry_make(1, 20);
+    study_of(&inquiry)->target = 0.1;
+    study_of(&inquiry)->metric = ENSEMBLE_PEAK_CONTACT_FORCE;
+    paper_model(&inquiry.simulation, "impulse");
+    assert_refused(&inquiry, NULL, "/study/metric", "impulses have none");
+
+    inquiry = inquiry_make(600, 20);
+    inquiry.simulation.output.psd.segment = 600000;
+    assert_refused(&inquiry, NULL, "/output/psd/segment", "takes at most 262144");
+
+    inquiry = inquiry_make(1, 2000);
+    const SimulationLimits limits = {.steps = 1e5};
+    assert_refused(&inquiry, &limits, "/study", "at most 0.03 s are allowed: ask for fewer runs");
+}
+
+static void a_metric_without_a_target_is_left_out(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make(1, 20);
+    study_of(&inquiry)->metric = ENSEMBLE_PSD;
+    complete(&inquiry);
+    assert_int_equal(study_of(&inquiry)->metric, CHOICE_ABSENT);
+    study_of(&inquiry)->target = 0.1;
+    complete(&inquiry);
+    assert_int_equal(study_of(&inquiry)->metric, ENSEMBLE_RMS_DISPLACEMENT);
+    inquiry_clear(&inquiry);
+}
+
+int main(void) {
+    fourier_start();
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_row_is_the_scene_with_its_seed),
+        cmocka_unit_test(a_target_ends_it_and_looser_ones_end_it_sooner),
+        cmocka_unit_test(all_are_made_where_none_differs),
+        cmocka_unit_test(a_seed_that_fails_is_a_row_with_its_reason),
+        cmocka_unit_test(where_all_fail_the_study_says_so_and_nothing_else),
+        cmocka_unit_test(what_is_not_known_is_not_told),
+        cmocka_unit_test(it_tells_its_progress_and_can_be_stopped_wherever_it_is),
+        cmocka_unit_test(the_same_study_has_the_same_bytes_in_any_workspace),
+        cmocka_unit_test(what_cannot_be_answered_is_refused),
+        cmocka_unit_test(a_metric_without_a_target_is_left_out),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
