@@ -148,26 +148,32 @@ typedef struct Pair {
     Plan plan; // a copy: what it points to is the run's
     Run near_run;
     Response near_response;
-    size_t stride;         // samples of the run in one interval of the neighbour
-    double longer;         // the neighbour's step over the run's
-    bool is_kinked;        // the base has kinks within steps
-    bool is_known;         // the neighbour has not failed
-    bool is_spent;         // nothing more to learn
-    size_t compared;       // samples
-    double largest, worst; // displacement, and difference of displacements [m]
-    double horizon;        // [s]; NAN: not reached
-    double *apart;         // of the modes
+    size_t stride;                 // samples of the run in one interval of the neighbour
+    double longer;                 // the neighbour's step over the run's
+    bool is_kinked;                // the base has kinks within steps
+    bool is_known;                 // the neighbour has not failed
+    bool is_spent;                 // nothing more to learn
+    size_t compared;               // samples
+    double largest, worst;         // displacement, and difference of displacements [m]
+    double horizon;                // [s]; NAN: not reached
+    double touched_at;             // no contact has begun before [s]; NAN: none has
+    double slowest[SCENE_DAMPERS]; // that a contact began with, as seen at samples [m/s]; 0: none
+    double *apart;                 // of the modes
 } Pair;
 
 // How much of the difference is the run's error.
-static double part_of(const Pair *pair) {
-    const Ledger *ledger = &pair->run.frame.ledger;
-    bool is_touched = ledger->response->impact_count + ledger->response->resting_count > 0;
+static bool is_touched(const Pair *pair) {
+    const Response *response = pair->run.frame.ledger.response;
+    bool is_touched = response->impact_count + response->resting_count > 0;
     for (size_t d = 0; d < pair->run.frame.dampers; d++)
         is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
+    return is_touched;
+}
+
+static double part_of(const Pair *pair) {
     if (pair->run.tolerance > 0)
         return 2;
-    if (is_touched)
+    if (is_touched(pair))
         return CHANCE;
     // Where a step has a kink of the base inside, its error is as that lies.
     return pair->is_kinked ? 1 : 1 / fabs(pow(pair->longer, pair->run.stepper->order) - 1);
@@ -232,7 +238,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     const Base *base = frame->run->base;
     pair->is_kinked = base->form == BASE_PIECES ||
                       (base->form == BASE_SAMPLED && kinks == 1 && frame->base.ratio == 0);
-    pair->horizon = NAN;
+    pair->horizon = pair->touched_at = NAN;
     set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
     pair->near_run = (Run){.plan = &pair->plan,
                            .base = frame->run->base,
@@ -249,6 +255,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
         // Longer steps are unstable where the run's are not: shorter ones then.
         steps_clear(&pair->near);
         response_clear(&pair->near_response);
+        pair->near_response.is_unlisted = true;
         set_pace(pair, 1, 2 * pair->run.share);
         status = steps_make(&pair->near, stepper, &pair->near_run, 2 * pair->run.share, finer, true,
                             &pair->near_response, NULL);
@@ -259,60 +266,36 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
 
 // What one contact a step late moves a storey by, within the time that its speed turns in [m]: both
 // runs may be as late by chance.
-static double jolt_of(const Pair *pair, const Impact *impact) {
+static double jolt_of(const Pair *pair, const FrameDamper *damper, double impulse) {
     const Frame *frame = &pair->run.frame;
-    const double h = pair->run.length;
-    double slowest = INFINITY, impulse = fabs(impact->impulse);
-    if (pair->run.tolerance > 0)
-        return 0;
+    const Peaks *peaks = &frame->ledger.response->peaks;
+    const double h = pair->run.length, speed = pair->slowest[damper - frame->damper];
+    double slowest = INFINITY, late = h / 2;
     for (size_t i = 0; i < frame->mode_count; i++)
         slowest = fmin(slowest, sqrt(frame->omega2[i]));
+    // Peaks may be those of the end of the run alone.
+    const bool is_whole = !(frame->run->statistics_from > 0);
+    const double velocity = is_whole ? peaks->velocity : pair->largest * frame->rate;
     // Of a long contact no more than acts while that lasts.
-    if (impact->peak_force < impulse * slowest)
-        impulse = impact->peak_force / slowest;
-    double late = h / 2;
+    if (is_whole && frame->plan->form != CONTACT_IMPULSIVE &&
+        peaks->contact_force < impulse * slowest)
+        impulse = peaks->contact_force / slowest;
     // A power law's factors are the speed's, which changes while the mass is not yet seen.
-    if (frame->plan->form == CONTACT_POWER && impact->approach_speed > 0) {
-        const double changed = frame->ledger.response->peaks.velocity * frame->rate * h;
-        late = fmax(late, fmin(changed / impact->approach_speed, 1) *
+    if (frame->plan->form == CONTACT_POWER && speed > 0)
+        late = fmax(late, fmin(velocity * frame->rate * h / speed, 1) *
                               fmin(1 / slowest, frame->plan->duration));
-    }
-    return impulse * frame->damper[impact->damper - 1].thrust * late;
+    return impulse * damper->thrust * late;
 }
 
 static double largest_jolt(const Pair *pair) {
     const Frame *frame = &pair->run.frame;
-    const Impacts *impacts = &frame->ledger.response->impacts;
     double most = 0;
-    // Where no rows are kept, the largest impulse is.
-    for (size_t d = 0; d < frame->dampers && frame->ledger.response->is_unlisted; d++) {
-        const Impact largest = {
-            .damper = d + 1, .impulse = frame->ledger.impulse[d], .peak_force = (double)NAN};
-        most = fmax(most, jolt_of(pair, &largest));
+    for (size_t d = 0; d < frame->dampers && !(pair->run.tolerance > 0); d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double open = damper->row.is_open ? fabs(damper->row.impact.impulse) : 0;
+        most = fmax(most, jolt_of(pair, damper, fmax(frame->ledger.impulse[d], open)));
     }
-    for (size_t i = 0; i < impacts->count; i++)
-        most = fmax(most, jolt_of(pair, &impacts->at[i]));
-    for (size_t d = 0; d < frame->dampers; d++)
-        if (frame->damper[d].row.is_open)
-            most = fmax(most, jolt_of(pair, &frame->damper[d].row.impact));
     return most;
-}
-
-// When the first contact began that may have moved a storey by more than `most` [s]; INFINITY:
-// none.
-static double first_jolt(const Pair *pair, double most) {
-    const Frame *frame = &pair->run.frame;
-    const Impacts *impacts = &frame->ledger.response->impacts;
-    double first = frame->ledger.response->is_unlisted ? 0 : INFINITY;
-    for (size_t i = 0; i < impacts->count; i++)
-        if (jolt_of(pair, &impacts->at[i]) > most)
-            first = fmin(first, impacts->at[i].start);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const LedgerRow *row = &frame->damper[d].row;
-        if (row->is_open && jolt_of(pair, &row->impact) > most)
-            first = fmin(first, row->impact.start);
-    }
-    return first;
 }
 
 // What a storey moves by at most that the steps did not see of the base [m].
@@ -336,10 +319,9 @@ static void tell(const Pair *pair, Response *response) {
     response->has_trust = pair->is_known && pair->compared > 0;
     response->is_stepped = true;
     response->error_estimate = fmin(fmax(error, balance / 2), 1);
-    const double jolted = first_jolt(pair, RESPONSE_PARTING * size);
     response->trust_horizon = pair->horizon;
-    if (isfinite(jolted))
-        response->trust_horizon = fmin(response->trust_horizon, jolted);
+    if (largest_jolt(pair) > RESPONSE_PARTING * size)
+        response->trust_horizon = fmin(response->trust_horizon, pair->touched_at);
     if (unseen > RESPONSE_PARTING * size)
         response->trust_horizon = fmin(response->trust_horizon, pair->run.unseen_since);
     // It was found before the displacement had grown.
@@ -352,7 +334,15 @@ static Status solve(Pair *pair, Response *response) {
     const Plan *plan = frame->plan;
     steps_take_sample(&pair->run);
     while (frame->sample + 1 < plan->count) {
+        const double before = frame_time(frame);
         TRY(steps_interval(&pair->run));
+        if (isnan(pair->touched_at) && is_touched(pair))
+            pair->touched_at = before;
+        for (size_t d = 0; d < frame->dampers; d++) {
+            const double speed = frame->damper[d].contact.speed;
+            if (speed > 0 && !(pair->slowest[d] > 0 && pair->slowest[d] <= speed))
+                pair->slowest[d] = speed;
+        }
         TRY(follow(pair));
     }
     tell(pair, response);

@@ -326,7 +326,7 @@ def test_progress_and_cancel():
 
 def test_faults_of_a_study_are_told_with_the_scenes():
     """422 with the pointer; what is too long in all is refused before anything runs."""
-    with program.daemon("--max-steps", "100000") as daemon:
+    with program.daemon("--max-cpu-seconds", "0.003") as daemon:
         for members, pointer, expected in [
                 ({"kind": "ensembel"}, "/study/kind", "must be one of tradeoff, ensemble"),
                 ({"runs": 0}, "/study/runs", "must be within [2, 10000]"),
