@@ -141,15 +141,30 @@ static void aim_clear(Aim *aim) {
     free(aim->modes_error);
 }
 
+// The largest displacement of the run over that which its numbers are of: an error made before
+// statistics_from is beside a motion that may have died away since.
+static double faded(const Outcome *outcome) {
+    const double largest = outcome->summary.peak_displacement;
+    return fmax(outcome->response.earlier, largest) / largest;
+}
+
+// Of the rms the error is surely no more than the largest difference over the rms; as the
+// difference is that large for a part of the run only, it was less than a twelfth of that in every
+// scene tried. A late part of the run may be off by as much all the time.
+static double rms_gain(const Outcome *outcome) {
+    const Summary *summary = &outcome->summary;
+    const double shape = summary->peak_displacement / summary->rms_displacement;
+    return outcome->response.earlier > 0 ? faded(outcome) * shape : 0.2 * shape;
+}
+
 // What a relative error of displacement comes to in the metric.
-static double metric_error(const Aim *aim, double displacement, const Summary *summary) {
+static double metric_error(const Aim *aim, double displacement, const Outcome *outcome) {
     double gain = gains[aim->asked->metric];
-    // Of the rms it is surely no more than the largest difference over the rms; as the difference
-    // is that large for a part of the run only, it was less than a twelfth of that in every scene
-    // tried.
-    if (aim->asked->metric == METRIC_RMS_DISPLACEMENT && summary != NULL)
-        gain = 0.2 * summary->peak_displacement / summary->rms_displacement;
-    return fmin(gain * displacement, 1);
+    if (aim->asked->metric == METRIC_RMS_DISPLACEMENT && outcome != NULL)
+        gain = rms_gain(outcome);
+    if (aim->asked->metric == METRIC_PEAK_FORCE && outcome != NULL)
+        gain *= faded(outcome);
+    return displacement > 0 ? fmin(gain * displacement, 1) : 0;
 }
 
 // Of the displacement, by contacts that are wrong by so much each.
@@ -362,8 +377,11 @@ static double estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
         aim->asked->metric == METRIC_DISPLACEMENT || aim->asked->metric == METRIC_MEAN_ACCELERATION;
     if (isnan(own) || (own >= 1 && !is_path))
         return (double)NAN;
-    return fmin(
-        metric_error(aim, own, &outcome->summary) + modes_error(aim, way) / modes_share(aim), 1);
+    double left_out = modes_error(aim, way) / modes_share(aim);
+    const int metric = aim->asked->metric;
+    if ((metric == METRIC_RMS_DISPLACEMENT || metric == METRIC_PEAK_FORCE) && left_out > 0)
+        left_out *= faded(outcome);
+    return fmin(metric_error(aim, own, outcome) + left_out, 1);
 }
 
 // Runs one way. A cheap one that fails leaves no outcome; `estimated` is 1 then.
