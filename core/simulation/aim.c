@@ -117,8 +117,13 @@ static Status foretell_modes(Aim *aim, Problem *problem) {
     Status status = errors == NULL || aim->modes_error == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
                         : truncation_predict(aim->plan, scene, errors);
+    // A part of the run has not the time in which errors that swing otherwise even out.
+    const bool is_part = aim->simulation->output.statistics_from > 0;
+    const int metric = aim->asked->metric == METRIC_RMS_DISPLACEMENT && is_part
+                           ? METRIC_DISPLACEMENT
+                           : aim->asked->metric;
     for (size_t k = 0; k < n && status == STATUS_OK; k++)
-        aim->modes_error[k] = truncation_error(&errors[k], aim->asked->metric);
+        aim->modes_error[k] = truncation_error(&errors[k], metric);
     free(errors);
     return status;
 }
