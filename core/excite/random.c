@@ -236,6 +236,6 @@ const ExcitationKind excitation_random = {
              .size = sizeof(ExcitationRandom)},
     .complete = random_complete,
     .interval = random_interval,
-    .effort = 0.25,
+    .effort = 0.06,
     .make = random_make,
 };

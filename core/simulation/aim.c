@@ -367,7 +367,7 @@ static double estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
 static Status run_way(Session *session, const Way *way, double *estimated, Problem *problem) {
     Simulation view;
     const double left = 1 - session->done;
-    Stage stage = {session->watch, session->done, is_whole(way) ? left : left / 2};
+    Stage stage = stage_of(session->watch, session->done, is_whole(way) ? left : left / 2);
     const Watch watch = stage_watch(&stage);
     outcome_drop(session->outcome);
     session->outcome = NULL;

@@ -9,6 +9,10 @@ const Solver *choice_solver(const Simulation *simulation) {
     return solver->run != NULL ? solver : &solver_exact;
 }
 
+const Accuracy *choice_common(const Simulation *simulation) {
+    return (const Accuracy *)(const void *)simulation->accuracy;
+}
+
 // What the chosen solver is asked for; the settings of "auto" are not the chosen one's.
 const Accuracy *choice_settings(const Simulation *simulation) {
     const Variant *accuracy = simulation->accuracy;

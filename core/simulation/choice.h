@@ -7,6 +7,9 @@
 
 const Solver *choice_solver(const Simulation *simulation);
 
+// The rows that every solver has, "auto" too.
+const Accuracy *choice_common(const Simulation *simulation);
+
 // What the chosen solver is asked for; the settings of "auto" are not the chosen one's: NULL.
 const Accuracy *choice_settings(const Simulation *simulation);
 

@@ -23,21 +23,18 @@ static const double TRANSFORM = 8000; // the first time, because it is planned t
 static const double REACHING = 0.3;   // of fast flight, where no bound keeps it from the stops
 static const double FREE_CYCLES = 30; // after which free vibration does not reach the stops
 
+// Of a contact under a power law, what it takes whatever its tolerance; and the digits of the
+// whole.
+static const double EASY = 0.3, DIGITS = 15;
+
 static const double IMPACTS_KEPT = 1e5; // more are hardly meant
 
 // What the exact solver will meet.
 typedef struct Outlook {
-    double samples, arcs, impacts;
-    size_t modes;
-    double digits; // of a contact under a power law
+    size_t modes; // of a frame
+    double samples, arcs, impacts, digits;
     bool is_coupled;
 } Outlook;
-
-// How many modes a run keeps.
-static size_t modes_of(const Simulation *simulation) {
-    return accuracy_modes((const Accuracy *)(const void *)simulation->accuracy,
-                          structure_storeys(scene_structure(&simulation->scene)));
-}
 
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
 // shows that the stops are out of reach, and coupled modes have no closed form for a whole
@@ -94,10 +91,10 @@ static double frame_steps(const Scene *scene, const Outlook *outlook) {
     const double arc = frame_work_steps(FRAME_WORK_ARC, n, m, is_coupled);
     const double event = frame_work_steps(FRAME_WORK_EVENT, n, m, is_coupled);
     const double flight = frame_work_steps(FRAME_WORK_FLIGHT, n, m, is_coupled);
-    const double contact =
-        law->form == CONTACT_POWER
-            ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled) * (0.25 + 0.05 * outlook->digits)
-            : FRAME_ARCS * arc;
+    const double contact = law->form == CONTACT_POWER
+                               ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled) *
+                                     (EASY + (1 - EASY) * outlook->digits / DIGITS)
+                               : FRAME_ARCS * arc;
     return (m > 0 ? NEIGHBOUR : 1) * (outlook->samples * flight + outlook->arcs * arc +
                                       outlook->impacts * (contact + 2 * event + 2 * arc));
 }
@@ -122,7 +119,7 @@ static bool is_single(const Scene *scene) {
 static double exact_steps(const Simulation *simulation, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
-    const size_t modes = modes_of(simulation);
+    const size_t modes = accuracy_modes(choice_common(simulation), structure_storeys(structure));
     StructureRates rates;
     if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // a guess without memory: the run will tell
@@ -142,7 +139,9 @@ static double exact_steps(const Simulation *simulation, bool *is_fast) {
 // Steps of a solver that knows its own cost.
 static double own_steps(const Simulation *simulation) {
     Plan *plan;
-    if (plan_sketch(&simulation->scene, modes_of(simulation), &plan) != STATUS_OK)
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (plan_sketch(&simulation->scene, accuracy_modes(choice_common(simulation), storeys),
+                    &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
         choice_solver(simulation)

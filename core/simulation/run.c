@@ -20,18 +20,12 @@ typedef struct Held {
     atomic_size_t holds;
 } Held;
 
-// Every solver has these rows, "auto" too.
-static const Accuracy *common_settings(const Simulation *simulation) {
-    return (const Accuracy *)(const void *)simulation->accuracy;
-}
-
 static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
     const Solver *solver = choice_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
-    Status status =
-        plan_keep(*plan, &simulation->scene,
-                  accuracy_modes(common_settings(simulation), (*plan)->storeys), problem);
+    Status status = plan_keep(*plan, &simulation->scene,
+                              accuracy_modes(choice_common(simulation), (*plan)->storeys), problem);
     if (status == STATUS_OK && solver->decide != NULL)
         status = solver->decide(choice_settings(simulation), choice_base_interval(simulation),
                                 *plan, problem);
@@ -165,7 +159,7 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
         columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
-    Stage stage = {journey->watch, 0.9, 0.1};
+    Stage stage = stage_of(journey->watch, 0.9, 0.1);
     const Watch watch = stage_watch(&stage);
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
@@ -258,7 +252,7 @@ static Status travel(Journey *journey, Problem *problem) {
                        .most = journey->limits == NULL ? 0 : journey->limits->samples,
                        .transforms = stock(journey)};
     const Excitation *excitation = scene_excitation(scene);
-    Stage making = {journey->watch, 0, 0.2}, solving = {journey->watch, 0.2, 0.7};
+    Stage making = stage_of(journey->watch, 0, 0.2), solving = stage_of(journey->watch, 0.2, 0.7);
     const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
     TRY(excitation_kind(excitation)
             ->make(excitation, &span, &making_watch, &journey->base, problem));

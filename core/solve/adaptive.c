@@ -151,9 +151,9 @@ static Status advance(Adaptive *own, double length) {
     const double from = own->at;
     memcpy(own->before, own->y, own->size * sizeof *own->y);
     length = fmin(fmin(length, knot), steps->length);
+    frame->run->work.stop_searches += frame->has_stops;
     if (is_poised(own))
         length *= POISED;
-    frame->run->work.stop_searches += frame->has_stops;
     TRY(ode_step(own->ode, from + length, &to, own->y, &root, frame->problem));
     const double taken = root == ODE_NO_ROOT && to >= from + length ? length : to - from;
     own->at = to;

@@ -36,7 +36,8 @@ Status frame_run(Run *run, Response *response, Problem *problem) {
     if (neighbour == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
-    Status status = frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
+    Status status =
+        frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
         status = solve(&engine, neighbour);
     if (engine.record.block != NULL)

@@ -72,20 +72,13 @@ bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
     nudge(own);
     while (own->sample < frame->sample && neighbour->is_known)
         neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
-    frame->run->steps = neighbour->run.steps;
     frame->run->work.neighbour_samples += own->sample - from;
+    frame->run->steps = neighbour->run.steps;
     if (neighbour->is_known)
         compare(neighbour, frame, from);
     else
         neighbour->is_spent = true;
     return neighbour->is_known;
-}
-
-// The neighbour follows; progress is the run's.
-static bool ask(void *context, double fraction) {
-    const Frame *frame = context;
-    (void)fraction;
-    return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
 }
 
 void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
@@ -95,11 +88,9 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     neighbour->is_known = neighbour->is_spent = true;
     if (!frame->has_stops)
         return;
-    neighbour->watch = (Watch){&engine->frame, ask};
     neighbour->run = (Run){.plan = frame->plan,
                            .base = frame->run->base,
-                           .watch = &neighbour->watch,
-                           .impacts_most = frame->run->impacts_most,
+                           .watch = frame->run->watch,
                            .steps_most = frame->run->steps_most};
     neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;

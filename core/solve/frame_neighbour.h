@@ -12,7 +12,6 @@ enum { NEIGHBOUR_SAMPLES = TRAIL_MOST };
 typedef struct FrameNeighbour {
     FrameEngine engine;
     Run run;
-    Watch watch; // the run's, told the run's own progress
     Response response;
     bool is_spent;         // parted, or failed: nothing is left to follow
     bool is_known;         // never failed

@@ -53,8 +53,9 @@ void frame_ode_look(FrameOde *ode, size_t d) {
         series_law_make(&at->law, &at->terms);
         at->speed = 0;
     }
-    at->push = frame_sign(damper->side) * (damper->lean * frame->ground +
-                                           frame_dot(damper->shape, ode->elastic, frame->mode_count));
+    at->push =
+        frame_sign(damper->side) *
+        (damper->lean * frame->ground + frame_dot(damper->shape, ode->elastic, frame->mode_count));
     const double n = at->terms.exponent, p = frame_ode_penetration(damper);
     double speed = fmax(fabs(w), damper->row.impact.approach_speed);
     if (!(speed <= at->speed) || !(speed >= at->speed / 4) || !(at->speed > 0)) {

@@ -95,8 +95,8 @@ typedef struct Frame {
     double *yield; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
     double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]; as `yield`
                       // of the modes kept
-    double *hold;   // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
-    size_t resting; // how many are
+    double *hold;     // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
+    size_t resting;   // how many are
 
     double *q, *p;   // modal displacements and speeds
     double *elastic; // D p + W^2 q, as of the last frame_feel

@@ -147,7 +147,6 @@ typedef struct Pair {
     Steps run, near;
     Plan plan; // a copy: what it points to is the run's
     Run near_run;
-    Watch near_watch; // the run's, told the run's own progress
     Response near_response;
     size_t stride;                 // samples of the run in one interval of the neighbour
     double longer;                 // the neighbour's step over the run's
@@ -228,12 +227,6 @@ static void set_pace(Pair *pair, size_t stride, size_t share) {
     pair->plan.count = (plan->count - 1) / stride + 1;
 }
 
-static bool look(void *context, double fraction) {
-    const Frame *frame = context;
-    (void)fraction;
-    return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
-}
-
 static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double tolerance) {
     const Frame *frame = &pair->run.frame;
     // Of the pieces that the base's kinks make.
@@ -247,11 +240,9 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
                       (base->form == BASE_SAMPLED && kinks == 1 && frame->base.ratio == 0);
     pair->horizon = pair->touched_at = NAN;
     set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
-    pair->near_watch = (Watch){&pair->run.frame, look};
     pair->near_run = (Run){.plan = &pair->plan,
                            .base = frame->run->base,
-                           .watch = &pair->near_watch,
-                           .impacts_most = frame->run->impacts_most,
+                           .watch = frame->run->watch,
                            .steps_most = frame->run->steps_most,
                            .is_clear = frame->run->is_clear};
     pair->near_response.is_unlisted = true;
@@ -282,12 +273,16 @@ static double jolt_of(const Pair *pair, const FrameDamper *damper, double impuls
     double slowest = INFINITY, late = h / 2;
     for (size_t i = 0; i < frame->mode_count; i++)
         slowest = fmin(slowest, sqrt(frame->omega2[i]));
+    // Peaks may be those of the end of the run alone.
+    const bool is_whole = !(frame->run->statistics_from > 0);
+    const double velocity = is_whole ? peaks->velocity : pair->largest * frame->rate;
     // Of a long contact no more than acts while that lasts.
-    if (frame->plan->form != CONTACT_IMPULSIVE && peaks->contact_force < impulse * slowest)
+    if (is_whole && frame->plan->form != CONTACT_IMPULSIVE &&
+        peaks->contact_force < impulse * slowest)
         impulse = peaks->contact_force / slowest;
     // A power law's factors are the speed's, which changes while the mass is not yet seen.
     if (frame->plan->form == CONTACT_POWER && speed > 0)
-        late = fmax(late, fmin(peaks->velocity * frame->rate * h / speed, 1) *
+        late = fmax(late, fmin(velocity * frame->rate * h / speed, 1) *
                               fmin(1 / slowest, frame->plan->duration));
     return impulse * damper->thrust * late;
 }

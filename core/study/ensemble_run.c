@@ -82,7 +82,7 @@ static Status make_run(Session *session, Problem *problem) {
     EnsembleRun *run = &answer->table.at[index];
     // What was foretold may change; what was told may not fall.
     const double share = (1 - session->told) / fmax(session->expected - (double)index, 1);
-    Stage stage = {tools->watch, session->told, share};
+    Stage stage = stage_of(tools->watch, session->told, share);
     const Watch watch = stage_watch(&stage);
     Outcome *outcome = NULL;
     problem_clear(session->fault);

@@ -32,7 +32,8 @@ typedef struct Session {
 // Runs within the study's progress, of which it is `steps`.
 static Status run(Session *session, const Simulation *simulation, const SimulationLimits *limits,
                   double steps, Outcome **outcome, Problem *problem) {
-    Stage stage = {session->tools->watch, session->done / session->all, steps / session->all};
+    Stage stage =
+        stage_of(session->tools->watch, session->done / session->all, steps / session->all);
     const Watch watch = stage_watch(&stage);
     return simulation_run(simulation, limits, &watch, session->tools->workspace, outcome, problem);
 }

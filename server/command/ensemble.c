@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/study/ensemble.h"
+#include "server/command/scene_file.h"
 #include "server/command/study.h"
 
 typedef struct EnsembleSettings {
@@ -12,6 +13,7 @@ typedef struct EnsembleSettings {
     uint64_t runs, first_seed;
     double target;
     int metric;
+    double max_cpu_seconds;
 } EnsembleSettings;
 
 // Ranges and defaults are the study's own.
@@ -28,6 +30,7 @@ static const Field ensemble_fields[] = {
     FIELD_CHOICE(EnsembleSettings, metric, ensemble_metric_names, OPTIONAL,
                  "peak_displacement, rms_displacement (usual), peak_acceleration, "
                  "rms_acceleration, impacts, peak_contact_force or psd"),
+    SCENE_FILE_CPU_ROW(EnsembleSettings),
     FIELD_END,
 };
 
@@ -117,7 +120,8 @@ static const StudyCommand study = {"ensemble", &study_ensemble, study_choose, en
 
 static int ensemble(void *of, const Options *options, Problem *problem) {
     EnsembleSettings *settings = of;
-    return study_command_run(&study, &settings->output, settings, options, problem);
+    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+                             options, problem);
 }
 
 static int ensemble_run(int argc, char *const *argv) {

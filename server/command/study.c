@@ -61,15 +61,14 @@ static double thread_cpu(void *context) {
 }
 
 static Status study_make(const StudyCommand *command, const Inquiry *inquiry, const Texts *outputs,
-                         Problem *problem) {
-    const SimulationLimits limits = scene_file_limits(SIMULATION_CPU_SECONDS);
+                         const SimulationLimits *limits, Problem *problem) {
     Bar bar;
     Workspace workspace = {0};
     Variant *answer = NULL;
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
     const StudyTools tools = {
-        .limits = &limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
+        .limits = limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
     Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &answer, problem);
     bar_stop(&bar);
     workspace_clear(&workspace);
@@ -97,8 +96,9 @@ static Status study_choose(const StudyCommand *command, Inquiry *inquiry, void *
 }
 
 static Status scene_study(const StudyCommand *command, const char *path, const Bytes *text,
-                          const Texts *outputs, void *settings, Problem *problem) {
-    const SimulationLimits limits = scene_file_limits(SIMULATION_CPU_SECONDS);
+                          const Texts *outputs, double cpu_seconds, void *settings,
+                          Problem *problem) {
+    const SimulationLimits limits = scene_file_limits(cpu_seconds);
     Store *store = NULL;
     Inquiry inquiry = {0};
     Warnings warnings = {0};
@@ -118,14 +118,14 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
         output_drop();
     }
     if (status == STATUS_OK)
-        status = study_make(command, &inquiry, outputs, problem);
+        status = study_make(command, &inquiry, outputs, &limits, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }
 
-int study_command_run(const StudyCommand *command, const Texts *outputs, void *settings,
-                      const Options *options, Problem *problem) {
+int study_command_run(const StudyCommand *command, const Texts *outputs, double cpu_seconds,
+                      void *settings, const Options *options, Problem *problem) {
     Status status = check_outputs(command, outputs, problem);
     if (status == STATUS_OK && options->operand_count != 1)
         status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
@@ -137,7 +137,7 @@ int study_command_run(const StudyCommand *command, const Texts *outputs, void *s
     output_guard();
     status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
-        status = scene_study(command, path, &text, outputs, settings, problem);
+        status = scene_study(command, path, &text, outputs, cpu_seconds, settings, problem);
     bytes_clear(&text);
     if (status != STATUS_OK)
         scene_file_refuse(path, problem);

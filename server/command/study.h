@@ -17,10 +17,10 @@ typedef struct StudyCommand {
     void (*print)(const Variant *answer); // on standard output, for people
 } StudyCommand;
 
-// Does the whole for the one scene among the operands, with a file for each of `outputs`. Returns
-// the exit code.
-int study_command_run(const StudyCommand *command, const Texts *outputs, void *settings,
-                      const Options *options, Problem *problem);
+// Does the whole for the one scene among the operands, with a file for each of `outputs`, within
+// the CPU seconds that a scene may take. Returns the exit code.
+int study_command_run(const StudyCommand *command, const Texts *outputs, double cpu_seconds,
+                      void *settings, const Options *options, Problem *problem);
 
 // A number for a table's cell, "-" where it is not known.
 const char *study_number(char text[24], const char *format, double value);

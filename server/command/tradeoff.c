@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/study/tradeoff.h"
+#include "server/command/scene_file.h"
 #include "server/command/study.h"
 
 typedef struct TradeoffSettings {
@@ -14,6 +15,7 @@ typedef struct TradeoffSettings {
     uint64_t repeats;
     Texts solver;
     double point_steps;
+    double max_cpu_seconds;
 } TradeoffSettings;
 
 enum { SOLVERS = 32 };
@@ -32,6 +34,7 @@ static const Field tradeoff_fields[] = {
                 "try this solver only; may be given again"),
     FIELD_REAL(TradeoffSettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be foretold to take (5e7)"),
+    SCENE_FILE_CPU_ROW(TradeoffSettings),
     FIELD_END,
 };
 
@@ -110,7 +113,8 @@ static const StudyCommand study = {"tradeoff", &study_tradeoff, study_choose, ta
 
 static int tradeoff(void *of, const Options *options, Problem *problem) {
     TradeoffSettings *settings = of;
-    return study_command_run(&study, &settings->output, settings, options, problem);
+    return study_command_run(&study, &settings->output, settings->max_cpu_seconds, settings,
+                             options, problem);
 }
 
 static int tradeoff_run(int argc, char *const *argv) {
