@@ -177,7 +177,7 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
         if (add_attempt(session, way, *estimated, session->outcome->steps) != STATUS_OK)
             status = problem_set(fault, STATUS_NO_MEMORY, "no memory for a run");
     } else if (!way_is_whole(way) && status != STATUS_CANCELLED && status != STATUS_NO_MEMORY) {
-        status = STATUS_OK;
+        status = add_attempt(session, way, (double)NAN, (double)NAN);
     }
     if (fault != problem) {
         if (status != STATUS_OK)
