@@ -49,7 +49,9 @@ bool blows_start(Blows *blows, const Plan *plan, size_t damper, const Level *lev
     blows->reach = sqrt(reach);
     blows->speed = sqrt(speed) + fabs(of->velocity);
     const double room = of->clearance / 2 - fabs(of->position);
-    if (wave->rms == 0 && 2 * blows->reach + fabs(of->velocity) * plan->duration < room)
+    // Its speed is relative to the storey's, which the mass keeps.
+    const double drift = fabs(plan->velocity[of->storey] + of->velocity) * plan->duration;
+    if (wave->rms == 0 && 2 * blows->reach + drift < room)
         return false;
     blows->carried = wave->rms == 0 ? CARRIED_FREE : CARRIED;
     blows->yield = 1 / of->effective_mass;

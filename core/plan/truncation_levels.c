@@ -156,7 +156,11 @@ static void random_level(Level *level, Wave *wave, const Mode *mode, const Excit
     // A short run has an rms of its own.
     const double chance = 0.7 / sqrt(draws);
     const double rms = (1 + chance) * sqrt(mean + (is_beyond ? 0 : square(behind)));
-    level->sure = fmin(level->sure, (1 - chance) / (1 + chance));
+    // What a mode that the band does not reach takes at the base's start alone may be much less.
+    const bool is_reached = f > f0 - width && !is_beyond;
+    const double lasts =
+        is_reached || is_beyond ? 1 : behind / fmax(hypot(behind, sqrt(mean)), 1e-300);
+    level->sure = fmin(level->sure, lasts * (1 - chance) / (1 + chance));
     wave->rms = 1 / wave_most;
     wave->least = sqrt(-2 * log1p(-pow(RARE, 1 / cycles))) / wave_most;
     wave->accelerated = sqrt(fourth);
@@ -166,7 +170,8 @@ static void random_level(Level *level, Wave *wave, const Mode *mode, const Excit
     level->rms = hypot(level->rms, rms);
     level->accelerated =
         hypot(level->accelerated, square(omega) * mean_of(omega, mode->interval) * rms);
-    level->least = fmax(level->least, hypot(least * sqrt(last), wave->least * wave_most * behind));
+    level->least = fmax(
+        level->least, hypot(is_reached ? least * sqrt(last) : 0, wave->least * wave_most * behind));
 }
 
 static void chirp(Level *level, Wave *wave, const Mode *mode, const ExcitationChirp *base) {

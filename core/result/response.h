@@ -72,6 +72,7 @@ typedef struct Response {
     Approaches *approaches; // made beforehand, or NULL: of damper d at 2 d + side
     Energy energy;
     Peaks peaks;
+    double earlier; // largest displacement before statistics_from [m]
     // Over samples from statistics_from on; of several storeys the largest.
     double sum_squares_displacement, sum_squares_acceleration;
     size_t statistics_count;

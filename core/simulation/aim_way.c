@@ -104,8 +104,13 @@ static Status foretell_modes(Aim *aim, Problem *problem) {
     Status status = errors == NULL || aim->modes_error == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the modes")
                         : truncation_predict(aim->plan, scene, errors);
+    // A part of the run has not the time in which errors that swing otherwise even out.
+    const bool is_part = aim->simulation->output.statistics_from > 0;
+    const int metric = aim->asked->metric == METRIC_RMS_DISPLACEMENT && is_part
+                           ? METRIC_DISPLACEMENT
+                           : aim->asked->metric;
     for (size_t k = 0; k < n && status == STATUS_OK; k++)
-        aim->modes_error[k] = truncation_error(&errors[k], aim->asked->metric);
+        aim->modes_error[k] = truncation_error(&errors[k], metric);
     free(errors);
     return status;
 }
@@ -129,15 +134,30 @@ void aim_clear(Aim *aim) {
     free(aim->modes_error);
 }
 
+// The largest displacement of the run over that which its numbers are of: an error made before
+// statistics_from is beside a motion that may have died away since.
+static double faded(const Outcome *outcome) {
+    const double largest = outcome->summary.peak_displacement;
+    return fmax(outcome->response.earlier, largest) / largest;
+}
+
+// Of the rms the error is surely no more than the largest difference over the rms; as the
+// difference is that large for a part of the run only, it was less than a twelfth of that in every
+// scene tried. A late part of the run may be off by as much all the time.
+static double rms_gain(const Outcome *outcome) {
+    const Summary *summary = &outcome->summary;
+    const double shape = summary->peak_displacement / summary->rms_displacement;
+    return outcome->response.earlier > 0 ? faded(outcome) * shape : 0.2 * shape;
+}
+
 // What a relative error of displacement comes to in the metric.
-static double metric_error(const Aim *aim, double displacement, const Summary *summary) {
+static double metric_error(const Aim *aim, double displacement, const Outcome *outcome) {
     double gain = gains[aim->asked->metric];
-    // Of the rms it is surely no more than the largest difference over the rms; as the difference
-    // is that large for a part of the run only, it was less than a twelfth of that in every scene
-    // tried.
-    if (aim->asked->metric == METRIC_RMS_DISPLACEMENT && summary != NULL)
-        gain = 0.2 * summary->peak_displacement / summary->rms_displacement;
-    return fmin(gain * displacement, 1);
+    if (aim->asked->metric == METRIC_RMS_DISPLACEMENT && outcome != NULL)
+        gain = rms_gain(outcome);
+    if (aim->asked->metric == METRIC_PEAK_FORCE && outcome != NULL)
+        gain *= faded(outcome);
+    return displacement > 0 ? fmin(gain * displacement, 1) : 0;
 }
 
 // Of the displacement, by contacts that are wrong by so much each.
@@ -272,6 +292,9 @@ double aim_estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
     if (way->is_impulsive)
         error += strike_margin * aim->strike_error * (double)outcome->summary.impacts *
                  fmax(own / ROUNDINGS, aim->growth);
-    return fmin(
-        metric_error(aim, error, &outcome->summary) + modes_error(aim, way) / modes_share(aim), 1);
+    double left_out = modes_error(aim, way) / modes_share(aim);
+    const int metric = aim->asked->metric;
+    if ((metric == METRIC_RMS_DISPLACEMENT || metric == METRIC_PEAK_FORCE) && left_out > 0)
+        left_out *= faded(outcome);
+    return fmin(metric_error(aim, error, outcome) + left_out, 1);
 }

@@ -142,6 +142,8 @@ static Status advance(Adaptive *own, double length) {
     // Where a base ends at once the motion begins anew: the integrator still holds the rate before.
     if (fabs(frame->ground - before_jump) > JUMP * (fabs(frame->ground) + fabs(before_jump)))
         own->events = SIZE_MAX;
+    if (own->events == frame->events && adaptive_motion_has_outgrown(own))
+        own->events = SIZE_MAX;
     if (own->events != frame->events) {
         frame_feel(frame);
         if (find_beyond(frame, false, &event))

@@ -13,6 +13,7 @@
 #include <string.h>
 
 enum { TOTALS = 3 };
+static const double GROWN = 100;
 
 // Where the parts of y begin.
 static size_t at_r(const Frame *frame) {
@@ -108,15 +109,32 @@ static void watch(const void *context, double t, const double *y, double *value,
     }
 }
 
+static double push_of(const Adaptive *own) {
+    const double interval = own->steps->frame.interval;
+    return fabs(own->slice.value) + fabs(own->slice.slope) * interval;
+}
+
+bool adaptive_motion_has_outgrown(const Adaptive *own) {
+    const Frame *frame = &own->steps->frame;
+    return push_of(own) > GROWN * own->push || frame_size(frame) > GROWN * own->speed;
+}
+
 // What is large for each component; returns a first step.
 static double make_scale(Adaptive *own) {
     const Frame *frame = &own->steps->frame;
     const size_t n = frame->mode_count, m = frame->dampers;
     double *scale = own->scale, *r = scale + at_r(frame), *w = r + m;
     double *impulse = scale + at_impulse(frame), *totals = scale + at_totals(frame);
-    const double push = fabs(own->slice.value) + fabs(own->slice.slope) * frame->interval;
     double time = frame->interval, energy = 0;
-    own->speed = fmax(own->speed, fmax(frame_size(frame), frame->drive * push * frame->interval));
+    own->push = fmax(own->push, push_of(own));
+    own->speed =
+        fmax(own->speed, fmax(frame_size(frame), frame->drive * own->push * frame->interval));
+    // A structure at rest will have what its masses bring.
+    for (size_t d = 0; d < m; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double mobility = frame_dot(damper->shape, damper->shape, n);
+        own->speed = fmax(own->speed, damper->effective_mass * fabs(damper->w) * sqrt(mobility));
+    }
     for (size_t i = 0; i < n; i++) {
         scale[n + i] = own->speed;
         scale[i] = own->speed / fmax(sqrt(frame->omega2[i]), 1 / frame->plan->duration);
@@ -146,7 +164,7 @@ static double make_scale(Adaptive *own) {
         energy += mass * speed * speed;
     }
     totals[0] = totals[1] = energy + own->speed * own->speed;
-    totals[2] = push * frame->interval;
+    totals[2] = own->push * frame->interval;
     return time / (8 * (double)own->steps->share);
 }
 

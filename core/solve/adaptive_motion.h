@@ -19,6 +19,7 @@ typedef struct Adaptive {
     double *rated;  // how often the motion's rate was asked for since it was last counted
     double *block;
     double speed;  // sqrt(p'p + q'W^2 q) at most, so far
+    double push;   // |a_g| over an interval at most, so far [m/s^2]
     Slice slice;   // of the base
     double at;     // the time at which it begins, and that of the state, since the start [s]
     size_t events; // of the frame as of the last step
@@ -30,6 +31,9 @@ void adaptive_motion_free(Adaptive *own);
 
 // From the frame's present state, anew.
 Status adaptive_motion_start(Adaptive *own);
+// Is the motion, or the base, far beyond what errors were measured by at the last start? A base
+// that has been still sets moving what was measured by nothing.
+bool adaptive_motion_has_outgrown(const Adaptive *own);
 // The frame's state becomes y, `length` seconds later; what was summed up goes where it belongs.
 void adaptive_motion_take(Adaptive *own, double length);
 

@@ -119,7 +119,9 @@ void ledger_count(const Ledger *ledger, Work *work) {
 }
 
 void ledger_forget_peaks(Ledger *ledger, const Moment *at) {
-    ledger->response->peaks = (Peaks){.contact_force = fabs(at->force)};
+    Response *response = ledger->response;
+    response->earlier = ledger_larger(response->earlier, response->peaks.displacement);
+    response->peaks = (Peaks){.contact_force = fabs(at->force)};
 }
 
 Status ledger_status(const Ledger *ledger, Problem *problem) {

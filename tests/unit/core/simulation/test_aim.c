@@ -127,6 +127,38 @@ static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
     }
 }
 
+// Of a motion that has died away what was wrong before is a larger part.
+static void late_statistics_are_beside_what_is_left_of_the_motion(void **state) {
+    (void)state;
+    Simulation simulation;
+    document_pass(&simulation, POWER ", \"accuracy\": {\"target\": 1e-2, \"metric\": "
+                                     "\"rms_displacement\"}");
+    simulation.scene.duration = 10;
+    simulation.output.statistics_from = 8;
+    Outcome *aimed, *whole;
+    assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &aimed, NULL), STATUS_OK);
+    ((AccuracyAuto *)(void *)simulation.accuracy)->target = (double)NAN;
+    ((AccuracyAuto *)(void *)simulation.accuracy)->metric = CHOICE_ABSENT;
+    assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &whole, NULL), STATUS_OK);
+    const double error =
+        fabs(aimed->summary.rms_displacement / whole->summary.rms_displacement - 1);
+    assert_int_equal(aimed->plan.target.verdict, VERDICT_KEPT);
+    assert_true(error <= aimed->plan.target.estimated_error);
+    outcome_drop(aimed);
+    outcome_drop(whole);
+    simulation_clear(&simulation);
+}
+
+static void what_does_not_move_has_no_error(void **state) {
+    (void)state;
+    Outcome *outcome = run("\"structure\": {\"mass\": 1, \"stiffness\": 9}, \"excitation\": "
+                           "{\"kind\": \"free\"}, \"accuracy\": {\"target\": 1e-3, "
+                           "\"metric\": \"rms_displacement\"}");
+    assert_int_equal(outcome->plan.target.verdict, VERDICT_KEPT);
+    assert_true(outcome->plan.target.estimated_error == 0);
+    outcome_drop(outcome);
+}
+
 static void what_no_double_can_keep_is_marked(void **state) {
     (void)state;
     Simulation simulation;
@@ -252,6 +284,8 @@ int main(void) {
         cmocka_unit_test(linear_contact_is_run_exactly_and_says_so),
         cmocka_unit_test(a_power_law_is_followed_no_closer_than_asked_for),
         cmocka_unit_test(contacts_are_impulses_where_that_keeps_the_target),
+        cmocka_unit_test(late_statistics_are_beside_what_is_left_of_the_motion),
+        cmocka_unit_test(what_does_not_move_has_no_error),
         cmocka_unit_test(what_no_double_can_keep_is_marked),
         cmocka_unit_test(a_dry_run_names_the_way),
         cmocka_unit_test(what_cannot_be_a_metric_is_refused),

@@ -164,6 +164,36 @@ static void a_mass_without_clearance_is_taken_along_from_the_start(void **state)
         "{\"solver\": \"adaptive\"}, \"duration\": 0.1, \"sample_rate\": 1000," END);
 }
 
+// Nothing moves until then: what errors are measured by has to grow.
+static void adaptive_steps_follow_a_base_that_begins_late(void **state) {
+    (void)state;
+    static const char *const kinds[] = {
+        "{\"kind\": \"half_sine\", \"amplitude\": 1, \"start\": 0.3, \"length\": 0.05}",
+        "{\"kind\": \"triangular\", \"amplitude\": 1, \"start\": 0.3, \"length\": 0.05, "
+        "\"displacement\": 1e-9}",
+        "{\"kind\": \"record\", \"samples\": [0, 0, 0, 0, 0, 0, 1, -1, 0, 0, 0], "
+        "\"interval\": 0.04}"};
+    for (size_t i = 0; i < COUNT(kinds); i++) {
+        char text[800];
+        snprintf(text, sizeof text,
+                 "{\"structure\": {\"mass\": 1, \"stiffness\": 900, \"damping\": 1}, "
+                 "\"dampers\": [], \"excitation\": %s, \"duration\": 0.5, \"sample_rate\": 100, "
+                 "\"accuracy\": {\"solver\": \"adaptive\"}," END,
+                 kinds[i]);
+        assert_states_its_error(text);
+    }
+}
+
+static void adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest(void **state) {
+    (void)state;
+    assert_states_its_error(
+        "{\"structure\": {\"mass\": 1, \"stiffness\": 900, \"damping\": 1}, \"dampers\": "
+        "[{\"mass\": 0.1, \"clearance\": 0.02, \"velocity\": 0.4, \"buffer\": {\"restitution\": "
+        "0.6, \"contact_time\": 0.01}}], \"contact\": {\"model\": \"flores\"}, \"excitation\": "
+        "{\"kind\": \"free\"}, \"duration\": 0.5, \"sample_rate\": 1000, "
+        "\"accuracy\": {\"solver\": \"adaptive\"}," END);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(steps_as_long_as_the_bases_lines_have_a_shorter_neighbour),
@@ -174,6 +204,8 @@ int main(void) {
         cmocka_unit_test(a_late_bounce_ends_trust),
         cmocka_unit_test(a_base_that_ends_at_once_is_no_error_of_adaptive_steps),
         cmocka_unit_test(a_neighbour_that_would_be_unstable_takes_shorter_steps),
+        cmocka_unit_test(adaptive_steps_follow_a_base_that_begins_late),
+        cmocka_unit_test(adaptive_steps_follow_what_a_mass_brings_to_a_structure_at_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
