@@ -60,8 +60,8 @@ typedef struct Warnings {
 typedef struct PlanAttempt {
     char *way;              // "exact, tolerance 1e-06"
     double predicted_error; // NAN before it was run
-    double estimated_error;
-    double steps; // counted
+    double estimated_error; // NAN: unknown, or it failed
+    double steps;           // counted; NAN: it failed
 } PlanAttempt;
 typedef struct PlanAttempts {
     PlanAttempt *at;

@@ -12,12 +12,12 @@ static const double TURN = 6.28318530717958647693;
 // In solver steps: a sample of the engine for one mass, an arc, and an impact, which is flight up
 // to it, contact and flight after it.
 static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
-static const double VALUE = 0.02;      // of a channel, at one sample
-static const double TRANSFORMED = 0.4; // of a spectrum, once
-static const double MODES = 2;         // of a storey cubed
-static const double RUN = 200;         // plan, room and summary
-static const double FRAME_ARCS = 14;   // of an impact in a frame
-static const double NEIGHBOUR = 1.6;   // of a frame with dampers, and its neighbour until they part
+static const double VALUE = 0.02;                   // of a channel, at one sample
+static const double TRANSFORMED = 0.4;              // of a spectrum, once
+static const double MODES = 2;                      // of a storey cubed
+static const double RUN = 200;                      // plan, room and summary
+static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // of an impact in a frame, of one by impulse
+static const double NEIGHBOUR = 1.6; // of a frame with dampers, and its neighbour until they part
 static const double IMPACTS_A_CYCLE = 2;
 static const double TRANSFORM = 8000; // the first time, because it is planned then
 static const double REACHING = 0.3;   // of fast flight, where no bound keeps it from the stops
@@ -94,7 +94,8 @@ static double frame_steps(const Scene *scene, const Outlook *outlook) {
     const double contact = law->form == CONTACT_POWER
                                ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled) *
                                      (EASY + (1 - EASY) * outlook->digits / DIGITS)
-                               : FRAME_ARCS * arc;
+                           : law->form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
+                                                            : FRAME_ARCS * arc;
     return (m > 0 ? NEIGHBOUR : 1) * (outlook->samples * flight + outlook->arcs * arc +
                                       outlook->impacts * (contact + 2 * event + 2 * arc));
 }

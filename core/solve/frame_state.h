@@ -121,6 +121,11 @@ static inline double frame_sign(Side side) {
     return side == SIDE_RIGHT ? 1 : -1;
 }
 
+// Columns of a matrix go in pairs.
+static inline size_t frame_even(size_t count) {
+    return count + count % 2;
+}
+
 // In a fixed order that processors can do two by two.
 static inline double frame_dot(const double *a, const double *b, size_t count) {
     double sum[4] = {0, 0, 0, 0};

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/simulation/impulses.h"
 #include "core/solve/solvers.h"
 
 enum {
@@ -241,36 +242,6 @@ static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
     return STATUS_OK;
 }
 
-// Buffers known by stiffness and damping alone have the restitution that these come to.
-static Status fill_restitution(Simulation *target, Problem *problem) {
-    PlanReport report;
-    TRY(simulation_plan(target, &report, problem));
-    for (size_t i = 0; i < target->scene.dampers.count; i++) {
-        Damper *damper = &target->scene.dampers.at[i];
-        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
-            Buffer *const own[] = {&damper->left_buffer, &damper->right_buffer};
-            Buffer *buffer = buffer_is_given(own[side]) ? own[side] : &damper->buffer;
-            if (buffer->table.count > 0 || !isnan(buffer->restitution))
-                continue;
-            buffer->restitution = report.derived.at[2 * i + (size_t)side].restitution;
-            buffer->stiffness = buffer->damping = (double)NAN;
-        }
-    }
-    fields_clear(plan_report_fields, &report);
-    return STATUS_OK;
-}
-
-static Status apply_contact(const TradeoffPoint *point, Simulation *target, Problem *problem) {
-    const Kind *kind = kind_find(&contact_kinds, point->contact_model);
-    TRY(fill_restitution(target, problem));
-    Variant *contact = variant_new(kind);
-    if (contact == NULL)
-        return STATUS_NO_MEMORY;
-    variant_free(target->scene.contact);
-    target->scene.contact = contact;
-    return STATUS_OK;
-}
-
 // A coarser spectrum keeps its share of overlap.
 static void apply_output(const TradeoffPoint *point, Simulation *target) {
     SpectrumRequest *psd = &target->output.psd;
@@ -301,7 +272,7 @@ Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
     if (status == STATUS_OK)
         status = apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
-        status = apply_contact(point, target, problem);
+        status = impulses_take(target, problem);
     if (status == STATUS_NO_MEMORY)
         return problem_set(problem, status, "no memory for a point of the study");
     TRY(status);

@@ -48,7 +48,9 @@ def test_good_examples_run():
         if study:
             continue  # a table, not a job
         job = json.loads(out)
-        most = 1e-9 if job["plan"]["solver"] == "exact" else 1e-3  # steps are wrong, and the balance says so
+        # Steps are wrong, and contacts that need not be right; the balance says so.
+        is_exact = job["plan"]["solver"] == "exact" and job["plan"]["target"] is None
+        most = 1e-9 if is_exact else 1e-3
         assert job["status"] == "successful" and job["summary"]["energy_residual"] < most, (name, job)
 
 

@@ -174,13 +174,17 @@ static void print_tally(void) {
         printf("%6zu judged by %s\n", tally.judged[j], extremes_judges[j]);
 }
 
+// Only a campaign judges times: the suite may run in a build, or beside others, that take longer.
+static bool is_timed;
+
 static void extremes_are_right_or_say_that_they_are_not(void **state) {
     (void)state;
     for (size_t next = 0; next < scenes;)
         next = supervise(next);
     print_tally();
     for (int v = EXTREME_FIRST_DEFECT; v < EXTREME_VERDICTS; v++)
-        assert_int_equal(tally.of[v], 0);
+        if (is_timed || (v != EXTREME_SLOW && v != EXTREME_DEAF))
+            assert_int_equal(tally.of[v], 0);
     assert_true(10 * tally.of[EXTREME_KEPT] > scenes);
 }
 
@@ -192,6 +196,7 @@ static int show(const char *of_seed, const char *number) {
 }
 
 int main(int count, char **arguments) {
+    is_timed = count > 1;
     if (count == 4 && strcmp(arguments[1], "show") == 0)
         return show(arguments[2], arguments[3]);
     if (count > 1)
