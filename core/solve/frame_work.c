@@ -6,7 +6,7 @@ double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool
     const double n = (double)storeys, m = (double)dampers, pairs = is_coupled ? n * n : 0;
     switch (kind) {
     case FRAME_WORK_FLIGHT:
-        return 1.2 + (0.05 + 0.0008 * n) * n * (1 + m) + 0.0014 * n * pairs;
+        return 1.2 + (0.05 + 0.0008 * n) * n * (1 + m) + (0.02 + 1.9e-6 * n * n) * pairs;
     case FRAME_WORK_HOLD:
         return 6 + 0.3 * n * (1 + m) + 0.1 * n * n;
     case FRAME_WORK_ARC:
@@ -14,7 +14,7 @@ double frame_work_steps(FrameWorkKind kind, size_t storeys, size_t dampers, bool
     case FRAME_WORK_EVENT:
         return 10 * (1 + m);
     case FRAME_WORK_POWER:
-        return (300 + 1000 * ceil(n / 8) + 20 * pairs) * fmax(m * sqrt(m), 1);
+        return 300 + 1000 * ceil(n / 8) + 20 * pairs + fmax(m - 1, 0) * (200 + 3 * n);
     }
     return 0;
 }
