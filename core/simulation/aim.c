@@ -220,9 +220,24 @@ static Status warn(const Session *session, double estimated) {
                         metric, estimated, aim->asked->target, until);
 }
 
+// Of steps, tolerances and modes that are too coarse the target's own warning speaks, for it chose
+// them.
+static void drop_advice(Warnings *warnings) {
+    size_t left = 0;
+    for (size_t i = 0; i < warnings->count; i++) {
+        const char *pointer = warnings->at[i].pointer;
+        if (strcmp(pointer, "/accuracy") == 0 || strcmp(pointer, "/accuracy/modes") == 0)
+            fields_clear(warning_fields, &warnings->at[i]);
+        else
+            warnings->at[left++] = warnings->at[i];
+    }
+    warnings->count = left;
+}
+
 static Status finish(Session *session, const Way *way, double estimated, Problem *problem) {
     Outcome *outcome = session->outcome;
     PlanTarget *target = &outcome->plan.target;
+    drop_advice(&outcome->warnings);
     TRY(tell_target(&session->aim, way, &outcome->plan, problem));
     target->estimated_error = estimated;
     target->verdict = isnan(estimated)                          ? VERDICT_UNKNOWN

@@ -38,6 +38,7 @@ static const double modes_margin = 0.7, dampers_margin = 0.4;
 // Of 150 random frames one in a hundred had more than the second of these in an impulse run.
 static const double strike_share = 5, strike_margin = 20;
 static const double strike_worth = 0.9; // impulses that take more of the whole save nothing
+static const double calm = 1e4; // roundings that a run with fewer modes and dampers may come to
 static const double modes_worth = 0.75; // keeping more than this part is not worth while
 
 static const AccuracyAuto *asked_of(const Simulation *simulation) {
@@ -293,6 +294,9 @@ double aim_estimate(const Aim *aim, const Way *way, const Outcome *outcome) {
         error += strike_margin * aim->strike_error * (double)outcome->summary.impacts *
                  fmax(own / ROUNDINGS, aim->growth);
     double left_out = modes_error(aim, way) / modes_share(aim);
+    // What impacts make of a rounding they make of a mode that is missing.
+    if (left_out > 0 && aim->plan->damper_count > 0 && own > calm * ROUNDINGS)
+        left_out = 1;
     const int metric = aim->asked->metric;
     if ((metric == METRIC_RMS_DISPLACEMENT || metric == METRIC_PEAK_FORCE) && left_out > 0)
         left_out *= faded(outcome);

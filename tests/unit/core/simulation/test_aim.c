@@ -74,6 +74,7 @@ static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
     Outcome *whole = run(POWER);
     assert_true(strstr(loose->plan.target.way, "tolerance") != NULL);
     assert_int_equal(loose->plan.target.verdict, VERDICT_KEPT);
+    assert_int_equal(loose->warnings.count, 0); // nothing to advise
     assert_int_equal(tight->plan.target.verdict, VERDICT_KEPT);
     assert_true(loose->steps < tight->steps && tight->steps < 1.5 * whole->steps);
     assert_true(find(&loose->plan, "target")->saving > 0);
