@@ -14,6 +14,7 @@
 #include "core/plan/truncation.h"
 #include "core/result/metric.h"
 #include "core/simulation/impulses.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
 
 static const double TURN = 6.28318530717958647693;
@@ -243,12 +244,6 @@ void way_name(const Way *way, char name[96]) {
         snprintf(name + used, 96 - (size_t)used, ", impulses");
 }
 
-static void *setting(Variant *accuracy, const char *name) {
-    size_t offset = 0;
-    const Field *row = fields_find(accuracy->kind->fields, name, &offset);
-    return row == NULL ? NULL : (char *)accuracy + offset + row->offset;
-}
-
 Status way_apply(const Simulation *simulation, const Way *way, Simulation *target,
                  Problem *problem) {
     Variant *accuracy = variant_new(&solver_exact.kind);
@@ -259,12 +254,9 @@ Status way_apply(const Simulation *simulation, const Way *way, Simulation *targe
     }
     variant_free(target->accuracy);
     target->accuracy = accuracy;
-    double *tolerance = setting(accuracy, "tolerance");
-    if (tolerance != NULL && !isnan(way->tolerance))
-        *tolerance = way->tolerance;
-    uint64_t *modes = setting(accuracy, "modes");
-    if (modes != NULL && way->modes != COUNT_ABSENT)
-        *modes = way->modes;
+    AccuracyExact *settings = (AccuracyExact *)(void *)accuracy;
+    settings->tolerance = way->tolerance;
+    settings->accuracy.modes = way->modes;
     if (!way->is_impulsive)
         return STATUS_OK;
     TRY(impulses_take(target, problem));
