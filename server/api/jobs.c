@@ -108,7 +108,9 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         TRY(body_require_json(request, problem));
         if (is_dry)
             return dry_run(app, request, reply, problem);
-        TRY(intake_submit(app->intake, request->body, request->body_size, &job, problem));
+        const Submission submission = {
+            .text = request->body, .size = request->body_size, .client = request->client};
+        TRY(intake_submit(app->intake, &submission, &job, problem));
     }
 
     const Prefer prefer = header_prefer(request->prefer);

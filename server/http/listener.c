@@ -67,10 +67,60 @@ static void add_header(struct MHD_Response *response, const char *name, const ch
         MHD_add_response_header(response, name, value);
 }
 
+// What a streamed body needs while it is sent.
+typedef struct Sending {
+    Exchange *exchange;
+    struct MHD_Connection *connection;
+    Stream stream;
+    void (*release)(void *context);
+    void *context;
+} Sending;
+
+static ssize_t send_next(void *context, uint64_t position, char *target, size_t size) {
+    (void)position;
+    Sending *sending = context;
+    for (;;) {
+        // Forgotten before looking: whoever wakes it from here on has it look again.
+        (void)seat_was_woken(sending->exchange->seat);
+        const ptrdiff_t count = sending->stream.next(sending->context, target, size);
+        if (count == STREAM_END)
+            return MHD_CONTENT_READER_END_OF_STREAM;
+        if (count != STREAM_WAIT)
+            return count;
+        if (hall_is_closing(sending->exchange->listener->hall))
+            return MHD_CONTENT_READER_END_OF_STREAM;
+        if (seat_sleep(sending->exchange->seat, sending->connection, sending->stream.wait_ms))
+            return 0;
+    }
+}
+
+static void sending_free(void *context) {
+    Sending *sending = context;
+    if (sending->release != NULL)
+        sending->release(sending->context);
+    free(sending);
+}
+
+static struct MHD_Response *stream_response(Exchange *exchange, struct MHD_Connection *connection,
+                                            const Reply *reply) {
+    enum { PIECE = 64 * 1024 };
+    Sending *sending = malloc(sizeof *sending);
+    if (sending == NULL)
+        return NULL;
+    *sending = (Sending){exchange, connection, reply->stream, reply->release, reply->context};
+    struct MHD_Response *response = MHD_create_response_from_callback(
+        reply->stream.size == UINT64_MAX ? MHD_SIZE_UNKNOWN : reply->stream.size, PIECE, send_next,
+        sending, sending_free);
+    if (response == NULL)
+        free(sending);
+    return response;
+}
+
 static enum MHD_Result send_reply(Exchange *exchange, struct MHD_Connection *connection,
                                   Reply *reply, bool closes) {
     struct MHD_Response *response =
-        reply->release != NULL
+        reply->stream.next != NULL ? stream_response(exchange, connection, reply)
+        : reply->release != NULL
             ? MHD_create_response_from_buffer_with_free_callback_cls(
                   reply->body_size, (void *)(uintptr_t)reply->body, reply->release, reply->context)
             : MHD_create_response_from_buffer(reply->body_size, (void *)(uintptr_t)reply->body,

@@ -103,10 +103,18 @@ void request_header(Request *request, const char *name, const char *value) {
     const struct {
         const char *name;
         const char **target;
-    } kept[] = {{"Host", &request->host},         {"Content-Type", &request->content_type},
-                {"Accept", &request->accept},     {"If-None-Match", &request->if_none_match},
-                {"If-Range", &request->if_range}, {"Range", &request->range},
-                {"Expect", &request->expect}};
+    } kept[] = {{"Host", &request->host},
+                {"Content-Type", &request->content_type},
+                {"Accept", &request->accept},
+                {"If-None-Match", &request->if_none_match},
+                {"If-Range", &request->if_range},
+                {"Range", &request->range},
+                {"Expect", &request->expect},
+                {"Authorization", &request->authorization},
+                {"Accept-Encoding", &request->accept_encoding},
+                {"If-Match", &request->if_match},
+                {"Idempotency-Key", &request->idempotency_key},
+                {"Last-Event-ID", &request->last_event_id}};
     for (size_t i = 0; i < COUNT(kept); i++)
         if (*kept[i].target == NULL && strcasecmp(name, kept[i].name) == 0)
             *kept[i].target = value;

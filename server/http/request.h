@@ -31,8 +31,10 @@ typedef struct Request {
     const char *host;  // as the client names us, else our address
     const char *content_type, *accept, *prefer, *if_none_match, *if_range,
         *range; // NULL if absent
-    const char *expect;
+    const char *expect, *authorization, *accept_encoding, *if_match, *idempotency_key,
+        *last_event_id;
     char prefers[128];  // all Prefer headers in one: `prefer` points here
+    const char *client; // the name of the token it came with; NULL: none was asked for
     char id[24];        // for the client and the journal
     int64_t started_ns; // monotonic
     bool is_woken;      // the handler asked to wait and is called again
@@ -61,11 +63,25 @@ bool request_decode(char *text, bool is_query);
 Status request_number(const Request *request, const char *name, double least, double most,
                       double initial, double *value, Problem *problem);
 
+// A body made piece by piece while it is sent, for what is too long to hold and for what is not
+// known yet. `next` writes up to `size` bytes and returns how many, STREAM_END behind the last, or
+// STREAM_WAIT to be called again when the request's waker (which the context may keep) is called or
+// after `wait_ms`. It is called from one thread at a time, must be quick, and knows no Request:
+// that is gone once the handler has returned. `release(context)` is called once, also if the client
+// leaves early.
+enum { STREAM_END = -1, STREAM_WAIT = -2 };
+typedef struct Stream {
+    ptrdiff_t (*next)(void *context, char *target, size_t size);
+    uint64_t size; // of the whole body; UINT64_MAX: not known
+    int wait_ms;
+} Stream;
+
 typedef struct Reply {
     int code; // HTTP status
     const char *content_type;
     const void *body;
     size_t body_size;
+    Stream stream;                  // `next` not NULL: in place of body
     void (*release)(void *context); // called once when the body was sent or given up; may be NULL
     void *context;
     char location[128]; // "" for none

@@ -32,10 +32,17 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **intake
 // start.
 void intake_close(Intake *intake);
 
+// What is asked, and by whom. Texts are the caller's.
+typedef struct Submission {
+    const char *text; // the scene's JSON, perhaps with a study
+    size_t size;
+    const char *client; // its token's name; NULL: nobody in particular
+} Submission;
+
 // Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
 // (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
 // STATUS_INVALID with the faults. The Job is a hold of the caller's.
-Status intake_submit(Intake *intake, const char *text, size_t size, Job **job, Problem *problem);
+Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {

@@ -178,7 +178,7 @@ static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *proble
     return status;
 }
 
-Status intake_submit(Intake *intake, const char *text, size_t size, Job **accepted,
+Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
                      Problem *problem) {
     *accepted = NULL;
     Job *job = job_new(intake);
@@ -187,8 +187,8 @@ Status intake_submit(Intake *intake, const char *text, size_t size, Job **accept
     job->submitted_ns = clock_monotonic_ns();
     Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
-    Status status = intake_prepare(intake->store, text, size, &intake->settings.limits, &inquiry,
-                                   &warnings, problem);
+    Status status = intake_prepare(intake->store, submission->text, submission->size,
+                                   &intake->settings.limits, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)

@@ -73,12 +73,17 @@ static void scene_text(char target[1024], double displacement, double duration,
              buffer, displacement, duration);
 }
 
+static Status submit_text(Intake *intake, const char *text, Job **job, Problem *told) {
+    const Submission submission = {.text = text, .size = strlen(text)};
+    return intake_submit(intake, &submission, job, told);
+}
+
 static Job *submit(Room *room, double displacement, double duration) {
     char text[1024];
     Job *job = NULL;
     scene_text(text, displacement, duration, "sponge");
     problem_clear(&problem);
-    if (intake_submit(room->intake, text, strlen(text), &job, &problem) != STATUS_OK)
+    if (submit_text(room->intake, text, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
@@ -209,7 +214,7 @@ static void a_full_queue_refuses(void **state) {
     char text[1024];
     scene_text(text, 0.01, 30000, "sponge");
     problem_clear(&problem);
-    assert_int_equal(intake_submit(room.intake, text, strlen(text), &more, &problem), STATUS_BUSY);
+    assert_int_equal(submit_text(room.intake, text, &more, &problem), STATUS_BUSY);
     assert_null(more);
     for (size_t i = 0; i < 3; i++)
         job_drop(jobs[i]);
@@ -319,7 +324,7 @@ static Job *submit_study(Room *room, int repeats) {
     Job *job = NULL;
     snprintf(text, sizeof text, studied, repeats);
     problem_clear(&problem);
-    if (intake_submit(room->intake, text, strlen(text), &job, &problem) != STATUS_OK)
+    if (submit_text(room->intake, text, &job, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return job;
 }
@@ -455,7 +460,7 @@ static void *hammer(void *context) {
         scene_text(text, 0.001 * (1 + rand_r(&own->seed) % 12), 5 + rand_r(&own->seed) % 3,
                    "aluminium");
         problem_clear(fault);
-        if (intake_submit(own->room->intake, text, strlen(text), &job, fault) != STATUS_OK)
+        if (submit_text(own->room->intake, text, &job, fault) != STATUS_OK)
             continue;
         JobShow now;
         if (job_show(job, &now) == STATUS_OK && rand_r(&own->seed) % 3 == 0)
@@ -614,7 +619,7 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
     for (; accepted < 10 && status == STATUS_OK; accepted++) {
         scene_text(text, 0.001 * accepted, 20000, "sponge");
         problem_clear(&problem);
-        status = intake_submit(room.intake, text, strlen(text), &second, &problem);
+        status = submit_text(room.intake, text, &second, &problem);
         if (status == STATUS_OK && accepted > 1)
             job_drop(second);
         else if (status == STATUS_OK)
@@ -628,7 +633,7 @@ static void waiting_scenes_have_a_limit_in_bytes(void **state) {
     assert_int_equal(intake_dismiss(room.intake, now.id, &gone, &problem), STATUS_OK);
     job_drop(gone);
     job_show_clear(&now);
-    assert_int_equal(intake_submit(room.intake, text, strlen(text), &second, &problem), STATUS_OK);
+    assert_int_equal(submit_text(room.intake, text, &second, &problem), STATUS_OK);
     job_drop(second);
     job_drop(first);
     room_end(&room);
