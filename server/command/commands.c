@@ -7,6 +7,7 @@
 #include "server/command/cancel.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
+#include "server/command/compare.h"
 #include "server/command/ensemble.h"
 #include "server/command/get.h"
 #include "server/command/import.h"
@@ -35,9 +36,13 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,  &command_run,     &command_check, &command_tradeoff, &command_ensemble,
-    &command_import, &command_submit,  &command_watch, &command_get,      &command_cancel,
-    &command_help,   &command_version, NULL,
+    &command_serve,    &command_run,
+    &command_check,    &command_tradeoff,
+    &command_ensemble, &command_import,
+    &command_submit,   &command_watch,
+    &command_get,      &command_cancel,
+    &command_compare,  &command_help,
+    &command_version,  NULL,
 };
 
 static const char overview[] =

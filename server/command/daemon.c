@@ -81,6 +81,36 @@ Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answe
     return job_told_read(answer, job, problem);
 }
 
+Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem) {
+    snprintf(result, 96, "%s", id);
+    if (strncmp(id, "j-", 2) != 0)
+        return STATUS_OK;
+    HttpAnswer answer = {0};
+    JobTold job = {0};
+    const double left = daemon_left(daemon);
+    Status status = daemon_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
+    while (status == STATUS_OK && !job_told_is_final(&job) && daemon_left(daemon) > 0) {
+        job_told_clear(&job);
+        http_answer_clear(&answer);
+        const double rest = daemon_left(daemon);
+        status = daemon_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
+    }
+    if (status == STATUS_OK && !job_told_is_final(&job))
+        status = problem_set(problem, STATUS_TIMEOUT,
+                             "is still %s; \"impactd watch %s\" follows it, --wait S waits",
+                             job.status, id);
+    else if (status == STATUS_OK && strcmp(job.status, "failed") == 0) {
+        problem_told_put(&job.problem, STATUS_INTERNAL, problem);
+        status = STATUS_INTERNAL;
+    } else if (status == STATUS_OK && (job.result == NULL || !daemon_is_id(job.result)))
+        status = problem_set(problem, STATUS_INTERNAL, "was %s and has no result", job.status);
+    if (status == STATUS_OK)
+        snprintf(result, 96, "%s", job.result);
+    job_told_clear(&job);
+    http_answer_clear(&answer);
+    return status;
+}
+
 // A bar, or a line whenever the state changes or ten more percent are done.
 typedef struct Show {
     Bar bar;

@@ -39,6 +39,10 @@ bool daemon_is_id(const char *text);
 Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobTold *job,
                   Problem *problem);
 
+// The result that `id` means: itself, or of a job that is finished, or is so before patience ends.
+// STATUS_TIMEOUT: it goes on.
+Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem);
+
 // Follows a job to its end: a bar on a terminal, else lines on `lines` (NULL: none). A daemon that
 // is started anew meanwhile is found again. STATUS_TIMEOUT when patience ends: the job goes on. The
 // last answer and what it tells stay with the caller, who clears both.

@@ -117,34 +117,6 @@ static void queries_put(Bytes *path, const GetSettings *settings) {
     }
 }
 
-// The result of a job that is finished, or is so in time.
-static Status result_of(Daemon *daemon, const char *id, char result[96], Problem *problem) {
-    HttpAnswer answer = {0};
-    JobTold job = {0};
-    const double left = daemon_left(daemon);
-    Status status = daemon_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
-    while (status == STATUS_OK && !job_told_is_final(&job) && daemon_left(daemon) > 0) {
-        job_told_clear(&job);
-        http_answer_clear(&answer);
-        const double rest = daemon_left(daemon);
-        status = daemon_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
-    }
-    if (status == STATUS_OK && !job_told_is_final(&job))
-        status = problem_set(problem, STATUS_TIMEOUT,
-                             "is still %s; \"impactd watch %s\" follows it, --wait S waits",
-                             job.status, id);
-    else if (status == STATUS_OK && strcmp(job.status, "failed") == 0) {
-        problem_told_put(&job.problem, STATUS_INTERNAL, problem);
-        status = STATUS_INTERNAL;
-    } else if (status == STATUS_OK && (job.result == NULL || !daemon_is_id(job.result)))
-        status = problem_set(problem, STATUS_INTERNAL, "was %s and has no result", job.status);
-    if (status == STATUS_OK)
-        snprintf(result, 96, "%s", job.result);
-    job_told_clear(&job);
-    http_answer_clear(&answer);
-    return status;
-}
-
 static Status file_take(void *context, const void *bytes, size_t size, Problem *problem) {
     (void)context;
     return output_write(bytes, size, problem);
@@ -160,10 +132,11 @@ static Status screen_take(void *context, const void *bytes, size_t size, Problem
 static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id, const char *what,
                     Problem *problem) {
     char result[96];
-    snprintf(result, sizeof result, "%s", id);
     const bool is_job = strcmp(what, "job") == 0;
-    if (strncmp(id, "j-", 2) == 0 && !is_job)
-        TRY(result_of(daemon, id, result, problem));
+    if (is_job)
+        snprintf(result, sizeof result, "%s", id);
+    else
+        TRY(daemon_result(daemon, id, result, problem));
     Bytes path = {.most = 16000};
     bytes_format(&path, "/v1/%s/%s", is_job ? "jobs" : "results", result);
     if (!is_job && strcmp(what, "result") != 0)
