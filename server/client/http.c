@@ -27,7 +27,7 @@ typedef struct Transfer {
     size_t headers; // [B] so far
     uint64_t taken; // [B] handed to ask->take
     uint64_t continue_from;
-    char etag[128]; // strong, "" for none
+    char etag[256]; // strong, "" for none
     char location[256];
     bool has_ranges, is_right_range;
 } Transfer;
@@ -37,8 +37,9 @@ static char *copy(const char *text) {
 }
 
 static bool host_is_loopback(const char *host) {
-    return strcasecmp(host, "localhost") == 0 || strncmp(host, "127.", 4) == 0 ||
-           strcmp(host, "[::1]") == 0;
+    const bool is_number = strspn(host, "0123456789.") == strlen(host);
+    return strcasecmp(host, "localhost") == 0 || strcmp(host, "[::1]") == 0 ||
+           (is_number && strncmp(host, "127.", 4) == 0);
 }
 
 static Status url_refuse(const char *url, const char *why, Problem *problem) {
@@ -166,8 +167,7 @@ static size_t header_take(char *line, size_t one, size_t count, void *of) {
                                                           : (int)seconds;
     } else if (header_is(line, size, "etag", value, sizeof value)) {
         if (transfer->continue_from == 0)
-            snprintf(transfer->etag, sizeof transfer->etag, "%s",
-                     value[0] == '"' && strlen(value) < sizeof transfer->etag ? value : "");
+            text_fit(transfer->etag, sizeof transfer->etag, value[0] == '"' ? value : "");
     } else if (header_is(line, size, "accept-ranges", value, sizeof value)) {
         transfer->has_ranges = strcasecmp(value, "bytes") == 0;
     } else if (header_is(line, size, "location", value, sizeof value)) {
