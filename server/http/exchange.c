@@ -47,6 +47,13 @@ static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const
     return MHD_YES;
 }
 
+static void write_id(char id[24], uint64_t number) {
+    memcpy(id, "q-", 2);
+    for (size_t i = 13; i >= 2; i--, number >>= 4)
+        id[i] = "0123456789abcdef"[number & 15];
+    id[14] = '\0';
+}
+
 // The head is complete: judge it, and refuse at once what cannot be read to its end.
 static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connection,
                              const char *method, const char *version) {
@@ -56,9 +63,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     exchange->connection = connection;
     request->method = method;
     request->path = request->target = exchange->target;
-    const uint64_t number = desk->first_id + atomic_fetch_add(&desk->requests, 1);
-    snprintf(request->id, sizeof request->id, "q-%012llx",
-             (unsigned long long)(number & 0xffffffffffff));
+    write_id(request->id, desk->first_id + atomic_fetch_add(&desk->requests, 1));
     request->started_ns = clock_monotonic_ns();
     request->waker = seat_waker(exchange->seat);
     request->body_most = desk->settings.body_most;
