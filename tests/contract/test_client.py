@@ -209,7 +209,7 @@ def test_wrong_words_are_usage():
                                  (("get", "r-1", "--token", "x"), "--token is no option"),
                                  (("submit", SPONGE, "--label", "x"), "KEY=VALUE"),
                                  (("submit", SPONGE, "--idempotency-key", "a\nb"), "printable"),
-                                 (("compare", "r-1"), "two results"), (("watch",), "job's id"),
+                                 (("compare", "r-1"), "ids of two results"), (("watch",), "job's id"),
                                  (("cancel", "a/b"), "job's id")):
             code, out, errors = client("http://127.0.0.1:1", *arguments)
             assert code == 2 and out == "" and words in errors and "secret" not in errors, (arguments, code, errors)
