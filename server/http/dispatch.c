@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "server/base/link.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
 
@@ -56,13 +57,14 @@ static Status set_parameters(Request *request, const RouteSpan *spans, size_t co
     return STATUS_OK;
 }
 
-static Status answer(const Dispatcher *dispatcher, Request *request, Reply *reply,
-                     Problem *problem) {
-    RouteSpan spans[REQUEST_PARAMETERS];
-    size_t count = 0;
-    char allow[64], near[ROUTE_SEGMENT_MOST], scratch[512];
+// The request's route, which its token may use.
+static Status find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans, size_t *count,
+                   Reply *reply, Problem *problem) {
+    char allow[64], near[ROUTE_SEGMENT_MOST];
+    request->path = link_inside(request->path);
     const Route *route =
-        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
+        route_find(dispatcher->table, request->method, request->path, spans, count, allow);
+    request->route = route;
     if (route == NULL && allow[0] != '\0') {
         snprintf(reply->allow, sizeof reply->allow, "%s", allow);
         return problem_set(problem, STATUS_METHOD, "%s is not for this path; it takes %s",
@@ -74,12 +76,28 @@ static Status answer(const Dispatcher *dispatcher, Request *request, Reply *repl
     if (route == NULL)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is nothing at this path; GET /openapi.json lists what there is");
-    TRY(check_queries(route, request, problem));
+    return doorman_admit(dispatcher->doorman, route->scope, request, problem);
+}
+
+static Status answer(const Dispatcher *dispatcher, Request *request, Reply *reply,
+                     Problem *problem) {
+    RouteSpan spans[REQUEST_PARAMETERS];
+    size_t count = 0;
+    char scratch[512];
+    TRY(find(dispatcher, request, spans, &count, reply, problem));
+    TRY(check_queries(request->route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
-    TRY(route->handle(dispatcher->app, request, reply, problem));
+    TRY(request->route->handle(dispatcher->app, request, reply, problem));
     if (reply->wait_ms > 0)
         return STATUS_OK;
     return reply_range(reply, request, problem);
+}
+
+static void refuse(const Request *request, Status status, Problem *problem, Reply *reply) {
+    if (problem->status == STATUS_OK)
+        problem_set(problem, status, "%s", status_title(status));
+    reply->wait_ms = 0;
+    body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
 }
 
 void dispatch(void *context, Request *request, Reply *reply) {
@@ -89,10 +107,30 @@ void dispatch(void *context, Request *request, Reply *reply) {
     problem_clear(&problem);
     const Status status = answer(dispatcher, request, reply, &problem);
     memset(request->parameters, 0, sizeof request->parameters);
-    if (status == STATUS_OK)
+    if (status != STATUS_OK)
+        refuse(request, status, &problem, reply);
+    if (reply->wait_ms > 0)
         return;
-    if (problem.status == STATUS_OK)
-        problem_set(&problem, status, "%s", status_title(status));
-    reply->wait_ms = 0;
-    body_problem(reply, &problem, reply->code == 416 ? 416 : 0, request->target);
+    link_apply(reply->location, sizeof reply->location);
+    link_apply(reply->link, sizeof reply->link);
+    doorman_note(dispatcher->doorman, request, reply);
+}
+
+bool dispatch_admits(void *context, Request *request, Reply *reply) {
+    const Dispatcher *dispatcher = context;
+    RouteSpan spans[REQUEST_PARAMETERS];
+    size_t count = 0;
+    Problem problem;
+    problem_clear(&problem);
+    const Status status = find(dispatcher, request, spans, &count, reply, &problem);
+    if (status == STATUS_OK)
+        return true;
+    refuse(request, status, &problem, reply);
+    doorman_note(dispatcher->doorman, request, reply);
+    return false;
+}
+
+void dispatch_note(void *context, const Request *request, const Reply *reply) {
+    const Dispatcher *dispatcher = context;
+    doorman_note(dispatcher->doorman, request, reply);
 }

@@ -4,14 +4,21 @@
 #ifndef SERVER_HTTP_DISPATCH_H
 #define SERVER_HTTP_DISPATCH_H
 
-#include "server/http/route.h"
+#include "server/http/doorman.h"
 
 typedef struct Dispatcher {
     App *app;
     const Route *table;
+    const Doorman *doorman; // NULL: whoever comes, nothing counted
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.
 void dispatch(void *context, Request *request, Reply *reply);
+
+// Judges a request by its head, before its body is taken: false where dispatch would refuse it for
+// its path or its token, with the refusal in `reply`.
+bool dispatch_admits(void *context, Request *request, Reply *reply);
+// Notes an answer that did not come from here: a refusal of the listener's.
+void dispatch_note(void *context, const Request *request, const Reply *reply);
 
 #endif

@@ -27,6 +27,7 @@
 #include "server/http/gate.h"
 #include "server/http/reply.h"
 #include "server/http/seat.h"
+#include "server/http/shield.h"
 
 enum {
     THREADS = 32,
@@ -145,13 +146,13 @@ static enum MHD_Result send_reply(Exchange *exchange, struct MHD_Connection *con
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     add_header(response, MHD_HTTP_HEADER_VARY, reply->varies_by_accept ? "Accept" : NULL);
     add_header(response, "X-Request-Id", exchange->request.id);
-    add_header(response, "X-Content-Type-Options", "nosniff");
-    add_header(response, "Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
+    add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
+    for (const ShieldHeader *header = shield_headers; header->name != NULL; header++)
+        add_header(response, header->name, header->value);
+    if (exchange->listener->settings.tls_cert != NULL)
+        add_header(response, shield_tls.name, shield_tls.value);
     if (closes || hall_is_closing(exchange->listener->hall))
         add_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
-    if (reply->code >= 500 && reply->code != 501 && reply->code != 503 && reply->code != 505)
-        fprintf(stderr, "impactd: request %s answered %d: %s %.200s\n", exchange->request.id,
-                reply->code, exchange->request.method, exchange->request.path);
     const enum MHD_Result result = MHD_queue_response(connection, (unsigned)reply->code, response);
     MHD_destroy_response(response);
     return result;
@@ -161,7 +162,10 @@ static enum MHD_Result send_problem(Exchange *exchange, struct MHD_Connection *c
                                     const Problem *problem, bool closes) {
     Reply reply;
     reply_default(&reply);
-    body_problem(&reply, problem, code, NULL);
+    body_problem(&reply, problem, code, NULL, exchange->request.id);
+    const ListenerSettings *settings = &exchange->listener->settings;
+    if (settings->note != NULL)
+        settings->note(settings->context, &exchange->request, &reply);
     return send_reply(exchange, connection, &reply, closes);
 }
 
@@ -183,16 +187,18 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     exchange->is_begun = true;
     request->method = method;
     request->path = request->target = exchange->target;
-    const uint64_t number = listener->first_id + atomic_fetch_add(&listener->requests, 1);
-    snprintf(request->id, sizeof request->id, "q-%012llx",
-             (unsigned long long)(number & 0xffffffffffff));
     request->started_ns = clock_monotonic_ns();
     request->waker = seat_waker(exchange->seat);
     request->body_most = listener->settings.body_most;
+    exchange->gate.names = listener->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
+    const uint64_t number = listener->first_id + atomic_fetch_add(&listener->requests, 1);
+    if (request->id[0] == '\0')
+        snprintf(request->id, sizeof request->id, "q-%012llx",
+                 (unsigned long long)(number & 0xffffffffffff));
 
     if (request->host == NULL)
-        request->host = listener->url + strlen("http://");
+        request->host = strstr(listener->url, "//") + 2;
 
     Problem problem;
     problem_clear(&problem);
@@ -218,8 +224,15 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         request->method = "GET";
         request->range = NULL;
     }
+    const ListenerSettings *settings = &listener->settings;
+    const bool has_body = body_size > 0 || exchange->gate.is_chunked;
+    Reply refusal;
+    reply_default(&refusal);
+    if (has_body && settings->admits != NULL &&
+        !settings->admits(settings->context, request, &refusal))
+        return send_reply(exchange, connection, &refusal, true);
     exchange->body.most = most;
-    seat_limit(exchange->seat, body_size > 0 || exchange->gate.is_chunked ? BODY_MS : 0);
+    seat_limit(exchange->seat, has_body ? BODY_MS : 0);
     return MHD_YES;
 }
 
@@ -270,6 +283,7 @@ static enum MHD_Result answer(Exchange *exchange, struct MHD_Connection *connect
         seat_begin(exchange->seat);
         request->body = exchange->body.at;
         request->body_size = exchange->body.count;
+        request->received = exchange->received;
     }
     request->is_woken = is_again && seat_was_woken(exchange->seat);
     request->is_expired = is_again && !request->is_woken;
@@ -389,15 +403,23 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
     if (status == STATUS_OK)
         status = address_open(&made->settings.address, &descriptor, problem);
     if (status == STATUS_OK) {
-        address_url(&made->settings.address, made->url);
+        const bool has_tls = settings->tls_cert != NULL;
+        address_url(&made->settings.address, has_tls, made->url);
+        const struct MHD_OptionItem tls[] = {
+            {MHD_OPTION_HTTPS_MEM_CERT, 0, (void *)(uintptr_t)settings->tls_cert},
+            {MHD_OPTION_HTTPS_MEM_KEY, 0, (void *)(uintptr_t)settings->tls_key},
+            {MHD_OPTION_END, 0, NULL}};
+        const struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
         made->daemon = MHD_start_daemon(
-            MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_TURBO | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC,
+            MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_TURBO | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC |
+                (has_tls ? MHD_USE_TLS : 0),
             0, NULL, NULL, on_request, made, MHD_OPTION_LISTEN_SOCKET, descriptor,
             MHD_OPTION_THREAD_POOL_SIZE, (unsigned)THREADS, MHD_OPTION_CONNECTION_LIMIT,
             (unsigned)CONNECTIONS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
             MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)(IDLE_MS / 1000), MHD_OPTION_STRICT_FOR_CLIENT,
             0, MHD_OPTION_URI_LOG_CALLBACK, on_target, made, MHD_OPTION_NOTIFY_CONNECTION,
-            on_connection, made, MHD_OPTION_NOTIFY_COMPLETED, on_completed, made, MHD_OPTION_END);
+            on_connection, made, MHD_OPTION_NOTIFY_COMPLETED, on_completed, made, MHD_OPTION_ARRAY,
+            has_tls ? tls : none, MHD_OPTION_END);
         if (made->daemon == NULL) {
             status = problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start: %s",
                                  strerror(errno));
@@ -428,6 +450,14 @@ void listener_stop(Listener *listener, int grace_ms) {
     MHD_stop_daemon(listener->daemon);
     listener->daemon = NULL;
     close(descriptor); // MHD_INVALID_SOCKET is -1: no harm
+}
+
+size_t listener_connections(Listener *listener) {
+    const union MHD_DaemonInfo *info =
+        listener->daemon != NULL
+            ? MHD_get_daemon_info(listener->daemon, MHD_DAEMON_INFO_CURRENT_CONNECTIONS)
+            : NULL;
+    return info != NULL ? info->num_connections : 0;
 }
 
 void listener_free(Listener *listener) {

@@ -1,18 +1,25 @@
-// The door: listens on loopback, collects requests, has them answered, sends the replies.
+// The door: listens, collects requests, has them answered, sends the replies.
 // libmicrohttpd lives in listener.c alone. Not routes and not rights (dispatch.h). Used by
 // command/serve.c.
 #ifndef SERVER_HTTP_LISTENER_H
 #define SERVER_HTTP_LISTENER_H
 
 #include "server/http/address.h"
+#include "server/http/gate.h"
 #include "server/http/request.h"
 
 typedef struct Listener Listener;
 
 typedef struct ListenerSettings {
     Address address;
-    size_t body_most; // bytes; a larger body is answered 413
-    void (*answer)(void *context, Request *request, Reply *reply); // from several threads
+    size_t body_most;               // bytes; a larger body is answered 413
+    const GateHosts *hosts;         // NULL: gate_loopback
+    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
+    // The three are called from several threads. `admits` is asked before a body is taken, `note`
+    // told of refusals that `answer` did not make; both may be NULL.
+    void (*answer)(void *context, Request *request, Reply *reply);
+    bool (*admits)(void *context, Request *request, Reply *reply);
+    void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
 } ListenerSettings;
 
@@ -25,5 +32,8 @@ const char *listener_url(const Listener *listener);
 void listener_stop(Listener *listener, int grace_ms);
 // Frees what wakers point to: after whoever may call them is gone.
 void listener_free(Listener *listener);
+
+// How many clients are connected now.
+size_t listener_connections(Listener *listener);
 
 #endif
