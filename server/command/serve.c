@@ -162,8 +162,11 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     Meter *meter = NULL;
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
+        const Status together = check(settings, problem);
         status = reach_read(&asked, &door.address, &ready, problem);
+        status = together != STATUS_OK ? together : status;
+    }
     if (status == STATUS_OK && (meter = meter_new(routes)) == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
     if (status == STATUS_OK)
@@ -222,8 +225,6 @@ static int run(int argc, char *const *argv) {
                              options.operands[0]);
     if (status == STATUS_OK)
         status = complete(&settings, problem);
-    if (status == STATUS_OK)
-        status = check(&settings, problem);
     if (status == STATUS_OK && settings.print_config)
         options_print(serve_fields, &settings, &options, stdout);
     else if (status == STATUS_OK)

@@ -40,7 +40,7 @@ Status address_read(const char *text, Address *address, Problem *problem) {
     if (strcmp(host, "localhost") == 0)
         snprintf(host, sizeof host, "127.0.0.1");
     unsigned char ignored[16];
-    if (inet_pton(strchr(host, ':') != NULL ? AF_INET6 : AF_INET, host, ignored) != 1)
+    if (inet_pton(text[0] == '[' ? AF_INET6 : AF_INET, host, ignored) != 1)
         return problem_set(problem, STATUS_USAGE,
                            "\"%.60s\" is not the address of an interface; write it in digits, as "
                            "127.0.0.1, [::1] or 0.0.0.0 for all, or localhost",
