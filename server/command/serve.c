@@ -92,9 +92,6 @@ static Status check(const ServeSettings *settings, Problem *problem) {
     if (settings->queue < settings->workers)
         status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
                         "a worker without a job is of no use");
-    if (settings->max_run_bytes < settings->max_body)
-        status = refuse(problem, "--max-run-bytes", settings->max_run_bytes, "--max-body",
-                        settings->max_body, "a run holds its scene");
     return status;
 }
 

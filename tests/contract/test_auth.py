@@ -83,6 +83,7 @@ def test_every_route_asks_for_its_scope():
             target = re.sub(r"\{format\}", "json", pattern)
             target = re.sub(r"\{\w+\}", "0", target)
             body = {"json": {}} if method in ("POST", "PUT", "PATCH") else {}
+            assert daemon.request(method, target, headers={"Host": "evil.example.org"}, **body).status == 421, target
             if needed == "open":
                 assert daemon.request(method, target, **body).status not in (401, 403), target
                 continue
@@ -219,6 +220,17 @@ def test_behind_a_base_url_every_link_begins_with_it():
         forwarded = daemon.get("/", headers={"X-Forwarded-Host": "evil.example.org", "X-Forwarded-Proto": "gopher",
                                              "X-Forwarded-Prefix": "/evil", "Forwarded": "host=evil.example.org"})
         assert b"evil" not in forwarded.body and b"gopher" not in forwarded.body
+
+
+def test_no_link_is_written_without_the_base():
+    """In the server's sources every path of ours that stands in an answer's quotes comes behind link_base()."""
+    found = []
+    for folder, _, files in os.walk(os.path.join(program.SOURCE, "server")):
+        for file in files:
+            if file.endswith(".c"):
+                with open(os.path.join(folder, file), encoding="utf-8") as source:
+                    found += [f"{file}: {line.strip()}" for line in source if re.search(r'\\"/(v1|schemas)\b', line)]
+    assert not found, found
 
 
 def test_every_answer_carries_the_protecting_headers_and_a_request_id():
