@@ -26,17 +26,17 @@ typedef struct Entry {
     unsigned char digest[DIGEST_BYTES];
     unsigned scopes; // bit i is scope_names[i]
     int64_t expires_unix_ms, used_unix_ms, revoked_unix_ms;
-    atomic_int_fast64_t seen_unix_ms; // last use, not all of it written back
+    int64_t seen_unix_ms; // last use, not all of it written back
     char name[TOKEN_NAME_SIZE];
 } Entry;
 
 struct Tokens {
     Store *store;
     bool are_required;
-    pthread_rwlock_t lock; // of entries and count
+    pthread_mutex_t lock; // of entries and count, held for a look-up
     Entry *entries;
     size_t count;
-    atomic_int_fast64_t now_unix_ms; // as of the last look
+    int64_t now_unix_ms; // as of the last look; under the lock
     atomic_int_fast64_t looked_ns;
     pthread_mutex_t looking; // one at a time
     pthread_mutex_t ending;
@@ -119,7 +119,7 @@ static void entry_fill(const Tokens *tokens, Entry *entry, const TokenRow *row) 
     entry->used_unix_ms = row->used_unix_ms;
     text_fit(entry->name, sizeof entry->name, row->name);
     const Entry *before = find(tokens, entry->digest);
-    atomic_init(&entry->seen_unix_ms, before != NULL ? atomic_load(&before->seen_unix_ms) : 0);
+    entry->seen_unix_ms = before != NULL ? before->seen_unix_ms : 0;
 }
 
 // With `looking` held. What is there stays where the database cannot be read.
@@ -132,14 +132,14 @@ static Status look(Tokens *tokens, Problem *problem) {
         free(rows.at);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
     }
-    atomic_store(&tokens->now_unix_ms, clock_unix_ms());
-    pthread_rwlock_wrlock(&tokens->lock);
+    pthread_mutex_lock(&tokens->lock);
+    tokens->now_unix_ms = clock_unix_ms();
     for (size_t i = 0; i < rows.count; i++)
         entry_fill(tokens, &entries[i], &rows.at[i]);
     Entry *old = tokens->entries;
     tokens->entries = entries;
     tokens->count = rows.count;
-    pthread_rwlock_unlock(&tokens->lock);
+    pthread_mutex_unlock(&tokens->lock);
     free(old);
     free(rows.at);
     return STATUS_OK;
@@ -148,10 +148,10 @@ static Status look(Tokens *tokens, Problem *problem) {
 // The next that was used and is worth a note; false if there is none.
 static bool next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
     bool is_found = false;
-    pthread_rwlock_wrlock(&tokens->lock);
+    pthread_mutex_lock(&tokens->lock);
     for (size_t i = 0; i < tokens->count && !is_found; i++) {
         Entry *entry = &tokens->entries[i];
-        const int64_t seen = atomic_load(&entry->seen_unix_ms);
+        const int64_t seen = entry->seen_unix_ms;
         if (seen <= entry->used_unix_ms || seen - entry->used_unix_ms < apart_ms)
             continue;
         is_found = true;
@@ -159,7 +159,7 @@ static bool next_used(Tokens *tokens, int64_t apart_ms, TokenRow *row) {
         row->used_unix_ms = entry->used_unix_ms = seen;
         text_fit(row->name, sizeof row->name, entry->name);
     }
-    pthread_rwlock_unlock(&tokens->lock);
+    pthread_mutex_unlock(&tokens->lock);
     return is_found;
 }
 
@@ -200,7 +200,7 @@ Status tokens_open(Store *store, bool are_required, Tokens **tokens, Problem *pr
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-    pthread_rwlock_init(&made->lock, NULL);
+    pthread_mutex_init(&made->lock, NULL);
     pthread_mutex_init(&made->looking, NULL);
     pthread_mutex_init(&made->ending, NULL);
     pthread_cond_init(&made->end, &attributes);
@@ -231,7 +231,7 @@ void tokens_close(Tokens *tokens) {
         pthread_join(tokens->follower, NULL);
         note_used(tokens, 0);
     }
-    pthread_rwlock_destroy(&tokens->lock);
+    pthread_mutex_destroy(&tokens->lock);
     pthread_mutex_destroy(&tokens->looking);
     pthread_mutex_destroy(&tokens->ending);
     pthread_cond_destroy(&tokens->end);
@@ -241,11 +241,11 @@ void tokens_close(Tokens *tokens) {
 
 size_t tokens_usable(Tokens *tokens) {
     size_t usable = 0;
-    const int64_t now = atomic_load(&tokens->now_unix_ms);
-    pthread_rwlock_rdlock(&tokens->lock);
+    pthread_mutex_lock(&tokens->lock);
+    const int64_t now = tokens->now_unix_ms;
     for (size_t i = 0; i < tokens->count; i++)
         usable += is_usable(&tokens->entries[i], now);
-    pthread_rwlock_unlock(&tokens->lock);
+    pthread_mutex_unlock(&tokens->lock);
     return usable;
 }
 
@@ -268,8 +268,8 @@ typedef struct Judgement {
 
 static Judgement judge(Tokens *tokens, const unsigned char *digest, char client[TOKEN_NAME_SIZE]) {
     Judgement found = {0};
-    const int64_t now = atomic_load_explicit(&tokens->now_unix_ms, memory_order_relaxed);
-    pthread_rwlock_rdlock(&tokens->lock);
+    pthread_mutex_lock(&tokens->lock);
+    const int64_t now = tokens->now_unix_ms;
     found.is_asked = tokens->are_required || tokens->count > 0;
     Entry *entry = digest != NULL ? find(tokens, digest) : NULL;
     if (entry != NULL) {
@@ -279,9 +279,9 @@ static Judgement judge(Tokens *tokens, const unsigned char *digest, char client[
         found.scopes = entry->scopes;
         memcpy(client, entry->name, TOKEN_NAME_SIZE);
         if (is_usable(entry, now))
-            atomic_store_explicit(&entry->seen_unix_ms, now, memory_order_relaxed);
+            entry->seen_unix_ms = now;
     }
-    pthread_rwlock_unlock(&tokens->lock);
+    pthread_mutex_unlock(&tokens->lock);
     return found;
 }
 

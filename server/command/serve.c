@@ -61,8 +61,13 @@ static const Field serve_fields[] = {
 // clang-format on
 
 static const OptionGroup serve_groups[] = {
-    {"listen", "Place"}, {"workers", "Work"},    {"max_body", "Limits"}, {"cache_bytes", "Memory"},
-    {"host", "Reach"},   {"journal", "Telling"}, {NULL, NULL},
+    {"listen", "Where it listens and keeps its data"},
+    {"workers", "Work"},
+    {"max_body", "Limits"},
+    {"cache_bytes", "Memory"},
+    {"host", "Who can reach it, and how"},
+    {"journal", "Journal and settings"},
+    {NULL, NULL},
 };
 
 // The defaults that depend on where we run.
