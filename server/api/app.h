@@ -14,6 +14,7 @@ struct App {
     Store *store;
     Intake *intake;
     const struct Meter *meter;
+    struct Hot *hot;
     struct Listener *listener; // NULL until it is open
     size_t reply_most;         // bytes of one answer
     char base_url[256];        // as clients see us, without a slash at its end; "": by their Host

@@ -1,6 +1,7 @@
 // GET /metrics: counters and gauges of all rooms in the Prometheus text format, version 0.0.4.
 #include "server/api/app.h"
 #include "server/base/process.h"
+#include "server/http/hot.h"
 #include "server/http/listener.h"
 #include "server/http/meter.h"
 #include "server/http/reply.h"
@@ -17,6 +18,20 @@ static void write_queue(Bytes *bytes, Intake *intake) {
                 (double)tally.cached_outcomes);
     tally_gauge(bytes, "impactd_cache_bytes", "Memory of these results.",
                 (double)tally.cached_bytes);
+}
+
+// Whole answers that are kept ready to be sent.
+static void write_hot(Bytes *bytes, Hot *hot) {
+    const HotTally tally = hot_tally(hot);
+    tally_gauge(bytes, "impactd_reply_cache_entries", "Answers kept whole.", (double)tally.count);
+    tally_gauge(bytes, "impactd_reply_cache_bytes", "Memory of these answers.",
+                (double)tally.bytes);
+    tally_counter(bytes, "impactd_reply_cache_hits_total", "Requests answered by these.",
+                  tally.hits);
+    tally_counter(bytes, "impactd_reply_cache_misses_total",
+                  "Looks for an answer that was not there.", tally.misses);
+    tally_counter(bytes, "impactd_reply_cache_evictions_total", "Answers that made room.",
+                  tally.evictions);
 }
 
 static void write_store(Bytes *bytes, Store *store) {
@@ -60,6 +75,8 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
     if (app->listener != NULL)
         tally_gauge(&bytes, "impactd_http_connections", "Clients connected.",
                     (double)listener_connections(app->listener));
+    if (app->hot != NULL)
+        write_hot(&bytes, app->hot);
     write_queue(&bytes, app->intake);
     totals_write(intake_totals(app->intake), &bytes);
     write_store(&bytes, app->store);

@@ -144,8 +144,9 @@ static void run_until_stopped(App *app, const ServeSettings *settings, const sig
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
     Doorman doorman = {.journal = (JournalMode)settings->journal};
-    Dispatcher dispatcher = {&app, routes, &doorman};
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20), &doorman};
     ListenerSettings door = {.body_most = settings->max_body,
+                             .answer_at_once = dispatch_at_once,
                              .answer = dispatch,
                              .admits = dispatch_admits,
                              .note = dispatch_note,
@@ -184,6 +185,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
         app.has_tls = ready.tls_cert != NULL;
         app.meter = doorman.meter = meter;
+        app.hot = dispatcher.hot;
         door.hosts = &ready.hosts;
         door.tls_cert = ready.tls_cert;
         door.tls_key = ready.tls_key;
@@ -195,6 +197,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(app.listener);
+    hot_free(dispatcher.hot);
     tokens_close(doorman.tokens);
     store_close(app.store);
     meter_free(meter);

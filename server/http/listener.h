@@ -1,5 +1,6 @@
 // The door: listens, collects requests, has them answered, sends the replies.
-// libmicrohttpd lives in listener.c alone. Not routes and not rights (dispatch.h). Used by
+// libmicrohttpd lives in listener.c, exchange.c and sending.c
+// alone. Not routes and not rights (dispatch.h). Used by
 // command/serve.c.
 #ifndef SERVER_HTTP_LISTENER_H
 #define SERVER_HTTP_LISTENER_H
@@ -12,15 +13,19 @@ typedef struct Listener Listener;
 
 typedef struct ListenerSettings {
     Address address;
-    size_t body_most;               // bytes; a larger body is answered 413
-    const GateHosts *hosts;         // NULL: gate_loopback
-    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
-    // The three are called from several threads. `admits` is asked before a body is taken, `note`
-    // told of refusals that `answer` did not make; both may be NULL.
+    size_t body_most; // bytes; a larger body is answered 413
+    // Both are called from several threads. The first answers what takes no waiting and no more
+    // than a moment, on the event loop, or returns false with `reply` untouched; then the second
+    // is called on a thread where it may take its time.
+    bool (*answer_at_once)(void *context, Request *request, Reply *reply);
     void (*answer)(void *context, Request *request, Reply *reply);
+    // Asked before a body is taken, on the event loop: false and a refusal in `reply`. May be NULL.
     bool (*admits)(void *context, Request *request, Reply *reply);
+    // Told of refusals that none of them made. May be NULL.
     void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
+    const GateHosts *hosts;         // NULL: gate_loopback
+    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
 } ListenerSettings;
 
 // Fails as address_open does.
@@ -34,6 +39,6 @@ void listener_stop(Listener *listener, int grace_ms);
 void listener_free(Listener *listener);
 
 // How many clients are connected now.
-size_t listener_connections(Listener *listener);
+size_t listener_connections(const Listener *listener);
 
 #endif

@@ -1,5 +1,5 @@
 // Headers that every answer carries, whatever it is: what browsers must not do with it. No
-// Access-Control-* among them: pages of other sites get nothing. Used by listener.c.
+// Access-Control-* among them: pages of other sites get nothing. Used by sending.c.
 #ifndef SERVER_HTTP_SHIELD_H
 #define SERVER_HTTP_SHIELD_H
 

@@ -46,7 +46,7 @@ static int open_house(void **state) {
         return -1;
     snprintf(house.lab, sizeof house.lab, "Bearer %s", token);
     house.doorman.meter = meter_new(table);
-    house.dispatcher = (Dispatcher){NULL, table, &house.doorman};
+    house.dispatcher = (Dispatcher){NULL, table, NULL, NULL, &house.doorman};
     *state = &house;
     return tokens_open(house.store, false, &house.doorman.tokens, NULL) == STATUS_OK ? 0 : -1;
 }
@@ -137,7 +137,7 @@ static void links_in_headers_begin_with_the_base(void **state) {
 
 static void without_a_doorman_everyone_comes_in(void **state) {
     (void)state;
-    House house = {.dispatcher = {NULL, table, NULL}};
+    House house = {.dispatcher = {NULL, table, NULL, NULL, NULL}};
     Reply reply;
     assert_int_equal(ask(&house, "POST", "/v1/a", NULL, &reply), 200);
 }
