@@ -358,15 +358,23 @@ void options_print(const Field *fields, const void *item, const Options *options
 
 char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]) {
     name_spell(name, "--", row->name, true);
-    bool is_first = true;
+    bool is_first = row->name[0] != 'h'; // -h is help
     for (const Field *other = fields; other < row; other++)
         is_first = is_first && other->name[0] != row->name[0];
     return is_first ? row->name[0] : '\0';
 }
 
 void options_help(const Field *fields, FILE *file) {
+    static const OptionGroup none[] = {{NULL, NULL}};
+    options_help_grouped(fields, none, file);
+}
+
+void options_help_grouped(const Field *fields, const OptionGroup *groups, FILE *file) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         char spelt[NAME_SIZE], left[2 * NAME_SIZE];
+        for (const OptionGroup *group = groups; group->first != NULL; group++)
+            if (strcmp(group->first, row->name) == 0)
+                fprintf(file, "%s%s\n", row == fields ? "" : "\n", group->title);
         const bool is_first = option_spell(fields, row, spelt) != '\0';
         const char *value = row->kind == FIELD_KIND_TEXT    ? " TEXT"
                             : row->kind == FIELD_KIND_TEXTS ? " TEXT ..."

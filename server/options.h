@@ -8,7 +8,7 @@
 
 #include "core/base/field.h"
 
-enum { OPTIONS_ROWS = 48, OPTIONS_OPERANDS = 8 };
+enum { OPTIONS_ROWS = 96, OPTIONS_OPERANDS = 8 };
 
 typedef enum OptionOrigin {
     OPTION_DEFAULT,
@@ -40,5 +40,12 @@ char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME])
 
 // One line per row for --help.
 void options_help(const Field *fields, FILE *file);
+
+// A heading over the row `first` and those behind it.
+typedef struct OptionGroup {
+    const char *first, *title;
+} OptionGroup;
+// The same with headings, which end with first == NULL.
+void options_help_grouped(const Field *fields, const OptionGroup *groups, FILE *file);
 
 #endif

@@ -27,7 +27,7 @@ def routes():
         text = file.read()
     names = {array: set(re.findall(r'"(\w+)"', list_)) for array, list_
              in re.findall(r"static const char \*const (\w+)\[\] = \{([^}]*)\}", text)}
-    rows = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(?:read|submit|materials|admin)",\s*(\w+),', text, re.M)
+    rows = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(?:open|read|submit|materials|admin)",\s*(\w+),', text, re.M)
     return {(method, pattern): names.get(queries, set()) for method, pattern, queries in rows}
 
 
@@ -78,6 +78,17 @@ def test_paths_methods_and_queries_are_those_of_the_routes():
     assert described == routes(), {key: (described.get(key), routes().get(key))
                                    for key in set(described) ^ set(routes())
                                    or {k for k in described if described[k] != routes()[k]}}
+
+
+def test_every_operation_tells_how_it_refuses():
+    """421 for a foreign Host everywhere; 401 and 403 wherever routes.c asks for a scope, and no token where it does not."""
+    with open(os.path.join(program.SOURCE, "server", "api", "routes.c"), encoding="utf-8") as file:
+        scopes = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(\w+)",', file.read(), re.M)
+    for method, pattern, scope in scopes:
+        operation = operations()[method, pattern]
+        wanted = {"421"} if scope == "open" else {"401", "403", "421"}
+        assert {code for code in operation["responses"] if code in ("401", "403", "421")} == wanted, (method, pattern)
+        assert operation.get("security") == ([] if scope == "open" else None), (method, pattern)
 
 
 def test_the_document_is_whole():
