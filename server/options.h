@@ -34,6 +34,10 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
 // One line per row as a config file would have it, with its origin behind a "#".
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file);
 
+// How a row is typed: "--queue-most" into `name`; returns its letter, '\0' where another has it.
+enum { OPTION_NAME = 96 };
+char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]);
+
 // One line per row for --help.
 void options_help(const Field *fields, FILE *file);
 

@@ -4,14 +4,19 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
+#include "server/command/cancel.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
+#include "server/command/compare.h"
 #include "server/command/ensemble.h"
+#include "server/command/get.h"
 #include "server/command/import.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
+#include "server/command/submit.h"
 #include "server/command/token.h"
 #include "server/command/tradeoff.h"
+#include "server/command/watch.h"
 #include "server/options.h"
 
 static int help_run(int argc, char *const *argv);
@@ -32,8 +37,9 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,  &command_run,   &command_check, &command_tradeoff, &command_ensemble,
-    &command_import, &command_token, &command_help,  &command_version,  NULL,
+    &command_serve,  &command_run,     &command_check,  &command_tradeoff, &command_ensemble,
+    &command_import, &command_token,   &command_submit, &command_watch,    &command_get,
+    &command_cancel, &command_compare, &command_help,   &command_version,  NULL,
 };
 
 static const char overview[] =
@@ -47,6 +53,8 @@ static const char overview[] =
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
     "  impactd token create --name lab      let a client in who has this token\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
+    "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"
+    "  impactd get JOB series -o out.npy    what became of it\n"
     "\n"
     "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"
     "\n"
@@ -169,6 +177,8 @@ int command_exit(Status status) {
     case STATUS_UNAUTHORIZED:
     case STATUS_FORBIDDEN:
         return COMMAND_NOT_ALLOWED;
+    case STATUS_UNREACHABLE:
+        return COMMAND_UNREACHABLE;
     case STATUS_TIMEOUT:
         return COMMAND_TIMED_OUT;
     case STATUS_CANCELLED:
