@@ -15,9 +15,9 @@ struct App {
     Intake *intake;
     const struct Meter *meter;
     struct Hot *hot;
-    struct Listener *listener; // NULL until it is open
-    size_t reply_most;         // bytes of one answer
-    char base_url[256];        // as clients see us, without a slash at its end; "": by their Host
+    _Atomic(struct Listener *) listener; // NULL until it is open
+    size_t reply_most;                   // bytes of one answer
+    char base_url[256]; // as clients see us, without a slash at its end; "": by their Host
     bool has_tls;
     int64_t started_unix_ms;
     atomic_bool is_stopping;

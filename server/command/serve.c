@@ -131,8 +131,10 @@ static void let_signals_kill(const sigset_t *stops) {
     pthread_sigmask(SIG_UNBLOCK, stops, NULL);
 }
 
-static void run_until_stopped(App *app, const ServeSettings *settings, const sigset_t *stops) {
-    greet(app->listener, settings, app);
+static void run_until_stopped(App *app, Listener *listener, const ServeSettings *settings,
+                              const sigset_t *stops) {
+    atomic_store(&app->listener, listener);
+    greet(listener, settings, app);
     notify_send("READY=1");
     const int signal = wait_for_end(stops);
     notify_send("STOPPING=1");
@@ -163,6 +165,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  settings->tls_key, settings->require_tokens};
     Reach ready = {0};
     Meter *meter = NULL;
+    Listener *listener = NULL;
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
@@ -189,14 +192,14 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
         door.hosts = &ready.hosts;
         door.tls_cert = ready.tls_cert;
         door.tls_key = ready.tls_key;
-        status = listener_open(&door, &app.listener, problem);
+        status = listener_open(&door, &listener, problem);
     }
     if (status == STATUS_OK)
-        run_until_stopped(&app, settings, stops);
-    listener_stop(app.listener, GRACE_MS);
+        run_until_stopped(&app, listener, settings, stops);
+    listener_stop(listener, GRACE_MS);
     if (app.intake != NULL)
         intake_close(app.intake);
-    listener_free(app.listener);
+    listener_free(listener);
     hot_free(dispatcher.hot);
     tokens_close(doorman.tokens);
     store_close(app.store);
