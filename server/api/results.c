@@ -1,5 +1,5 @@
 // Results as documents: the summary, the manifest, and what was saved as JSON when the result was
-// made. Numbers in columns are series.c's.
+// made. Numbers in columns are series.c's and ledgers.c's.
 #include "server/api/results.h"
 
 #include <stdio.h>
@@ -251,8 +251,4 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     }
     result_row_clear(&row);
     return answered;
-}
-
-Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_document(app, request, reply, DOCUMENT_ENERGY, problem);
 }

@@ -1,5 +1,5 @@
 // The documents saved with a result, for the handlers that offer them beside other formats.
-// Used by results.c and series.c.
+// Used by results.c, ledgers.c and bundle.c.
 #ifndef SERVER_API_RESULTS_H
 #define SERVER_API_RESULTS_H
 
