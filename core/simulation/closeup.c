@@ -17,26 +17,11 @@
 #include "core/plan/keep.h"
 #include "core/simulation/aim.h"
 #include "core/simulation/choice.h"
+#include "core/simulation/closeup_points.h"
 
-enum { FINE_MOST = 1 << 22 };                      // samples of the fine run
-enum { TIME, FORCE, PENETRATION, SPEED, COLUMNS }; // of the answer
-enum { FINE_FORCE, FINE_PENETRATION, FINE_VELOCITY, FINE_DAMPER_VELOCITY, FINE_COLUMNS };
+enum { FINE_MOST = 1 << 22 }; // samples of the fine run
 
 static const double states_most = 1e9; // bytes of the first run's columns
-
-typedef struct Shot {
-    Simulation simulation; // as it was run, but for its output
-    Outcome *outcome;      // all states, by sample
-    const Impact *impact;
-    Plan *plan;          // of the fine run
-    Base base;           // of the whole
-    Base shifted;        // from the fine run's start on; its values are the other's
-    size_t sample;       // there
-    double start;        // of the fine run [s]
-    Columns fine;        // FINE_COLUMNS
-    Response response;   // of the fine run
-    const Impact *again; // the impact in that
-} Shot;
 
 static void shot_clear(Shot *shot) {
     simulation_clear(&shot->simulation);
@@ -47,13 +32,10 @@ static void shot_clear(Shot *shot) {
     response_clear(&shot->response);
 }
 
-static double sign_of(int side) {
-    return side == SIDE_RIGHT ? 1 : -1;
-}
-
-// "velocity", or with several of its kind "velocity_2".
-static void name_state(char *target, size_t size, ChannelId channel, size_t index, size_t count) {
-    if (count > 1)
+// "velocity", or with several storeys or dampers "velocity_2".
+static void name_state(char *target, size_t size, ChannelId channel, size_t index,
+                       bool is_numbered) {
+    if (is_numbered)
         snprintf(target, size, "%s_%zu", channels[channel].name, index + 1);
     else
         snprintf(target, size, "%s", channels[channel].name);
@@ -67,9 +49,9 @@ static bool has_text(const Texts *texts, const char *text) {
 }
 
 // Adds a channel to those asked for; the room is there.
-static Status add_channel(Texts *texts, ChannelId channel, size_t index, size_t count) {
+static Status add_channel(Texts *texts, ChannelId channel, size_t index, bool is_numbered) {
     char name[48];
-    name_state(name, sizeof name, channel, index, count);
+    name_state(name, sizeof name, channel, index, is_numbered);
     if (has_text(texts, name))
         return STATUS_OK;
     char *text = strdup(name);
@@ -82,26 +64,27 @@ static Status add_channel(Texts *texts, ChannelId channel, size_t index, size_t 
 // The scene as it was run, with all states for its output.
 static Status ask_for_states(Simulation *simulation, size_t storeys, size_t dampers) {
     Texts *texts = &simulation->output.channels;
+    const bool is_numbered = storeys > 1 || dampers > 1;
     char **room =
         realloc(texts->at, (texts->count + 2 * storeys + 2 * dampers) * sizeof *texts->at);
     if (room == NULL)
         return STATUS_NO_MEMORY;
     texts->at = room;
     for (size_t i = 0; i < storeys; i++) {
-        TRY(add_channel(texts, CHANNEL_DISPLACEMENT, i, storeys));
-        TRY(add_channel(texts, CHANNEL_VELOCITY, i, storeys));
+        TRY(add_channel(texts, CHANNEL_DISPLACEMENT, i, is_numbered));
+        TRY(add_channel(texts, CHANNEL_VELOCITY, i, is_numbered));
     }
     for (size_t i = 0; i < dampers; i++) {
-        TRY(add_channel(texts, CHANNEL_DAMPER_DISPLACEMENT, i, dampers));
-        TRY(add_channel(texts, CHANNEL_DAMPER_VELOCITY, i, dampers));
+        TRY(add_channel(texts, CHANNEL_DAMPER_DISPLACEMENT, i, is_numbered));
+        TRY(add_channel(texts, CHANNEL_DAMPER_VELOCITY, i, is_numbered));
     }
     return STATUS_OK;
 }
 
-static double state_at(const Shot *shot, ChannelId channel, size_t index, size_t count,
-                       size_t sample) {
+static double state_at(const Shot *shot, ChannelId channel, size_t index, size_t sample) {
+    const Plan *plan = shot->plan;
     char name[48];
-    name_state(name, sizeof name, channel, index, count);
+    name_state(name, sizeof name, channel, index, plan->storeys > 1 || plan->damper_count > 1);
     return columns_find(&shot->outcome->response.series, name)->values[sample];
 }
 
@@ -164,9 +147,8 @@ static double knot_at(const Shot *shot, size_t sample) {
 static bool is_free(const Shot *shot, size_t sample) {
     for (size_t i = 0; i < shot->plan->damper_count; i++) {
         const PlanDamper *damper = &shot->plan->dampers[i];
-        const double u =
-            state_at(shot, CHANNEL_DAMPER_DISPLACEMENT, i, shot->plan->damper_count, sample) -
-            state_at(shot, CHANNEL_DISPLACEMENT, damper->storey, shot->plan->storeys, sample);
+        const double u = state_at(shot, CHANNEL_DAMPER_DISPLACEMENT, i, sample) -
+                         state_at(shot, CHANNEL_DISPLACEMENT, damper->storey, sample);
         if (!(fabs(u - damper->offset) < 0.5 * damper->clearance))
             return false;
     }
@@ -264,18 +246,15 @@ static void set_state(Shot *shot) {
     if (shot->sample == 0)
         return;
     for (size_t i = 0; i < plan->storeys; i++) {
-        plan->displacement[i] =
-            state_at(shot, CHANNEL_DISPLACEMENT, i, plan->storeys, shot->sample);
-        plan->velocity[i] = state_at(shot, CHANNEL_VELOCITY, i, plan->storeys, shot->sample);
+        plan->displacement[i] = state_at(shot, CHANNEL_DISPLACEMENT, i, shot->sample);
+        plan->velocity[i] = state_at(shot, CHANNEL_VELOCITY, i, shot->sample);
     }
     for (size_t i = 0; i < plan->damper_count; i++) {
         PlanDamper *damper = &plan->dampers[i];
-        damper->position =
-            state_at(shot, CHANNEL_DAMPER_DISPLACEMENT, i, plan->damper_count, shot->sample) -
-            plan->displacement[damper->storey] - damper->offset;
-        damper->velocity =
-            state_at(shot, CHANNEL_DAMPER_VELOCITY, i, plan->damper_count, shot->sample) -
-            plan->velocity[damper->storey];
+        damper->position = state_at(shot, CHANNEL_DAMPER_DISPLACEMENT, i, shot->sample) -
+                           plan->displacement[damper->storey] - damper->offset;
+        damper->velocity = state_at(shot, CHANNEL_DAMPER_VELOCITY, i, shot->sample) -
+                           plan->velocity[damper->storey];
     }
 }
 
@@ -288,8 +267,12 @@ static Status set_clock(Shot *shot, size_t points, Problem *problem) {
         return problem_set(problem, STATUS_NOT_FOUND,
                            "the contact takes no time that could be shown: from %.17g s to %.17g s",
                            shot->impact->start, end);
+    const double left = total - shot->start;
     plan->sample_rate = (double)(points - 2) / length;
-    plan->duration = fmin(end - shot->start + 2 / plan->sample_rate, total - shot->start);
+    plan->duration = fmin(end - shot->start + 2 / plan->sample_rate, left);
+    // To the run's end the last sample must be at it.
+    if (plan->duration == left)
+        plan->sample_rate = ceil(left * plan->sample_rate) / left;
     const double samples = plan->duration * plan->sample_rate * (1 + 1e-12) + 1;
     if (samples > FINE_MOST)
         return problem_set(problem, STATUS_LIMIT,
@@ -336,129 +319,6 @@ static Status run_finely(Shot *shot, const SimulationLimits *limits, const Watch
     return STATUS_OK;
 }
 
-// One row of the answer, in the fine run's time.
-typedef struct Point {
-    double time, force, penetration, speed;
-} Point;
-
-static Point sample_at(const Shot *shot, size_t i) {
-    const Column *fine = shot->fine.at;
-    const double sign = sign_of(shot->again->side);
-    return (Point){.time = (double)i / shot->plan->sample_rate,
-                   .force = sign * fine[FINE_FORCE].values[i],
-                   .penetration = fine[FINE_PENETRATION].values[i],
-                   .speed = sign *
-                            (fine[FINE_DAMPER_VELOCITY].values[i] - fine[FINE_VELOCITY].values[i])};
-}
-
-// The parameters of the contact, which may have begun before a pause of its force.
-static ContactParameters frozen(const Shot *shot) {
-    const Impact *first = shot->again;
-    for (const Impact *at = first; at > shot->response.impacts.at && first->is_resumed; at--)
-        if (at[-1].damper == first->damper && at[-1].side == first->side)
-            first = &at[-1];
-    const PlanStop *stop = &shot->plan->dampers[first->damper - 1].stops[first->side];
-    return contact_freeze(&stop->contact, first->approach_speed);
-}
-
-// The contact's side of an end of it, `near` being the nearest sample within.
-static Point end_at(const Shot *shot, double time, double speed, bool has_force,
-                    const Point *near) {
-    const ContactParameters own = frozen(shot);
-    Point point = {.time = time, .speed = speed};
-    if (shot->plan->form == CONTACT_LINEAR) {
-        point.force = has_force ? own.damping * speed : 0;
-        point.penetration = has_force ? 0 : fmax(-own.damping * speed / own.stiffness, 0);
-    } else {
-        point.penetration = fmax(near->penetration + near->speed * (time - near->time), 0);
-        point.force = fmax(shot->plan->law->force(&own, point.penetration, point.speed).value, 0);
-    }
-    return point;
-}
-
-// At the vertex of the parabola through three points; the force is the ledger's, which searched for
-// it.
-static Point peak_between(const Point *a, const Point *b, const Point *c, double force) {
-    const double left = a->time - b->time, right = c->time - b->time;
-    const double low = (a->force - b->force) / left, high = (c->force - b->force) / right;
-    const double bend = (high - low) / (right - left), slope = low - bend * left;
-    const double t = bend != 0 ? fmin(fmax(-slope / (2 * bend), left), right) : 0;
-    const double by_a = t * (t - right) / (left * (left - right)),
-                 by_c = t * (t - left) / (right * (right - left)), by_b = 1 - by_a - by_c;
-    return (Point){.time = b->time + t,
-                   .force = copysign(force, b->force),
-                   .penetration =
-                       by_a * a->penetration + by_b * b->penetration + by_c * c->penetration,
-                   .speed = by_a * a->speed + by_b * b->speed + by_c * c->speed};
-}
-
-// All rows but the peak's. Returns how many.
-static size_t gather(const Shot *shot, Point *points) {
-    const Impact *again = shot->again;
-    const double rate = shot->plan->sample_rate;
-    const bool is_open = isnan(again->end), has_ends = again->kind == IMPACT_IMPACT;
-    const double end = is_open ? shot->plan->duration : again->end, edge = 1e-6 / rate;
-    const size_t last = shot->plan->count - 1;
-    size_t count = has_ends ? 1 : 0, i = (size_t)fmax(ceil((again->start + edge) * rate), 0);
-    for (; i <= last && ((double)i / rate < end - edge || (is_open && i == last)); i++)
-        points[count++] = sample_at(shot, i);
-    if (!has_ends)
-        return count;
-    const Point none = {.time = again->start};
-    const Point *first = count > 1 ? &points[1] : &none;
-    points[0] = end_at(shot, again->start, again->approach_speed, !again->is_resumed, first);
-    if (is_open)
-        return count;
-    const bool pulls = shot->plan->separation == SEPARATION_ZERO_PENETRATION;
-    points[count] = end_at(shot, end, -again->separation_speed, pulls, &points[count - 1]);
-    return count + 1;
-}
-
-static size_t add_peak(const Shot *shot, Point *points, size_t count) {
-    size_t top = 0;
-    for (size_t i = 1; i < count; i++)
-        if (fabs(points[i].force) > fabs(points[top].force))
-            top = i;
-    if (top == 0 || top + 1 >= count || isnan(shot->again->peak_force))
-        return count;
-    const Point peak =
-        peak_between(&points[top - 1], &points[top], &points[top + 1], shot->again->peak_force);
-    const double apart = peak.time - points[top].time;
-    if (fabs(apart) * shot->plan->sample_rate < 1e-6) {
-        points[top] = peak;
-        return count;
-    }
-    const size_t at = apart > 0 ? top + 1 : top;
-    memmove(&points[at + 1], &points[at], (count - at) * sizeof *points);
-    points[at] = peak;
-    return count + 1;
-}
-
-static Status tell(const Shot *shot, Closeup *closeup, Problem *problem) {
-    static const struct {
-        const char *name, *unit;
-    } names[COLUMNS] = {[TIME] = {"time", "s"},
-                        [FORCE] = {"contact_force", "N"},
-                        [PENETRATION] = {"penetration", "m"},
-                        [SPEED] = {"approach_speed", "m/s"}};
-    Point *points = malloc((shot->plan->count + 3) * sizeof *points);
-    if (points == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the contact");
-    const size_t count = add_peak(shot, points, gather(shot, points));
-    const Status status = columns_make(&closeup->columns, COLUMNS, count, 0, problem);
-    for (size_t c = 0; c < COLUMNS && status == STATUS_OK; c++)
-        columns_name(&closeup->columns, c, names[c].name, names[c].unit);
-    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
-        closeup->columns.at[TIME].values[i] = shot->start + points[i].time;
-        closeup->columns.at[FORCE].values[i] = points[i].force;
-        closeup->columns.at[PENETRATION].values[i] = points[i].penetration;
-        closeup->columns.at[SPEED].values[i] = points[i].speed;
-    }
-    free(points);
-    closeup->impact = *shot->impact;
-    return status;
-}
-
 static Status take(Shot *shot, const Simulation *simulation, size_t number, size_t points,
                    const SimulationLimits *limits, const Watch *watch, Workspace *workspace,
                    Closeup *closeup, Problem *problem) {
@@ -472,7 +332,8 @@ static Status take(Shot *shot, const Simulation *simulation, size_t number, size
     set_state(shot);
     TRY(set_clock(shot, points, problem));
     TRY(run_finely(shot, limits, watch, workspace, problem));
-    return tell(shot, closeup, problem);
+    closeup->impact = *shot->impact;
+    return closeup_points(shot, &closeup->columns, problem);
 }
 
 Status closeup_make(const Simulation *simulation, size_t number, size_t points,
