@@ -6,6 +6,7 @@ static const char *const of_submit[] = {"dry_run", NULL};
 static const char *const of_jobs[] = {"limit", "before", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
+static const char *const of_force[] = {"points", NULL};
 static const char *const of_materials[] = {"q", NULL};
 
 // clang-format off
@@ -22,6 +23,9 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/psd",                  "read",   NULL,         "Power spectral densities, format by Accept", results_psd},
     {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json, csv, npy, npz or mat", results_impacts},
     {"GET",    "/v1/results/{id}/impacts",              "read",   NULL,         "The ledger of impacts, format by Accept", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force.{format}", "read", of_force, "One impact in detail, as json, csv, npy, npz or mat", results_force},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force", "read", of_force,     "One impact in detail, format by Accept", results_force},
+    {"GET",    "/v1/results/{id}/bundle.zip",           "read",   NULL,         "All of a result in one archive", results_bundle},
     {"GET",    "/v1/results/{id}/energy.{format}",      "read",   NULL,         "The energy ledger as json, csv, npy, npz or mat", results_energy},
     {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger, format by Accept", results_energy},
     {"GET",    "/v1/results/{id}/tradeoff.{format}",    "read",   NULL,         "The study's table as json, or its chart as svg", results_tradeoff},

@@ -68,16 +68,9 @@ Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
     return STATUS_OK;
 }
 
-Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
-                      const char *extension, Outcome **outcome, Problem *problem) {
+Status tables_find(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                   Problem *problem) {
     const char *id = request->parameters[0];
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
-    // Nothing is computed anew for a client who has it.
-    if (request->if_none_match != NULL && !store_result_exists(app->store, id))
-        return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
-    if (reply_immutable(reply, request, tag))
-        return STATUS_OK;
     const Status status = intake_outcome(app->intake, id, request->waker, outcome, problem);
     if (status == STATUS_GONE)
         snprintf(reply->link, sizeof reply->link,
@@ -95,6 +88,19 @@ Status tables_outcome(App *app, const Request *request, Reply *reply, const char
     }
     reply_wait(reply, (int)(1000 * left) + 1, NULL, NULL);
     return STATUS_OK;
+}
+
+Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
+                      const char *extension, Outcome **outcome, Problem *problem) {
+    const char *id = request->parameters[0];
+    char tag[104];
+    snprintf(tag, sizeof tag, "%.72s-%s.%s", id, what, extension);
+    // Nothing is computed anew for a client who has it.
+    if (request->if_none_match != NULL && !store_result_exists(app->store, id))
+        return problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s", id);
+    return reply_immutable(reply, request, tag)
+               ? STATUS_OK
+               : tables_find(app, request, reply, outcome, problem);
 }
 
 static ptrdiff_t stream_next(void *context, char *target, size_t size) {

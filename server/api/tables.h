@@ -34,6 +34,10 @@ Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
 Status tables_outcome(App *app, const Request *request, Reply *reply, const char *what,
                       const char *extension, Outcome **outcome, Problem *problem);
 
+// The same without an entity tag.
+Status tables_find(App *app, const Request *request, Reply *reply, Outcome **outcome,
+                   Problem *problem);
+
 // Takes what `sheet` holds, also when it fails.
 Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet, Problem *problem);
 // The same of a document whose every byte has its place; the sheet holds what that borrows.

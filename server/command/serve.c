@@ -23,7 +23,7 @@ typedef struct ServeSettings {
     bool print_config;
 } ServeSettings;
 
-enum { GRACE_MS = 1500 };
+enum { GRACE_MS = 1500, ASIDES = 2 }; // ASIDES: runs for readers at once
 
 #define MIB ((double)(1 << 20))
 
@@ -103,6 +103,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     TRY(store_open(settings->data, &app.store, problem));
     Status status = intake_open(app.store, &work, &app.intake, problem);
     if (status == STATUS_OK)
+        status = asides_open(ASIDES, &app.asides, problem);
+    if (status == STATUS_OK)
         status = listener_open(&door, &listener, problem);
     if (status == STATUS_OK) {
         int signal = 0;
@@ -113,6 +115,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                 signal == SIGINT ? "interrupted" : "asked to end");
     }
     listener_stop(listener, GRACE_MS);
+    asides_close(app.asides);
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(listener);
