@@ -61,15 +61,24 @@ static Status add_channel(Texts *texts, ChannelId channel, size_t index, bool is
     return STATUS_OK;
 }
 
-// The scene as it was run, with all states for its output.
-static Status ask_for_states(Simulation *simulation, size_t storeys, size_t dampers) {
-    Texts *texts = &simulation->output.channels;
+// Asks for all states besides. What was asked for stays: whether there is a mean acceleration
+// decides how the solver goes, and with it a path's last digits. But spectra are not made again.
+static Status ask_for_states(Output *output, size_t storeys, size_t dampers) {
+    Texts *texts = &output->channels, *transformed = &output->psd.channels;
     const bool is_numbered = storeys > 1 || dampers > 1;
     char **room =
-        realloc(texts->at, (texts->count + 2 * storeys + 2 * dampers) * sizeof *texts->at);
+        realloc(texts->at, (texts->count + transformed->count + 2 * storeys + 2 * dampers) *
+                               sizeof *texts->at);
     if (room == NULL)
         return STATUS_NO_MEMORY;
     texts->at = room;
+    for (; transformed->count > 0; transformed->count--) {
+        char *name = transformed->at[transformed->count - 1];
+        if (has_text(texts, name))
+            free(name);
+        else
+            texts->at[texts->count++] = name;
+    }
     for (size_t i = 0; i < storeys; i++) {
         TRY(add_channel(texts, CHANNEL_DISPLACEMENT, i, is_numbered));
         TRY(add_channel(texts, CHANNEL_VELOCITY, i, is_numbered));
@@ -104,12 +113,8 @@ static Status settle(const Simulation *asked, const SimulationLimits *limits, co
         TRY(aim_settle(asked, limits, watch, workspace, &shot->simulation, problem));
     else if (fields_copy(simulation_fields, asked, &shot->simulation) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
-    Output *output = &shot->simulation.output;
-    for (size_t i = 0; i < output->psd.channels.count; i++)
-        free(output->psd.channels.at[i]);
-    output->psd.channels.count = 0;
-    output->impacts = true;
-    if (ask_for_states(&shot->simulation, storeys, dampers) != STATUS_OK)
+    shot->simulation.output.impacts = true;
+    if (ask_for_states(&shot->simulation.output, storeys, dampers) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
     return STATUS_OK;
 }
