@@ -135,7 +135,10 @@ static Status find_impact(Shot *shot, size_t number, Problem *problem) {
                            "impacts.json lists them",
                            number, impacts->count);
     shot->impact = &impacts->at[number - 1];
-    return STATUS_OK;
+    // A rest under impulses has a force all the same.
+    return shot->plan->form == CONTACT_IMPULSIVE && shot->impact->kind == IMPACT_IMPACT
+               ? refuse_impulse(problem)
+               : STATUS_OK;
 }
 
 // Where the base has a sample of its own at the output's sample, its number; else -1.
@@ -228,8 +231,6 @@ static Status make_plan(Shot *shot, Problem *problem) {
     const Scene *scene = &simulation->scene;
     TRY(plan_new(scene, simulation->accuracy->kind->name, solver_exact.kind.name, &shot->plan,
                  problem));
-    if (shot->plan->form == CONTACT_IMPULSIVE)
-        return refuse_impulse(problem);
     return plan_keep(shot->plan, scene,
                      accuracy_modes(choice_common(simulation), shot->plan->storeys), problem);
 }
