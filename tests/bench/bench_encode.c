@@ -13,6 +13,7 @@
 #include "server/encode/encoding.h"
 
 enum { ROWS = 60001, CHANNELS = 5, REPEATS = 41, SAMPLES = 1000000 };
+enum { MEMCPY, JANSSON, NPY, NPZ, MAT, JSON, CSV, WAYS };
 
 typedef struct Series {
     Column at[CHANNELS];
@@ -53,65 +54,48 @@ static void make(Series *series, double *values) {
 }
 
 static double time_memcpy(const double *source, double *target) {
-    double times[REPEATS];
-    for (size_t r = 0; r < REPEATS; r++) {
-        const int64_t start = clock_monotonic_ns();
-        memcpy(target, source, (1 + CHANNELS) * ROWS * sizeof *source);
-        __asm__ volatile("" ::"r"(target) : "memory");
-        times[r] = 1e-3 * (double)(clock_monotonic_ns() - start);
-    }
-    return median(times, REPEATS);
+    const int64_t start = clock_thread_cpu_ns();
+    memcpy(target, source, (1 + CHANNELS) * ROWS * sizeof *source);
+    __asm__ volatile("" ::"r"(target) : "memory");
+    return 1e-3 * (double)(clock_thread_cpu_ns() - start);
 }
 
-static double time_encoder(const char *extension, const Table *table, Bytes *bytes) {
-    const Encoder *encoder = encoder_find(extension);
-    double times[REPEATS];
-    for (size_t r = 0; r < REPEATS; r++) {
-        bytes->count = 0;
-        const int64_t start = clock_monotonic_ns();
-        if (encoding_write(encoder, table, bytes, NULL) != STATUS_OK || bytes->is_failed)
-            return (double)NAN;
-        times[r] = 1e-3 * (double)(clock_monotonic_ns() - start);
-    }
-    return median(times, REPEATS);
+static double time_encoder(const Encoder *encoder, const Table *table, Bytes *bytes) {
+    bytes->count = 0;
+    const int64_t start = clock_thread_cpu_ns();
+    const Status status = encoding_write(encoder, table, bytes, NULL);
+    const double time = 1e-3 * (double)(clock_thread_cpu_ns() - start);
+    return status == STATUS_OK && !bytes->is_failed ? time : (double)NAN;
 }
 
-static int count_bytes(const char *buffer, size_t size, void *data) {
+static int drop_bytes(const char *buffer, size_t size, void *data) {
     memcpy(data, buffer, size < 8 ? size : 8);
     return 0;
 }
 
-static double time_jansson(const Bytes *text) {
-    enum { FEW = 7 };
-    double times[FEW];
+static double time_jansson(const json_t *document) {
     char sink[8];
-    json_t *document = json_loadb(text->at, text->count, 0, NULL);
-    if (document == NULL)
-        return (double)NAN;
-    for (size_t r = 0; r < FEW; r++) {
-        const int64_t start = clock_monotonic_ns();
-        (void)json_dump_callback(document, count_bytes, sink, JSON_COMPACT);
-        times[r] = 1e-3 * (double)(clock_monotonic_ns() - start);
-    }
-    json_decref(document);
-    return median(times, FEW);
+    const int64_t start = clock_thread_cpu_ns();
+    (void)json_dump_callback(document, drop_bytes, sink, JSON_COMPACT);
+    return 1e-3 * (double)(clock_thread_cpu_ns() - start);
 }
 
 static double time_buckets(const Column *column, size_t bucket) {
     double times[REPEATS];
     for (size_t r = 0; r < REPEATS; r++) {
         Columns buckets;
-        const int64_t start = clock_monotonic_ns();
+        const int64_t start = clock_thread_cpu_ns();
         if (buckets_make(&column, 1, 0, SAMPLES, bucket, &buckets, NULL) != STATUS_OK)
             return (double)NAN;
-        times[r] = 1e-3 * (double)(clock_monotonic_ns() - start);
+        times[r] = 1e-3 * (double)(clock_thread_cpu_ns() - start);
         columns_clear(&buckets);
     }
     return median(times, REPEATS);
 }
 
 int main(void) {
-    static const char *const names[] = {"npy", "npz", "mat", "json", "csv"};
+    static const char *const names[WAYS] = {"memcpy", "jansson", "npy", "npz",
+                                            "mat",    "json",    "csv"};
     double *values = malloc((1 + CHANNELS) * ROWS * sizeof *values);
     double *target = calloc((1 + CHANNELS) * ROWS, sizeof *target);
     double *many = malloc(SAMPLES * sizeof *many);
@@ -123,20 +107,28 @@ int main(void) {
         values[CHANNELS * ROWS + i] = 0;
     for (size_t i = 0; i < SAMPLES; i++)
         many[i] = sin(0.01 * (double)i);
-    const double copied = time_memcpy(values, target);
-    printf("format,bytes,microseconds,to_memcpy\nmemcpy,%zu,%.1f,1\n",
-           (size_t)(1 + CHANNELS) * ROWS * sizeof *values, copied);
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        Bytes bytes = {.most = 0};
-        const double time = time_encoder(names[i], &series.table, &bytes);
-        printf("%s,%zu,%.1f,%.2f\n", names[i], bytes.count, time, time / copied);
-        if (strcmp(names[i], "json") == 0) {
-            const double other = time_jansson(&bytes);
-            printf("jansson,,%.1f,%.2f\n", other, other / copied);
-            printf("# jansson to json: %.1f\n", other / time);
-        }
-        bytes_clear(&bytes);
+    // In turn, so that what else the machine does falls on all of them.
+    static double times[WAYS][REPEATS], ratios[WAYS][REPEATS];
+    Bytes bytes[WAYS] = {{.most = 0}};
+    json_t *document = NULL;
+    for (size_t r = 0; r < REPEATS; r++) {
+        times[MEMCPY][r] = time_memcpy(values, target);
+        for (size_t i = NPY; i < WAYS; i++)
+            times[i][r] = time_encoder(encoder_find(names[i]), &series.table, &bytes[i]);
+        if (document == NULL)
+            document = json_loadb(bytes[JSON].at, bytes[JSON].count, 0, NULL);
+        times[JANSSON][r] = document != NULL ? time_jansson(document) : (double)NAN;
+        for (size_t i = 0; i < WAYS; i++)
+            ratios[i][r] =
+                i == JSON ? times[JANSSON][r] / times[i][r] : times[i][r] / times[MEMCPY][r];
     }
+    printf("format,bytes,microseconds,ratio,to\n");
+    for (size_t i = 0; i < WAYS; i++)
+        printf("%s,%zu,%.1f,%.2f,%s\n", names[i], bytes[i].count, median(times[i], REPEATS),
+               median(ratios[i], REPEATS), i == JSON ? "jansson to it" : "memcpy");
+    json_decref(document);
+    for (size_t i = 0; i < WAYS; i++)
+        bytes_clear(&bytes[i]);
     const Column column = {"x", "m", many};
     for (size_t bucket = 1; bucket <= 1000; bucket *= 10)
         printf("# extremes of %d samples in buckets of %zu: %.0f us\n", SAMPLES, bucket,
