@@ -122,8 +122,7 @@ bool reply_tagged(Reply *reply, const Request *request, const char *text) {
 }
 
 Status reply_range(Reply *reply, const Request *request, Problem *problem) {
-    if (!reply->accepts_ranges || reply->stream.next != NULL || reply->code != 200 ||
-        strcmp(request->method, "GET") != 0)
+    if (!reply->accepts_ranges || reply->code != 200 || strcmp(request->method, "GET") != 0)
         return STATUS_OK;
     // If-Range: a part only of what the client already has the other parts of.
     if (request->if_range != NULL && strcmp(request->if_range, reply->etag) != 0)
