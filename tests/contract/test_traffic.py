@@ -18,9 +18,18 @@ import program  # noqa: E402
 HERE = os.path.dirname(os.path.abspath(__file__))
 with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
     DOCUMENT = json.load(openapi)
+# Answers that many operations share stand in one place.
+for ITEM in DOCUMENT["paths"].values():
+    for OPERATION in ITEM.values():
+        OPERATION["responses"] = {
+            status: DOCUMENT["components"]["responses"][answer["$ref"].rsplit("/", 1)[1]] if "$ref" in answer else answer
+            for status, answer in OPERATION["responses"].items()}
 
 # Tests that together see every operation.
-SOURCES = ("test_openapi.py", "test_http.py", "test_auth.py")
+SOURCES = ("test_openapi.py", "test_http.py", "test_auth.py", "test_metrics.py", "test_formats.py")
+
+# The base path that test_auth.py gives its daemon; paths are taken with and without it.
+BASE = "/impactd"
 
 # On every answer, so that no operation names them.
 EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-control", "vary", "accept-ranges",
@@ -80,7 +89,7 @@ def validator():
 
 def operation_of(method, path):
     """(path template, operation) that answers; of two that fit the more literal one. None if there is none."""
-    path = urllib.parse.unquote(urllib.parse.urlsplit(path).path)
+    path = urllib.parse.unquote(urllib.parse.urlsplit(path).path).removeprefix(BASE) or "/"
     fitting = []
     for template, item in DOCUMENT["paths"].items():
         parts = re.split(r"(\{\w+\})", template)
