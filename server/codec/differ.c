@@ -154,12 +154,15 @@ static void walk_values(Walk *walk, const char *pointer, const json_t *a, const 
     }
 }
 
-Status differ_json(const char *a, const char *b, Differences *differences, Problem *problem) {
+Status differ_json(const char *a, const char *b, const char *besides, Differences *differences,
+                   Problem *problem) {
     Walk walk = {.differences = differences};
     *differences = (Differences){0};
     json_t *trees[2] = {json_loads(a, JSON_REJECT_DUPLICATES, NULL),
                         json_loads(b, JSON_REJECT_DUPLICATES, NULL)};
     const bool are_read = trees[0] != NULL && trees[1] != NULL;
+    for (int i = 0; i < 2 && are_read && besides != NULL; i++)
+        (void)json_object_del(trees[i], besides);
     if (are_read)
         walk_values(&walk, "", trees[0], trees[1]);
     json_decref(trees[0]);

@@ -24,8 +24,10 @@ typedef struct Differences {
 } Differences;
 
 // Objects are compared member by member, arrays of numbers longer than 16 as a whole, other arrays
-// item by item. Cleared by differences_clear in any case. STATUS_INTERNAL: one is not JSON.
-Status differ_json(const char *a, const char *b, Differences *differences, Problem *problem);
+// item by item; the member `besides` of the documents (NULL: none) is left out. Cleared by
+// differences_clear in any case. STATUS_INTERNAL: one is not JSON.
+Status differ_json(const char *a, const char *b, const char *besides, Differences *differences,
+                   Problem *problem);
 void differences_clear(Differences *differences);
 
 // [{"pointer", "a", "b", "detail"}], what is not there null.

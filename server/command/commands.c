@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
+#include "server/command/any_study.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
 #include "server/command/ensemble.h"
@@ -31,9 +32,8 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,      &command_check,
-    &command_tradeoff, &command_ensemble, &command_import,
-    &command_help,     &command_version,  NULL,
+    &command_serve, &command_run,    &command_check, &command_tradeoff, &command_ensemble,
+    &command_study, &command_import, &command_help,  &command_version,  NULL,
 };
 
 static const char overview[] =

@@ -9,7 +9,7 @@
 #include "server/encode/plot.h"
 #include "server/encode/svg.h"
 
-static const double width = 760, height = 690;
+static const double width = 960, right = 660, height = 690;
 
 // The entries that are drawn, the reference first, each with its colour.
 static size_t choose(const Comparison *comparison, const CompareEntry *drawn[PLOT_COLOURS]) {
@@ -42,9 +42,10 @@ static void put_description(const Comparison *comparison, Bytes *bytes) {
 static void put_spectra(const Comparison *comparison, const CompareEntry *const drawn[],
                         size_t count, Bytes *bytes) {
     Plot plot = {.left = 70,
-                 .right = width - 14,
+                 .right = right,
                  .top = 44,
                  .bottom = 330,
+                 .legend = width - 42,
                  .is_logarithmic = true,
                  .x_title = "frequency [Hz]",
                  .bytes = bytes};
@@ -68,7 +69,7 @@ static void put_spectra(const Comparison *comparison, const CompareEntry *const 
 static void put_traces(const Comparison *comparison, const CompareEntry *const drawn[],
                        size_t count, Bytes *bytes) {
     Plot plot = {.left = 70,
-                 .right = width - 14,
+                 .right = right,
                  .top = 400,
                  .bottom = 640,
                  .x_title = "time [s]",
@@ -76,7 +77,7 @@ static void put_traces(const Comparison *comparison, const CompareEntry *const d
     const size_t buckets = count > 0 ? drawn[0]->trace.minimum.count : 0;
     Reals time = {calloc(buckets + 1, sizeof(double)), 0};
     for (size_t i = 0; i < buckets && time.at != NULL; i++)
-        time.at[time.count++] = ((double)i + 0.5) / comparison->trace_rate;
+        time.at[time.count++] = (double)i / comparison->trace_rate;
     plot_begin(&plot);
     for (size_t i = 0; i < count; i++) {
         plot_fit(&plot, &time, &drawn[i]->trace.minimum);

@@ -40,9 +40,9 @@ static void put_slope(Bytes *bytes, const SensitivitySlope *slope, double x, dou
     if (isnan(slope->derivative))
         bytes_text(bytes, "not known");
     else
-        bytes_format(bytes, "%.3g", slope->derivative);
+        bytes_format(bytes, "%.2g", slope->derivative);
     if (!slope->is_settled && !isnan(slope->spread))
-        bytes_format(bytes, " (%.2g)", slope->spread);
+        bytes_format(bytes, " (%.1g)", slope->spread);
     bytes_text(bytes, "</text>\n");
 }
 

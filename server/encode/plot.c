@@ -197,10 +197,11 @@ void plot_band(const Plot *plot, const Reals *x, const Reals *low, const Reals *
 
 void plot_legend(const Plot *plot, size_t line, size_t colour, const char *text) {
     const double y = plot->top + 18 + 18 * (double)line;
+    const double x = plot->legend > 0 ? plot->legend : plot->right - 38;
     bytes_format(plot->bytes,
                  "<path class=\"line s%zu\" d=\"M%.0f %.0fh20\"/><text x=\"%.0f\" y=\"%.0f\" "
                  "text-anchor=\"end\">",
-                 colour % PLOT_COLOURS, plot->right - 30, y, plot->right - 38, y + 4);
+                 colour % PLOT_COLOURS, x + 8, y, x, y + 4);
     svg_text(plot->bytes, text);
     bytes_text(plot->bytes, "</text>\n");
 }

@@ -10,6 +10,7 @@ enum { PLOT_COLOURS = 8 };
 
 typedef struct Plot {
     double left, right, top, bottom; // of the frame
+    double legend;                   // right end of its texts; 0: inside the frame
     bool is_logarithmic;             // both axes
     const char *x_title;
     double x_least, x_most, y_least, y_most; // what was fitted in
