@@ -123,17 +123,23 @@ Status likeness_pair(const Signal *reference, const Signal *other, size_t least,
     return STATUS_OK;
 }
 
+// What is left of a constant when its mean is taken off is its rounding, and no motion.
+static const double motionless = 1e-24; // of the energy
+
 // On a grid of `rate` from the signal's own start, its mean taken off; zeros behind it.
 static void put_centred(const Signal *signal, double rate, size_t count, double *target,
                         size_t size) {
-    double mean = 0;
+    double sum = 0, whole = 0, rest = 0;
     for (size_t i = 0; i < count; i++) {
         target[i] = value_at(signal, signal->start + (double)i / rate);
-        mean += target[i] / (double)count;
+        sum += target[i];
+        whole += target[i] * target[i];
     }
-    for (size_t i = 0; i < count; i++)
-        target[i] -= mean;
-    for (size_t i = count; i < size; i++)
+    for (size_t i = 0; i < count; i++) {
+        target[i] -= sum / (double)count;
+        rest += target[i] * target[i];
+    }
+    for (size_t i = rest > motionless * whole ? count : 0; i < size; i++)
         target[i] = 0;
 }
 

@@ -181,10 +181,9 @@ static Status make_draw(Session *session, size_t index, Problem *problem) {
         session->answer->failed++;
         return (kept->why = strdup(told->why)) != NULL ? STATUS_OK : no_memory(problem);
     }
-    kept->summary = outcome->summary;
+    kept->summary = told->summary = outcome->summary;
     if (!ladder_has_force(session->simulation))
-        kept->summary.peak_contact_force = (double)NAN;
-    told->summary = kept->summary;
+        kept->summary.peak_contact_force = (double)NAN; // of no statistic
     const Status done =
         band_keep(&session->densities, &outcome->spectrum, (size_t)session->study->runs, problem);
     outcome_drop(outcome);
@@ -215,8 +214,6 @@ static Status tell_own(Session *session, Problem *problem) {
     const double horizon = own->summary.trust_horizon;
     char text[280];
     answer->summary = own->summary;
-    if (!ladder_has_force(session->simulation))
-        answer->summary.peak_contact_force = (double)NAN;
     answer->is_chaotic = !isnan(horizon);
     if (answer->is_chaotic)
         snprintf(text, sizeof text,
