@@ -27,12 +27,15 @@ const Field likeness_fields[] = {
 static const double snap = 1e-6;
 
 static double value_at(const Signal *signal, double time) {
-    const double index = (time - signal->start) * signal->rate, near = nearbyint(index);
-    if (fabs(index - near) < snap && near >= 0 && near < (double)signal->count)
+    // Far from time 0 a time has few digits: what rounding puts beside the signal is its end's.
+    const double last = (double)(signal->count - 1);
+    const double index = fmin(fmax((time - signal->start) * signal->rate, 0), last);
+    const double near = nearbyint(index);
+    if (fabs(index - near) < snap || index >= last)
         return signal->values[(size_t)near];
     const size_t at = (size_t)index;
-    const double part = index - floor(index), from = signal->values[at];
-    return at + 1 < signal->count ? from + part * (signal->values[at + 1] - from) : from;
+    const double part = index - (double)at, from = signal->values[at];
+    return from + part * (signal->values[at + 1] - from);
 }
 
 static double end_of(const Signal *signal) {
@@ -51,8 +54,9 @@ static Grid grid_of(const Signal *a, const Signal *b) {
         return grid;
     const double from = fmax(a->start, b->start), to = fmin(end_of(a), end_of(b));
     const double first = ceil((from - grid.coarse->start) * grid.coarse->rate - snap);
-    const double last = floor((to - grid.coarse->start) * grid.coarse->rate + snap);
-    if (first < 0 || last < first)
+    const double last = fmin(floor((to - grid.coarse->start) * grid.coarse->rate + snap),
+                             (double)(grid.coarse->count - 1));
+    if (!(first >= 0) || !(last >= first))
         return grid;
     grid.first = (size_t)first;
     grid.count = (size_t)(last - first) + 1;
@@ -208,6 +212,11 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
                       1;
     if (counts[0] < 2 || counts[1] < 2)
         return problem_set(problem, STATUS_LIMIT, "too few samples to find a shift");
+    if (counts[0] + counts[1] > LIKENESS_SHIFT_MOST)
+        return problem_set(problem, STATUS_LIMIT,
+                           "%zu samples are too many to find a shift, at most %d: give the shift, "
+                           "or fewer samples",
+                           counts[0] + counts[1], LIKENESS_SHIFT_MOST);
     while (size < counts[0] + counts[1])
         size *= 2;
     Fourier *forward = fourier_new(size, FOURIER_FORWARD);

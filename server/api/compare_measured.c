@@ -42,8 +42,8 @@ typedef struct MeasuredRequest {
 // clang-format off
 static const Field measured_fields[] = {
     FIELD_REALS(Measured, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
-    FIELD_REAL(Measured, interval, "s", ABOVE(0), REQUIRED, "from one sample to the next"),
-    FIELD_REAL(Measured, start, "s", ANY, 0, "time of the first sample; the result's first is at 0"),
+    FIELD_REAL(Measured, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
+    FIELD_REAL(Measured, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
     FIELD_CHOICE(Measured, quantity, quantity_names, QUANTITY_ACCELERATION, "what was measured"),
     FIELD_END
 };
@@ -53,7 +53,7 @@ static const Field request_fields[] = {
     FIELD_TEXT(MeasuredRequest, channel, 64, PRESENCE_OPTIONAL, 0, "the result's channel; if absent the quantity's, or for an acceleration mean_acceleration where that alone was sampled"),
     FIELD_ITEM(MeasuredRequest, measured, measured_fields, NULL, PRESENCE_DEFAULT, "the measurement"),
     FIELD_CHOICE(MeasuredRequest, align, align_names, ALIGN_GIVEN, "given: by shift; auto: the shift at which both correlate best"),
-    FIELD_REAL(MeasuredRequest, shift, "s", ANY, 0, "that the measured samples are moved by to later times, under given"),
+    FIELD_REAL(MeasuredRequest, shift, "s", WITHIN(-1e9, 1e9), 0, "that the measured samples are moved by to later times, under given"),
     FIELD_REAL(MeasuredRequest, most_shift, "s", ABOVE(0), OPTIONAL, "under auto, within which it is sought; anywhere if absent"),
     FIELD_END
 };

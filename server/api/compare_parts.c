@@ -7,7 +7,7 @@
 
 #include "server/codec/write.h"
 
-enum { CHANNELS = 64 }; // of each kind, compared
+enum { CHANNELS = 64, SAMPLES = 1 << 26 }; // compared, of each kind and in all
 
 static double number_of(const Field *field, const Summary *summary) {
     const void *member = (const char *)summary + field->offset;
@@ -79,8 +79,9 @@ void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
     const char *channel = NULL, *separator = "";
     double parting = (double)NAN;
     size_t compared = 0;
+    double samples = 0;
     bytes_text(bytes, "\"channels\": [");
-    for (size_t i = 0; i < a->series.count && compared < CHANNELS; i++) {
+    for (size_t i = 0; i < a->series.count && compared < CHANNELS && samples < SAMPLES; i++) {
         const Column *from = &a->series.at[i], *to = columns_find(&b->series, from->name);
         if (to == NULL)
             continue;
@@ -95,6 +96,7 @@ void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
         put_named(bytes, from->name, from->unit, likeness_fields, &likeness);
         separator = ", ";
         compared++;
+        samples += (double)likeness.samples;
     }
     bytes_text(bytes, "]");
     put_divergence(bytes, channel, parting, horizons);

@@ -13,7 +13,8 @@
 // [{"name", "unit", "a", "b", "difference", "relative"}].
 void compare_put_metrics(Bytes *bytes, const Summary *a, const Summary *b);
 
-// [{"channel", "unit", ...}] for every channel that both sampled, and when the displacements part:
+// [{"channel", "unit", ...}] for every channel that both sampled, as many as can be looked at while
+// a client waits, and when the displacements part:
 // "channels" and "divergence", the members themselves. `horizons` are the summaries'.
 void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
                          const double horizons[2]);
