@@ -117,6 +117,17 @@ def test_models_and_rules_can_be_chosen():
             assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == pointer, (members, reply)
 
 
+def test_aluminium_may_take_impulses_and_the_sponge_may_not():
+    """The paper's thesis as spectra's distances in dB, 0.5 to 15 and 15 to 100 Hz, in free vibration of 30 s."""
+    for buffer, wanted in (("aluminium", (2.8, 7.6)), ("sponge", (8.6, 20.4))):
+        for band, level in zip(([0.5, 15], [15, 100]), wanted):
+            document = {**program.scene("paper_free_" + buffer), "duration": 30, "output": {"channels": []},
+                        "study": {"kind": "compare", "models": ["impulse"], "band": band}}
+            code, out, errors = program.run("study", "-", text=json.dumps(document))
+            assert code == 0, errors
+            assert abs(json.loads(out)["entries"][1]["psd"]["level"] - level) < 0.06, (buffer, band)
+
+
 def test_the_command_makes_the_study_of_the_document():
     """`impactd study` prints the daemon's bytes, or writes all formats; without a study it says so."""
     text = json.dumps(scene(study={"kind": "compare", "models": ["impulse"]}))
