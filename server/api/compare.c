@@ -83,7 +83,8 @@ static Status show(App *app, char results[2][72], Outcome *const outcomes[SIDES]
     return status;
 }
 
-Status compare_results(App *app, const Request *request, Reply *reply, Problem *problem) {
+static Status compare(App *app, const Request *request, Sides *sides, Reply *reply,
+                      Problem *problem) {
     static const char *const names[2] = {"a", "b"};
     char results[2][72], tag[104];
     for (int i = 0; i < 2; i++) {
@@ -98,22 +99,28 @@ Status compare_results(App *app, const Request *request, Reply *reply, Problem *
     snprintf(tag, sizeof tag, "%.34s-%.34s-compare", results[0], results[1]);
     if (reply_immutable(reply, request, tag))
         return STATUS_OK;
-    Outcome *outcomes[SIDES] = {NULL, NULL};
     bool is_waiting;
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the comparison");
-    Status status = sides_outcomes(app, request, reply, 2, results, outcomes, &is_waiting, fault);
+    Status status = sides_outcomes(app, request, reply, 2, results, sides, &is_waiting, fault);
     if (status == STATUS_GONE) {
         // Another program may have the series: this answer is not for ever.
+        reply->is_immutable = false;
         reply->etag[0] = reply->cache_control[0] = '\0';
-        status = show(app, results, outcomes, fault->detail, reply, problem);
+        status = show(app, results, sides->outcomes, fault->detail, reply, problem);
     } else if (status != STATUS_OK) {
         (void)problem_set(problem, status, "%s", fault->detail);
     } else if (!is_waiting) {
-        status = show(app, results, outcomes, NULL, reply, problem);
+        status = show(app, results, sides->outcomes, NULL, reply, problem);
     }
-    sides_drop(outcomes);
     free(fault);
+    return status;
+}
+
+Status compare_results(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Sides sides = sides_begin(request);
+    const Status status = compare(app, request, &sides, reply, problem);
+    sides_end(&sides);
     return status;
 }

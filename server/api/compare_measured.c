@@ -59,7 +59,19 @@ static const Field request_fields[] = {
 };
 // clang-format on
 
-static Status request_read(const Request *request, MeasuredRequest *asked, Problem *problem) {
+static void release(void *asked) {
+    fields_clear(request_fields, asked);
+    free(asked);
+}
+
+// Into what is kept while the request sleeps.
+static Status request_read(const Request *request, Sides *sides, Problem *problem) {
+    TRY(body_require_json(request, problem));
+    MeasuredRequest *asked = calloc(1, sizeof *asked);
+    if (asked == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
+    sides->asked = asked;
+    sides->release = release;
     TRY(read_json(request->body, request->body_size, request_fields, asked, problem));
     TRY(fields_check(request_fields, asked, "", problem));
     if (asked->measured.samples.count < SAMPLES_LEAST)
@@ -165,19 +177,17 @@ static Status compare(App *app, const char *result, const MeasuredRequest *asked
 }
 
 Status compare_measured(App *app, const Request *request, Reply *reply, Problem *problem) {
-    MeasuredRequest asked = {0};
-    Outcome *outcomes[SIDES] = {NULL, NULL};
+    Sides sides = sides_begin(request);
     char results[1][72];
     bool is_waiting = false;
-    TRY(body_require_json(request, problem));
-    Status status = request_read(request, &asked, problem);
+    Status status = sides.asked == NULL ? request_read(request, &sides, problem) : STATUS_OK;
+    const MeasuredRequest *asked = sides.asked;
     if (status == STATUS_OK)
-        status = side_resolve(app, "a", asked.a, results[0], problem);
+        status = side_resolve(app, "a", asked->a, results[0], problem);
     if (status == STATUS_OK)
-        status = sides_outcomes(app, request, reply, 1, results, outcomes, &is_waiting, problem);
+        status = sides_outcomes(app, request, reply, 1, results, &sides, &is_waiting, problem);
     if (status == STATUS_OK && !is_waiting)
-        status = compare(app, results[0], &asked, outcomes[0], reply, problem);
-    sides_drop(outcomes);
-    fields_clear(request_fields, &asked);
+        status = compare(app, results[0], asked, sides.outcomes[0], reply, problem);
+    sides_end(&sides);
     return status;
 }

@@ -34,52 +34,52 @@ Status side_resolve(App *app, const char *name, const char *id, char result[72],
     return status;
 }
 
-// What a sleeping request holds on to, so that no cache can drop one while it waits for the other.
-typedef struct Kept {
-    Outcome *outcomes[SIDES];
-} Kept;
-
-void sides_drop(Outcome *outcomes[SIDES]) {
-    for (size_t i = 0; i < SIDES; i++) {
-        outcome_drop(outcomes[i]);
-        outcomes[i] = NULL;
-    }
+Sides sides_begin(const Request *request) {
+    Sides sides = {{NULL}, NULL, NULL};
+    if (request->kept == NULL)
+        return sides;
+    sides = *(const Sides *)request->kept;
+    free(request->kept);
+    return sides;
 }
 
-static void forget(void *of) {
-    Kept *kept = of;
-    sides_drop(kept->outcomes);
+void sides_end(Sides *sides) {
+    for (size_t i = 0; i < SIDES; i++)
+        outcome_drop(sides->outcomes[i]);
+    if (sides->release != NULL)
+        sides->release(sides->asked);
+    *sides = (Sides){{NULL}, NULL, NULL};
+}
+
+static void forget(void *kept) {
+    sides_end(kept);
     free(kept);
 }
 
-static Status sleep_on(const Request *request, Reply *reply, Outcome *const outcomes[SIDES],
-                       Problem *problem) {
+static Status sleep_on(const Request *request, Reply *reply, Sides *sides, Problem *problem) {
     const double left = wait_most - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (left <= 0 || request->is_expired) {
         reply->retry_after = 5;
         return problem_set(problem, STATUS_BUSY,
                            "the series are still being computed anew; ask again a little later");
     }
-    Kept *kept = calloc(1, sizeof *kept);
+    Sides *kept = malloc(sizeof *kept);
     if (kept == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the series");
-    for (size_t i = 0; i < SIDES; i++)
-        kept->outcomes[i] = outcomes[i] != NULL ? outcome_hold(outcomes[i]) : NULL;
+    *kept = *sides;
+    *sides = (Sides){{NULL}, NULL, NULL};
     reply_wait(reply, (int)(1000 * left) + 1, kept, forget);
     return STATUS_OK;
 }
 
 Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t count,
-                      char results[][72], Outcome *outcomes[SIDES], bool *is_waiting,
-                      Problem *problem) {
-    const Kept *kept = request->kept;
+                      char results[][72], Sides *sides, bool *is_waiting, Problem *problem) {
     *is_waiting = false;
     for (size_t i = 0; i < count; i++) {
-        if (kept != NULL && kept->outcomes[i] != NULL)
-            outcomes[i] = outcome_hold(kept->outcomes[i]);
-        else
-            TRY(intake_outcome(app->intake, results[i], request->waker, &outcomes[i], problem));
-        *is_waiting = *is_waiting || outcomes[i] == NULL;
+        if (sides->outcomes[i] == NULL)
+            TRY(intake_outcome(app->intake, results[i], request->waker, &sides->outcomes[i],
+                               problem));
+        *is_waiting = *is_waiting || sides->outcomes[i] == NULL;
     }
-    return *is_waiting ? sleep_on(request, reply, outcomes, problem) : STATUS_OK;
+    return *is_waiting ? sleep_on(request, reply, sides, problem) : STATUS_OK;
 }

@@ -11,13 +11,21 @@ Status side_resolve(App *app, const char *name, const char *id, char result[72],
 
 enum { SIDES = 2 };
 
-// Outcomes of `count` results, held; what an earlier call had is taken from request->kept. With
-// *is_waiting the reply is made: the request sleeps. STATUS_GONE as intake_outcome, with the
-// outcomes there are; the caller drops all in any case.
-Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t count,
-                      char results[][72], Outcome *outcomes[SIDES], bool *is_waiting,
-                      Problem *problem);
+// What a request works with, and what it keeps while it sleeps, so that no cache can drop one
+// outcome while it waits for the other. A body is gone by then: what was asked is kept too.
+typedef struct Sides {
+    Outcome *outcomes[SIDES]; // holds
+    void *asked;              // the handler's own, freed by `release`
+    void (*release)(void *asked);
+} Sides;
 
-void sides_drop(Outcome *outcomes[SIDES]);
+// What an earlier call of the handler kept; taken once, at its beginning.
+Sides sides_begin(const Request *request);
+void sides_end(Sides *sides);
+
+// Gets the outcomes of `count` results. With *is_waiting the reply is made: the request sleeps, and
+// `sides` is empty. STATUS_GONE as intake_outcome.
+Status sides_outcomes(App *app, const Request *request, Reply *reply, size_t count,
+                      char results[][72], Sides *sides, bool *is_waiting, Problem *problem);
 
 #endif

@@ -205,8 +205,15 @@ def test_series_are_computed_again_where_they_are_not_in_memory():
             one, two = (program.finished(daemon, scene(duration=duration)) for duration in (3, 4))
             path = f"/v1/compare?a={one['result']}&b={two['result']}"
             first = daemon.get(path).body
+            ask = {"a": one["result"], "channel": "displacement", "align": "auto", "measured": {
+                "samples": list(series(daemon, one["result"])["displacement"][1000:2000]), "interval": 0.001,
+                "quantity": "displacement"}}
+            beside = daemon.request("POST", "/v1/compare", json=ask).body
+        for _ in range(2):
+            with program.daemon(data=folder) as daemon:
+                assert daemon.get(path).body == first
         with program.daemon(data=folder) as daemon:
-            assert daemon.get(path).body == first
+            assert daemon.request("POST", "/v1/compare", json=ask).body == beside
 
 
 def test_faults_of_a_comparison_are_told():
