@@ -9,6 +9,7 @@
 #include "server/api/app.h"
 #include "server/api/compare_parts.h"
 #include "server/api/compare_side.h"
+#include "server/base/link.h"
 #include "server/codec/differ.h"
 #include "server/codec/report.h"
 #include "server/http/reply.h"
@@ -16,7 +17,7 @@
 static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
     bytes_format(bytes, "\"%s\": {\"id\": \"%s\", \"engine\": ", name, row->id);
     bytes_json_string(bytes, row->engine);
-    bytes_format(bytes, ", \"links\": {\"self\": \"/v1/results/%s\"}}", row->id);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s\"}}", link_base(), row->id);
 }
 
 // Without outcomes (NULL), what is of series and spectra is null, and `gone` says why.

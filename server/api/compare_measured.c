@@ -10,6 +10,7 @@
 #include "server/api/app.h"
 #include "server/api/compare_parts.h"
 #include "server/api/compare_side.h"
+#include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/http/body.h"
@@ -133,9 +134,9 @@ static void write_answer(Bytes *bytes, const char *result, const Column *column,
         distance_measure(spectrum, spectrum->densities.at[0].values, spectrum,
                          spectrum->densities.at[1].values, (double)NAN, (double)NAN);
     bytes_format(bytes,
-                 "{\"a\": {\"id\": \"%s\", \"links\": {\"self\": \"/v1/results/%s\"}}, "
+                 "{\"a\": {\"id\": \"%s\", \"links\": {\"self\": \"%s/v1/results/%s\"}}, "
                  "\"channel\": ",
-                 result, result);
+                 result, link_base(), result);
     bytes_json_string(bytes, column->name);
     bytes_text(bytes, ", \"unit\": ");
     bytes_json_string(bytes, column->unit);
