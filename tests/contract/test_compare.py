@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import os
+import sqlite3
 import sys
 import tempfile
 import xml.etree.ElementTree
@@ -214,6 +215,26 @@ def test_series_are_computed_again_where_they_are_not_in_memory():
                 assert daemon.get(path).body == first
         with program.daemon(data=folder) as daemon:
             assert daemon.request("POST", "/v1/compare", json=ask).body == beside
+
+
+def test_what_another_engine_made_is_compared_without_its_series():
+    """Metrics and inputs stay, motions and spectra are null with a warning, and the answer is not for ever; POST: 410."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            one, two = (program.finished(daemon, scene(duration=duration)) for duration in (1, 2))
+        with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
+            database.execute("UPDATE results SET engine = 'impactd-0' WHERE id = ?", (two["result"],))
+        database.close()
+        with program.daemon(data=folder) as daemon:
+            reply = daemon.get(f"/v1/compare?a={one['result']}&b={two['result']}")
+            told = reply.json()
+            assert told["b"]["engine"] == "impactd-0" and told["inputs"][0]["pointer"] == "/duration"
+            assert told["channels"] is None and told["psd"] is None and told["divergence"] is None
+            assert "made by impactd-0" in told["warnings"][0]["detail"], told["warnings"]
+            assert "etag" not in reply.headers and "immutable" not in reply.headers.get("cache-control", "")
+            assert told["metrics"][0]["b"] == two["summary"]["peak_displacement"]
+            assert daemon.request("POST", "/v1/compare", json={
+                "a": two["result"], "measured": measured(range(100))}).status == 410
 
 
 def test_faults_of_a_comparison_are_told():
