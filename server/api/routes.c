@@ -56,4 +56,9 @@ const Route routes[] = {
 };
 // clang-format on
 
-Handler *const quick_handlers[] = {health_live, health_ready, version_show, NULL};
+const QuickHandler quick_handlers[] = {
+    {health_live, health_live},
+    {health_ready, health_ready},
+    {version_show, version_show},
+    {NULL, NULL},
+};
