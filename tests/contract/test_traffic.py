@@ -35,10 +35,17 @@ UNSEEN = {
     (None, "410"): "results of another engine version; tested below the HTTP interface",
     (None, "507"): "a full disk; tested where a small one can be mounted",
     (None, "500"): "a fault of the daemon",
+    ("GET", "/v1/results/{id}/bundle.zip", "422"): "an archive of more than 4 GiB",
+    ("GET", "/v1/results/{id}/impacts/{number}/force", "422"): "minutes of computing up to one impact",
+    ("GET", "/v1/results/{id}/impacts/{number}/force.{format}", "422"): "the same",
 }
 
 # Answered before any handler, in the same way everywhere: seen anywhere is seen.
 CENTRAL = {"401", "403", "421"}
+
+
+# The sub-path under which the tests of --base-url serve.
+BELOW = "/impactd"
 
 
 def exchanges():
@@ -81,6 +88,8 @@ def validator():
 def operation_of(method, path):
     """(path template, operation) that answers; of two that fit the more literal one. None if there is none."""
     path = urllib.parse.unquote(urllib.parse.urlsplit(path).path)
+    if path == BELOW or path.startswith(BELOW + "/"):
+        path = path[len(BELOW):] or "/"
     fitting = []
     for template, item in DOCUMENT["paths"].items():
         parts = re.split(r"(\{\w+\})", template)
@@ -96,6 +105,14 @@ def operation_of(method, path):
     template = max(fitting)[1]
     operation = DOCUMENT["paths"][template].get({"HEAD": "get"}.get(method, method.lower()))
     return (template, operation) if operation else None
+
+
+def response(operation, status):
+    """What the operation declares for a status; {} if nothing."""
+    found = operation["responses"].get(str(status), {})
+    if "$ref" in found:
+        found = DOCUMENT["components"]["responses"][found["$ref"].rsplit("/", 1)[1]]
+    return found
 
 
 def media(headers, name="content-type"):
@@ -119,15 +136,15 @@ def test_every_answer_is_declared():
                     one["status"] not in (501, 505):
                 found.append(f"{name}: answered, and not in the document")
             continue
-        answer = match[1]["responses"].get(str(one["status"]))
-        if answer is None:
+        answer = response(match[1], one["status"])
+        if not answer:
             found.append(f"{name}: the status is not declared for {match[0]}")
             continue
         content = answer.get("content", {})
         if (kind not in content if content else one["size"] > 0):
             found.append(f"{name}: {kind or 'no type'} is not declared for {match[0]}")
         # A 304 and a 206 have what their 200 would have had (RFC 9110, 15.3.7 and 15.4.5).
-        kin = match[1]["responses"].get("200", {}) if one["status"] in (206, 304) else {}
+        kin = response(match[1], 200) if one["status"] in (206, 304) else {}
         declared = {header.lower() for header in [*answer.get("headers", {}), *kin.get("headers", {})]}
         found += [f"{name}: the header {header} is not declared for {match[0]}"
                   for header in one["answer_headers"] if header not in declared | EVERYWHERE]
@@ -142,7 +159,7 @@ def test_every_json_body_fits_its_schema():
         kind = media(one["answer_headers"])
         if match is None or "json" not in kind or one["method"] == "HEAD" or one["answer"] is None:
             continue
-        content = match[1]["responses"].get(str(one["status"]), {}).get("content", {})
+        content = response(match[1], one["status"]).get("content", {})
         if kind in content:
             count += 1
             value = json.loads(base64.b64decode(one["answer"]))
