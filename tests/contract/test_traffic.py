@@ -18,9 +18,18 @@ import program  # noqa: E402
 HERE = os.path.dirname(os.path.abspath(__file__))
 with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
     DOCUMENT = json.load(openapi)
+# Answers that many operations share stand in one place.
+for ITEM in DOCUMENT["paths"].values():
+    for OPERATION in ITEM.values():
+        OPERATION["responses"] = {
+            status: DOCUMENT["components"]["responses"][answer["$ref"].rsplit("/", 1)[1]] if "$ref" in answer else answer
+            for status, answer in OPERATION["responses"].items()}
 
 # Tests that together see every operation.
-SOURCES = ("test_openapi.py", "test_http.py", "test_auth.py")
+SOURCES = ("test_openapi.py", "test_http.py", "test_auth.py", "test_metrics.py", "test_formats.py")
+
+# The base path that test_auth.py gives its daemon; paths are taken with and without it.
+BASE = "/impactd"
 
 # On every answer, so that no operation names them.
 EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-control", "vary", "accept-ranges",
@@ -35,17 +44,10 @@ UNSEEN = {
     (None, "410"): "results of another engine version; tested below the HTTP interface",
     (None, "507"): "a full disk; tested where a small one can be mounted",
     (None, "500"): "a fault of the daemon",
-    ("GET", "/v1/results/{id}/bundle.zip", "422"): "an archive of more than 4 GiB",
-    ("GET", "/v1/results/{id}/impacts/{number}/force", "422"): "minutes of computing up to one impact",
-    ("GET", "/v1/results/{id}/impacts/{number}/force.{format}", "422"): "the same",
 }
 
 # Answered before any handler, in the same way everywhere: seen anywhere is seen.
 CENTRAL = {"401", "403", "421"}
-
-
-# The sub-path under which the tests of --base-url serve.
-BELOW = "/impactd"
 
 
 def exchanges():
@@ -87,9 +89,7 @@ def validator():
 
 def operation_of(method, path):
     """(path template, operation) that answers; of two that fit the more literal one. None if there is none."""
-    path = urllib.parse.unquote(urllib.parse.urlsplit(path).path)
-    if path == BELOW or path.startswith(BELOW + "/"):
-        path = path[len(BELOW):] or "/"
+    path = urllib.parse.unquote(urllib.parse.urlsplit(path).path).removeprefix(BASE) or "/"
     fitting = []
     for template, item in DOCUMENT["paths"].items():
         parts = re.split(r"(\{\w+\})", template)
@@ -105,14 +105,6 @@ def operation_of(method, path):
     template = max(fitting)[1]
     operation = DOCUMENT["paths"][template].get({"HEAD": "get"}.get(method, method.lower()))
     return (template, operation) if operation else None
-
-
-def response(operation, status):
-    """What the operation declares for a status; {} if nothing."""
-    found = operation["responses"].get(str(status), {})
-    if "$ref" in found:
-        found = DOCUMENT["components"]["responses"][found["$ref"].rsplit("/", 1)[1]]
-    return found
 
 
 def media(headers, name="content-type"):
@@ -136,15 +128,15 @@ def test_every_answer_is_declared():
                     one["status"] not in (501, 505):
                 found.append(f"{name}: answered, and not in the document")
             continue
-        answer = response(match[1], one["status"])
-        if not answer:
+        answer = match[1]["responses"].get(str(one["status"]))
+        if answer is None:
             found.append(f"{name}: the status is not declared for {match[0]}")
             continue
         content = answer.get("content", {})
         if (kind not in content if content else one["size"] > 0):
             found.append(f"{name}: {kind or 'no type'} is not declared for {match[0]}")
         # A 304 and a 206 have what their 200 would have had (RFC 9110, 15.3.7 and 15.4.5).
-        kin = response(match[1], 200) if one["status"] in (206, 304) else {}
+        kin = match[1]["responses"].get("200", {}) if one["status"] in (206, 304) else {}
         declared = {header.lower() for header in [*answer.get("headers", {}), *kin.get("headers", {})]}
         found += [f"{name}: the header {header} is not declared for {match[0]}"
                   for header in one["answer_headers"] if header not in declared | EVERYWHERE]
@@ -159,7 +151,7 @@ def test_every_json_body_fits_its_schema():
         kind = media(one["answer_headers"])
         if match is None or "json" not in kind or one["method"] == "HEAD" or one["answer"] is None:
             continue
-        content = response(match[1], one["status"]).get("content", {})
+        content = match[1]["responses"].get(str(one["status"]), {}).get("content", {})
         if kind in content:
             count += 1
             value = json.loads(base64.b64decode(one["answer"]))
