@@ -7,7 +7,7 @@ set_target_properties(print_pages PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BI
 set(PAGES ${CMAKE_BINARY_DIR}/install)
 add_custom_command(
     OUTPUT ${PAGES}/impactd.1 ${PAGES}/impactd-scene.5 ${PAGES}/impactd.bash ${PAGES}/_impactd ${PAGES}/impactd.fish
-    COMMAND print_pages ${PAGES} VERBATIM)
+    COMMAND print_pages ${PAGES} DEPENDS print_pages VERBATIM)
 add_custom_target(pages ALL DEPENDS ${PAGES}/impactd.1)
 
 install(TARGETS impactd RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

@@ -44,6 +44,9 @@ UNSEEN = {
     (None, "410"): "results of another engine version; tested below the HTTP interface",
     (None, "507"): "a full disk; tested where a small one can be mounted",
     (None, "500"): "a fault of the daemon",
+    ("GET", "/v1/results/{id}/bundle.zip", "422"): "an archive of more than 4 GiB",
+    ("GET", "/v1/results/{id}/impacts/{number}/force", "422"): "minutes of computing up to one impact",
+    ("GET", "/v1/results/{id}/impacts/{number}/force.{format}", "422"): "the same",
 }
 
 # Answered before any handler, in the same way everywhere: seen anywhere is seen.
