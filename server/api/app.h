@@ -7,12 +7,14 @@
 #include <stdint.h>
 
 #include "server/http/route.h"
+#include "server/jobs/aside.h"
 #include "server/jobs/intake.h"
 #include "server/store/store.h"
 
 struct App {
     Store *store;
     Intake *intake;
+    Asides *asides; // for readers of what takes a run
     const struct Meter *meter;
     struct Hot *hot;
     _Atomic(struct Listener *) listener; // NULL until it is open
@@ -29,7 +31,7 @@ extern const char program_build[];   // the compiler
 // The handlers, by file; routes.c lists them with their patterns.
 Handler jobs_create, jobs_list, jobs_show, jobs_dismiss;
 Handler results_show, results_manifest, results_series, results_psd, results_impacts,
-    results_energy, results_tradeoff, results_ensemble;
+    results_energy, results_force, results_bundle, results_tradeoff, results_ensemble;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;

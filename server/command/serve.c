@@ -31,7 +31,7 @@ typedef struct ServeSettings {
     bool require_tokens, print_config;
 } ServeSettings;
 
-enum { GRACE_MS = 1500 };
+enum { GRACE_MS = 1500, ASIDES = 2 }; // ASIDES: runs for readers at once
 
 #define MIB ((double)(1 << 20))
 
@@ -183,6 +183,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
         status = reach_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
     if (status == STATUS_OK)
         status = intake_open(app.store, &work, &app.intake, problem);
+    if (status == STATUS_OK)
+        status = asides_open(ASIDES, &app.asides, problem);
     if (status == STATUS_OK) {
         link_base_set(ready.url.path);
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
@@ -197,6 +199,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (status == STATUS_OK)
         run_until_stopped(&app, listener, settings, stops);
     listener_stop(listener, GRACE_MS);
+    asides_close(app.asides);
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(listener);
