@@ -206,8 +206,11 @@ static enum MHD_Result hand_over(Exchange *exchange) {
 static enum MHD_Result answer(Exchange *exchange) {
     const ListenerSettings *settings = &exchange->desk->settings;
     Request *request = &exchange->request;
-    if (exchange->is_answered)
-        return sending_queue(exchange, &exchange->reply, false);
+    if (exchange->is_answered) {
+        Reply reply = exchange->reply;
+        reply_default(&exchange->reply);
+        return sending_queue(exchange, &reply, false);
+    }
     if (exchange->is_busy) {
         Problem problem;
         problem_clear(&problem);
@@ -324,6 +327,9 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     *state = NULL;
     if (exchange->forget != NULL)
         exchange->forget(exchange->request.kept);
+    // The client left before its answer was there.
+    exchange->reply.forget = NULL;
+    reply_clear(&exchange->reply);
     drop_body(exchange);
     request_close(&exchange->request);
     seat_limit(exchange->seat, IDLE_MS);

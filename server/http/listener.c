@@ -46,7 +46,8 @@ static void take_arrivals(Loop *loop) {
         pthread_mutex_lock(&loop->lock);
         count = loop->arrival_count < MOST ? loop->arrival_count : MOST;
         loop->arrival_count -= count;
-        memcpy(arrivals, loop->arrivals + loop->arrival_count, count * sizeof *arrivals);
+        if (count > 0) // a bell may be stale
+            memcpy(arrivals, loop->arrivals + loop->arrival_count, count * sizeof *arrivals);
         pthread_mutex_unlock(&loop->lock);
         for (size_t i = 0; i < count; i++) {
             struct sockaddr_storage peer = {.ss_family = AF_INET};
