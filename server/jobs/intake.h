@@ -39,9 +39,10 @@ typedef struct Submission {
     const char *client; // its token's name; NULL: nobody in particular
 } Submission;
 
-// Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
-// (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
-// STATUS_INVALID with the faults. The Job is a hold of the caller's.
+// Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told
+// of it until it is kept (job_kept). Known results finish it at once (cached), a scene in flight
+// shares that computation. STATUS_BUSY when the queue is full, STATUS_INVALID with the faults. The
+// Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
 
 // The same without running: everything a dry run answers.
@@ -60,7 +61,7 @@ void dry_run_clear(DryRun *dry_run);
 // A job by its id, from memory or the store. STATUS_NOT_FOUND.
 Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// Dismisses; STATUS_CONFLICT if it is finished already.
+// Dismisses, for all at once and kept soon (job_kept); STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
 // The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is

@@ -5,7 +5,8 @@
 
 #include "server/store/access.h"
 
-// Within a transaction: all that changes of a job. STATUS_NOT_FOUND.
-Status job_row_update(Database *database, const JobRow *row, Problem *problem);
+// Within a transaction: all that changes of a job, or the whole where it is_unsaved.
+// STATUS_NOT_FOUND.
+Status job_row_save(Database *database, const JobRow *row, Problem *problem);
 
 #endif
