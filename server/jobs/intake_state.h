@@ -10,6 +10,7 @@
 #include "server/jobs/head.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
+#include "server/jobs/known.h"
 
 enum { OUTCOME_FAILURES = 64 };
 
@@ -88,6 +89,8 @@ struct Intake {
     size_t posted;               // writes that the store has yet to answer
     size_t saving, saving_bytes; // computations that have run and are not yet saved
     Cache *cache;
+    Known *known;
+    atomic_uint_fast64_t deletions;     // of results
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
 };
