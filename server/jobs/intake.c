@@ -391,9 +391,11 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     *tally = (IntakeTally){.queued = intake->queued,
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
-                           .cached_outcomes = cache_count(intake->cache),
-                           .cached_bytes = cache_bytes(intake->cache),
-                           .saving = intake->saving};
+                           .saving = intake->saving,
+                           .rows = intake->rows};
+    cache_tally(intake->cache, &tally->series, &tally->heads);
+    tally->cached_outcomes = tally->series.count;
+    tally->cached_bytes = tally->series.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->settings.workers; i++)
         tally->running += intake->workers[i].running != NULL;

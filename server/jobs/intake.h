@@ -108,8 +108,11 @@ typedef struct LayerTally {
 
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
-    size_t saving;    // computations that have run and are not yet in the store
-    LayerTally known; // whole answers, by body
+    size_t saving;     // computations that have run and are not yet in the store
+    LayerTally known;  // whole answers, by body
+    LayerTally heads;  // in memory, by result: plan, summary, work and notes
+    LayerTally series; // in memory, by result; its bytes are those of both
+    LayerTally rows;   // results in the database: those found there and not
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
 

@@ -90,6 +90,7 @@ struct Intake {
     size_t saving, saving_bytes; // computations that have run and are not yet saved
     Cache *cache;
     Known *known;
+    LayerTally rows;                    // results found in the database
     atomic_uint_fast64_t deletions;     // of results
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;

@@ -232,7 +232,8 @@ static void saved(void *context, Status status, const char *detail) {
         // What is in the cache is known, so it must be in the store.
         if (status == STATUS_OK && saving->findings.status == STATUS_OK) {
             saving->is_saved = true;
-            cache_put(intake->cache, saving->computation->result, saving->findings.outcome);
+            cache_put(intake->cache, saving->computation->result, saving->findings.outcome,
+                      saving->head);
         }
         publish(saving, status, detail);
         goes_on = go_on(saving);
@@ -299,7 +300,7 @@ void intake_save(Intake *intake, Computation *computation, Findings *findings) {
     intake->saving_bytes += saving->bytes;
     // Only the series was wanted: the result is saved already.
     if (saving->findings.outcome != NULL && computation->is_again)
-        cache_put(intake->cache, computation->result, saving->findings.outcome);
+        cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
     const bool goes_on = go_on(saving);
     if (!goes_on)
         end(saving);
