@@ -118,6 +118,11 @@ Head *cache_head(Cache *cache, const char *id) {
     return is_hit ? head_hold(entry->head) : NULL;
 }
 
+bool cache_has(const Cache *cache, const char *id, bool with_series) {
+    const Entry *entry = index_find(cache->index, id);
+    return entry != NULL && (with_series ? entry->outcome != NULL : entry->head != NULL);
+}
+
 void cache_forget(Cache *cache, const char *id) {
     Entry *entry = index_find(cache->index, id);
     if (entry != NULL)

@@ -386,6 +386,15 @@ void intake_forget(Intake *intake, const char *result) {
     pthread_mutex_unlock(&intake->lock);
 }
 
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
+    pthread_mutex_lock(&intake->lock);
+    *layers = (IntakeLayers){.in_memory = cache_has(intake->cache, result, false),
+                             .series_in_memory = cache_has(intake->cache, result, true)};
+    pthread_mutex_unlock(&intake->lock);
+    layers->in_database = store_result_exists(intake->store, result);
+    layers->series_in_database = false;
+}
+
 void intake_tally(Intake *intake, IntakeTally *tally) {
     pthread_mutex_lock(&intake->lock);
     *tally = (IntakeTally){.queued = intake->queued,

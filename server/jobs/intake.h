@@ -106,6 +106,12 @@ typedef struct LayerTally {
     size_t count, bytes, most_bytes;
 } LayerTally;
 
+// Where a result is known.
+typedef struct IntakeLayers {
+    bool in_memory, in_database, series_in_memory, series_in_database;
+} IntakeLayers;
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers);
+
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
     size_t saving;     // computations that have run and are not yet in the store

@@ -136,6 +136,12 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
+    // It may have become known meanwhile.
+    if (other == NULL && (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
+        pthread_mutex_unlock(&intake->lock);
+        computation_free(computation);
+        return finish_known(intake, job, problem);
+    }
     Status status = find_room(intake, job, problem);
     if (status == STATUS_OK)
         status = post(intake, job, problem);

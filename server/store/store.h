@@ -121,5 +121,13 @@ Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
+// Id, engine and scene of the newest ones, newest first, without scenes longer than that.
+typedef struct ResultRows {
+    ResultRow *at;
+    size_t count;
+} ResultRows;
+Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+                           Problem *problem);
+void result_rows_clear(ResultRows *rows);
 
 #endif
