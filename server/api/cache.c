@@ -34,6 +34,12 @@ Status cache_show(App *app, const Request *request, Reply *reply, Problem *probl
     put_layer(&bytes, "series", &tally.series, true);
     bytes_text(&bytes, ", ");
     put_layer(&bytes, "results", &tally.rows, false);
+    uint64_t count, size;
+    store_series_tally(app->store, &count, &size, &tally.stored.evictions);
+    tally.stored.count = count;
+    tally.stored.bytes = size;
+    bytes_text(&bytes, ", ");
+    put_layer(&bytes, "stored_series", &tally.stored, true);
     bytes_text(&bytes, "}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

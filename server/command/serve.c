@@ -18,7 +18,7 @@
 
 typedef struct ServeSettings {
     char *listen, *data, *config;
-    uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, cache_bytes;
+    uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, cache_bytes, store_bytes;
     double max_cpu_seconds;
     bool print_config;
 } ServeSettings;
@@ -39,6 +39,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
     FIELD_END,
@@ -95,6 +96,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
+                                 .store_bytes = settings->store_bytes,
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,

@@ -392,7 +392,7 @@ void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
                              .series_in_memory = cache_has(intake->cache, result, true)};
     pthread_mutex_unlock(&intake->lock);
     layers->in_database = store_result_exists(intake->store, result);
-    layers->series_in_database = false;
+    layers->series_in_database = store_series_exists(intake->store, result);
 }
 
 void intake_tally(Intake *intake, IntakeTally *tally) {
@@ -401,7 +401,8 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
                            .saving = intake->saving,
-                           .rows = intake->rows};
+                           .rows = intake->rows,
+                           .stored = intake->stored};
     cache_tally(intake->cache, &tally->series, &tally->heads);
     tally->cached_outcomes = tally->series.count;
     tally->cached_bytes = tally->series.bytes;
@@ -409,4 +410,5 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     for (size_t i = 0; i < intake->settings.workers; i++)
         tally->running += intake->workers[i].running != NULL;
     pthread_mutex_unlock(&intake->lock);
+    tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -16,6 +16,7 @@ typedef struct IntakeSettings {
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
     size_t cache_bytes; // of finished outcomes in memory
     size_t known_bytes; // of ready answers in memory; 0: an eighth of cache_bytes
+    size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -94,9 +95,10 @@ Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 // Dismisses, for all at once and kept soon (job_kept); STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is
-// NULL and the return is STATUS_OK while it is being computed: `waker` is then called once when it
-// is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
+// The series-bearing Outcome of a result: from memory, from the database where it is kept (its
+// plan, summary and warnings are empty then), or computed anew by a worker. *outcome is NULL and
+// the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
+// asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
 
@@ -119,6 +121,7 @@ typedef struct IntakeTally {
     LayerTally heads;  // in memory, by result: plan, summary, work and notes
     LayerTally series; // in memory, by result; its bytes are those of both
     LayerTally rows;   // results in the database: those found there and not
+    LayerTally stored; // series in the database
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
 

@@ -130,4 +130,14 @@ Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultR
                            Problem *problem);
 void result_rows_clear(ResultRows *rows);
 
+// Series of results as bytes, at most `most` of them in all: the longest unused make room. Posted
+// behind all else that is to be written. Takes `body`, which is to be freed, also when it fails.
+Status store_series_post(Store *store, const char *result, char *body, size_t size, uint64_t most,
+                         const StoreDone *done);
+// *body is to be freed. STATUS_NOT_FOUND.
+Status store_series_load(Store *store, const char *result, char **body, size_t *size,
+                         Problem *problem);
+bool store_series_exists(Store *store, const char *result);
+void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
+
 #endif
