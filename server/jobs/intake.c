@@ -336,6 +336,7 @@ static Status dismiss(Intake *intake, Job *job, Problem *problem) {
         job_drop(job); // the post's hold
     }
     wakers_call(&job->wakers);
+    totals_ended(&intake->totals, JOB_DISMISSED, false);
     pthread_mutex_unlock(&intake->lock);
     return STATUS_OK;
 }
@@ -359,7 +360,10 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
 }
 
 bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer) {
-    return known_answer(intake->known, intake->store, submission, intake_mark(intake), answer);
+    if (!known_answer(intake->known, intake->store, submission, intake_mark(intake), answer))
+        return false;
+    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+    return true;
 }
 
 // Both only rise: their sum is the same only while both are.
@@ -393,6 +397,10 @@ void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
     pthread_mutex_unlock(&intake->lock);
     layers->in_database = store_result_exists(intake->store, result);
     layers->series_in_database = store_series_exists(intake->store, result);
+}
+
+const Totals *intake_totals(const Intake *intake) {
+    return &intake->totals;
 }
 
 void intake_tally(Intake *intake, IntakeTally *tally) {
