@@ -34,6 +34,7 @@ Handler results_show, results_manifest, results_series, results_psd, results_imp
     results_energy, results_force, results_bundle, results_tradeoff, results_ensemble,
     results_compare, results_sensitivity;
 Handler compare_results, compare_measured;
+Handler cache_show, cache_explain;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;

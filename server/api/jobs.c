@@ -16,6 +16,8 @@ static const double wait_initial = 2, wait_most = 30; // [s]
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
 
+enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
+
 // Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
     JobShow show = {0};
@@ -56,22 +58,46 @@ static void pause_forget(void *kept) {
     job_drop(pause_end(kept));
 }
 
+// Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
+// there is no memory; the hold stays with the caller then.
+static bool sleep_until(const Request *request, Reply *reply, Job *job,
+                        bool (*watch)(Job *job, const Waker *waker), int wait_ms) {
+    Pause *pause = malloc(sizeof *pause);
+    if (pause == NULL)
+        return false;
+    *pause = (Pause){job, request->waker};
+    if (!watch(job, request->waker)) {
+        free(pause);
+        return false;
+    }
+    reply_wait(reply, wait_ms, pause, pause_forget);
+    return true;
+}
+
 // Puts the request to sleep until the job is finished, `wait` seconds after the request came at
 // most. False if there is nothing to wait for; the hold stays with the caller then.
 static bool pause_begin(const Request *request, Reply *reply, Job *job, double wait) {
     const double left = wait - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (request->is_expired || left <= 0 || job_is_finished(job))
         return false;
-    Pause *pause = malloc(sizeof *pause);
-    if (pause == NULL)
-        return false;
-    *pause = (Pause){job, request->waker};
-    if (!job_watch(job, request->waker)) {
-        free(pause);
-        return false;
+    return sleep_until(request, reply, job, job_watch, (int)(1000 * left) + 1);
+}
+
+// The same until the store has the job: nobody is told of it before. Where that fails, the hold is
+// dropped.
+static Status pause_until_kept(const Request *request, Reply *reply, Job *job, bool *is_paused,
+                               Problem *problem) {
+    bool is_kept;
+    *is_paused = false;
+    Status status = job_kept(job, &is_kept, problem);
+    if (status == STATUS_OK && !is_kept) {
+        *is_paused = sleep_until(request, reply, job, job_watch_kept, KEEP_WAIT_MS);
+        if (!*is_paused)
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the job");
     }
-    reply_wait(reply, (int)(1000 * left) + 1, pause, pause_forget);
-    return true;
+    if (status != STATUS_OK)
+        job_drop(job);
+    return status;
 }
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -98,6 +124,21 @@ static Status read_flag(const Request *request, const char *name, bool *flag, Pr
                        "the query parameter \"%s\" must be 1 or 0, is \"%.40s\"", name, text);
 }
 
+// The next time this body comes it is answered without being read.
+static void learn(App *app, const Submission *submission, uint64_t mark, Job *job) {
+    JobShow show = {0};
+    JobSlots slots;
+    Bytes bytes = {.most = app->reply_most};
+    if (job_is_finished(job) && job_show(job, &show) == STATUS_OK && show.is_cached &&
+        show.state == JOB_SUCCESSFUL) {
+        job_put_known(&bytes, &show, &slots);
+        if (!bytes.is_failed)
+            intake_learn(app->intake, submission, mark, job, bytes.at, bytes.count, &slots);
+        bytes_clear(&bytes);
+    }
+    job_show_clear(&show);
+}
+
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
@@ -114,7 +155,16 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
                                "is back");
         const Submission submission = {
             .text = request->body, .size = request->body_size, .client = request->client};
+        KnownAnswer known;
+        if (request->idempotency_key == NULL && intake_known(app->intake, &submission, &known)) {
+            reply_borrow(reply, 200, type_json, known.body, known.size);
+            reply->release = free;
+            reply->context = known.body;
+            return STATUS_OK;
+        }
+        const uint64_t mark = intake_mark(app->intake);
         TRY(intake_submit(app->intake, &submission, &job, problem));
+        learn(app, &submission, mark, job);
     }
 
     const Prefer prefer = header_prefer(request->prefer);
@@ -122,6 +172,10 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
     if (prefer.has_wait)
         wait = prefer.wait < wait_most ? prefer.wait : wait_most;
     if (pause_begin(request, reply, job, wait))
+        return STATUS_OK;
+    bool is_paused;
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
         return STATUS_OK;
     char applied[24] = "";
     if (prefer.has_wait)
@@ -147,7 +201,14 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
 
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    bool is_paused;
+    if (request->kept != NULL)
+        job = pause_end(request->kept);
+    else
+        TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
 }
 
@@ -185,6 +246,7 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     double limit;
     TRY(request_number(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
     const size_t most = (size_t)limit;
+    store_job_settle(app->store); // whoever was answered finds the job here
     JobRows rows = {0};
     // One more than asked for tells whether there is a next page.
     const Status status =

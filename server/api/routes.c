@@ -39,6 +39,8 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_sensitivity},
     {"GET",    "/v1/compare",                           "read",   of_compare,   "Two results side by side, and the inputs that differ", compare_results},
     {"POST",   "/v1/compare",                           "read",   NULL,         "A result beside a measured motion", compare_measured},
+    {"GET",    "/v1/cache",                             "read",   NULL,         "How often what is known already helped, by layer", cache_show},
+    {"POST",   "/v1/cache/explain",                     "read",   NULL,         "Whether a scene is known, and in what it differs from the nearest that is", cache_explain},
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},

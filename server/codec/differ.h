@@ -1,5 +1,5 @@
 // Where two JSON documents differ: JSON Pointer and both values. Not a judgement of what they say.
-// Used by api/compare.c.
+// Used by api/compare.c and api/cache.c.
 #ifndef SERVER_CODEC_DIFFER_H
 #define SERVER_CODEC_DIFFER_H
 

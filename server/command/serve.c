@@ -25,7 +25,7 @@ typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
     Texts host;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
-        cache_bytes;
+        cache_bytes, store_bytes;
     double max_cpu_seconds;
     int journal;
     bool require_tokens, print_config;
@@ -48,6 +48,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another name that requests may call this machine by; may be repeated, or a list with commas"),
     FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "how clients reach it behind a proxy, as https://sim.example.org/impactd; every link begins with it"),
     FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
@@ -157,6 +158,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  .queue_most = settings->queue,
                                  .queue_bytes = settings->queue_bytes,
                                  .cache_bytes = settings->cache_bytes,
+                                 .store_bytes = settings->store_bytes,
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,

@@ -11,6 +11,8 @@
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
 
+enum { KNOWN_SHARE = 8 }; // of the cache's bytes, for ready answers
+
 Computation *computation_new(const char *result) {
     Computation *computation = calloc(1, sizeof *computation);
     if (computation == NULL)
@@ -56,16 +58,42 @@ void intake_release(Job *job) {
 }
 
 void intake_retire(Job *job) {
-    Intake *intake = job->intake;
     intake_release(job);
-    index_remove(intake->jobs, &job->indexed);
+    if (!job->is_live)
+        return;
+    job->is_live = false;
+    index_remove(job->intake->jobs, &job->indexed);
     job_drop(job);
+}
+
+void intake_settle(Intake *intake) {
+    if (--intake->posted == 0)
+        pthread_cond_broadcast(&intake->settled);
+}
+
+void intake_refuse(Job *job, Status status, const char *detail) {
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    job->row.state = JOB_FAILED;
+    wakers_call(&job->wakers);
+    wakers_call(&job->keepers);
+    intake_detach(job);
+    intake_retire(job);
+}
+
+void intake_withdraw(Job *job) {
+    if (job->ticket == NULL || !store_withdraw(job->intake->store, job->ticket))
+        return;
+    job->ticket = NULL;
+    intake_settle(job->intake);
+    job_drop(job); // the post's hold
 }
 
 void intake_drop(Intake *intake) {
     if (intake == NULL || atomic_fetch_sub(&intake->holds, 1) != 1)
         return;
     pthread_cond_destroy(&intake->work);
+    pthread_cond_destroy(&intake->settled);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
 }
@@ -120,6 +148,7 @@ void intake_attach(Job *job, Computation *computation) {
 void intake_admit(Intake *intake, Job *job) {
     job->scene_size = strlen(job->row.scene);
     index_add(intake->jobs, &job_hold(job)->indexed);
+    job->is_live = true;
     job->is_counted = true;
     intake->live++;
     intake->scene_bytes += job->scene_size;
@@ -147,13 +176,16 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
     pthread_cond_init(&intake->work, NULL);
+    pthread_cond_init(&intake->settled, NULL);
     intake->jobs = index_new();
     intake->in_flight = index_new();
     intake->cache = cache_new(settings->cache_bytes);
+    intake->known = known_new(settings->known_bytes > 0 ? settings->known_bytes
+                                                        : settings->cache_bytes / KNOWN_SHARE);
     intake->workers = calloc(settings->workers, sizeof *intake->workers);
     Status status = STATUS_OK;
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
-        intake->workers == NULL)
+        intake->known == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
@@ -199,6 +231,10 @@ void intake_close(Intake *intake) {
     pthread_mutex_unlock(&intake->lock);
     for (size_t i = 0; i < intake->worker_count; i++)
         pthread_join(intake->workers[i].thread, NULL);
+    pthread_mutex_lock(&intake->lock);
+    while (intake->posted > 0)
+        pthread_cond_wait(&intake->settled, &intake->lock);
+    pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
     while (intake->first != NULL) {
         Computation *computation = intake->first;
@@ -209,6 +245,7 @@ void intake_close(Intake *intake) {
     for (Job *job; (job = index_any(intake->jobs)) != NULL;)
         intake_retire(job);
     cache_free(intake->cache);
+    known_free(intake->known);
     index_free(intake->jobs);
     index_free(intake->in_flight);
     free(intake->workers);
@@ -231,6 +268,7 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     Job *job = job_new(NULL);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    job->is_kept = true;
     const Status status = store_job_load(intake->store, id, &job->row, problem);
     if (status != STATUS_OK) {
         job_drop(job);
@@ -238,13 +276,8 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     }
     ResultRow result = {0};
     if (job->row.state == JOB_SUCCESSFUL &&
-        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK) {
-        job->plan = result.plan;
-        job->summary = result.summary;
-        job->work = result.work;
-        job->notes = result.notes;
-        result.plan = result.summary = result.work = result.notes = NULL;
-    }
+        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK)
+        job->head = head_new(&result);
     result_row_clear(&result);
     *found = job;
     return STATUS_OK;
@@ -256,7 +289,23 @@ static Status refuse_finished(const char *id, int state, Problem *problem) {
                        job_state_names[state]);
 }
 
-// Live jobs only. The row is as it goes to the store.
+static void dismissed(void *context, Status status, const char *detail) {
+    Job *job = context;
+    Intake *intake = job->intake;
+    pthread_mutex_lock(&intake->lock);
+    job->is_kept = status == STATUS_OK;
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    // Until the store has it, the job is found here.
+    if (status == STATUS_OK)
+        intake_retire(job);
+    wakers_call(&job->keepers);
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    job_drop(job); // the post's hold
+}
+
+// Live jobs only: dismissed for all at once, and on its way to the store.
 static Status dismiss(Intake *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
@@ -269,15 +318,25 @@ static Status dismiss(Intake *intake, Job *job, Problem *problem) {
         job->row.run = 1e-9 * (double)(clock_monotonic_ns() - job->started_ns);
     job->row.finished_unix_ms = clock_unix_ms();
     job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
+    intake_withdraw(job);
+    job->is_closing = true;
+    job->closing = job->row;
+    job->closing.is_unsaved = !job->is_kept;
+    job->is_kept = false;
     intake_detach(job);
     intake_release(job);
+    const StoreDone done = {dismissed, job_hold(job)};
+    const Status status = store_job_update_post(intake->store, &job->closing, &done);
+    if (status == STATUS_OK) {
+        intake->posted++;
+    } else {
+        job->refusal = status;
+        text_fit(job->refused, sizeof job->refused, "no memory to save the job");
+        wakers_call(&job->keepers);
+        job_drop(job); // the post's hold
+    }
     wakers_call(&job->wakers);
     totals_ended(&intake->totals, JOB_DISMISSED, false);
-    pthread_mutex_unlock(&intake->lock);
-    // The row is final. Until the store has it, the job is found here.
-    TRY(store_job_update(intake->store, &job->row, problem));
-    pthread_mutex_lock(&intake->lock);
-    intake_retire(job);
     pthread_mutex_unlock(&intake->lock);
     return STATUS_OK;
 }
@@ -300,6 +359,46 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
     return STATUS_OK;
 }
 
+bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer) {
+    if (!known_answer(intake->known, intake->store, submission, intake_mark(intake), answer))
+        return false;
+    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+    return true;
+}
+
+// Both only rise: their sum is the same only while both are.
+uint64_t intake_mark(Intake *intake) {
+    return store_generation(intake->store) + atomic_load(&intake->deletions);
+}
+
+void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, Job *job,
+                  const char *text, size_t size, const JobSlots *slots) {
+    pthread_mutex_lock(&intake->lock);
+    JobRow row = job->row;
+    row.scene = NULL; // its result has it
+    // What it was made under may be no more: it would be dropped when it is found.
+    if (mark == intake_mark(intake))
+        known_put(intake->known, submission, mark, &row, text, size, slots);
+    pthread_mutex_unlock(&intake->lock);
+}
+
+void intake_forget(Intake *intake, const char *result) {
+    atomic_fetch_add(&intake->deletions, 1);
+    known_forget(intake->known, result);
+    pthread_mutex_lock(&intake->lock);
+    cache_forget(intake->cache, result);
+    pthread_mutex_unlock(&intake->lock);
+}
+
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
+    pthread_mutex_lock(&intake->lock);
+    *layers = (IntakeLayers){.in_memory = cache_has(intake->cache, result, false),
+                             .series_in_memory = cache_has(intake->cache, result, true)};
+    pthread_mutex_unlock(&intake->lock);
+    layers->in_database = store_result_exists(intake->store, result);
+    layers->series_in_database = store_series_exists(intake->store, result);
+}
+
 const Totals *intake_totals(const Intake *intake) {
     return &intake->totals;
 }
@@ -309,9 +408,15 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     *tally = (IntakeTally){.queued = intake->queued,
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
-                           .cached_outcomes = cache_count(intake->cache),
-                           .cached_bytes = cache_bytes(intake->cache)};
+                           .saving = intake->saving,
+                           .rows = intake->rows,
+                           .stored = intake->stored};
+    cache_tally(intake->cache, &tally->series, &tally->heads);
+    tally->cached_outcomes = tally->series.count;
+    tally->cached_bytes = tally->series.bytes;
+    known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->settings.workers; i++)
         tally->running += intake->workers[i].running != NULL;
     pthread_mutex_unlock(&intake->lock);
+    tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -15,6 +15,8 @@ typedef struct IntakeSettings {
     size_t queue_most;  // unfinished jobs at most
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
     size_t cache_bytes; // of finished outcomes in memory
+    size_t known_bytes; // of ready answers in memory; 0: an eighth of cache_bytes
+    size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -39,10 +41,40 @@ typedef struct Submission {
     const char *client; // its token's name; NULL: nobody in particular
 } Submission;
 
-// Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
-// (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
-// STATUS_INVALID with the faults. The Job is a hold of the caller's.
+// Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told
+// of it until it is kept (job_kept). Known results finish it at once (cached), a scene in flight
+// shares that computation. STATUS_BUSY when the queue is full, STATUS_INVALID with the faults. The
+// Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
+
+// What differs from job to job in the text of a known answer: offsets, each the place of so many
+// bytes. The job's id stands at `id` and `self` (JOB_ID_LENGTH).
+enum { JOB_SLOT_TIME = 24, JOB_SLOT_TOTAL = 8 };
+typedef struct JobSlots {
+    size_t id, self;
+    size_t created, started, finished; // JOB_SLOT_TIME, RFC 3339
+    size_t total;                      // JOB_SLOT_TOTAL, "0.000001" [s]
+} JobSlots;
+
+typedef struct KnownAnswer {
+    char *body; // the whole document, to be freed
+    size_t size;
+    char job[40];
+} KnownAnswer;
+
+// Answers a body that was answered before to the byte, under the catalogue as it is: a job of its
+// own that is finished at once, as jobs_create would. Without reading JSON, files or the database
+// and without waiting, some microseconds in all: fit for an event loop. False: submit it. Not for
+// requests with a query or an Idempotency-Key.
+bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer);
+// Under what an answer holds: to be read before the submission that is learnt.
+uint64_t intake_mark(Intake *intake);
+// Keeps the answer to a submission whose job was finished at once, for intake_known: `text` is the
+// document as it shall stand there, with anything in its slots.
+void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, Job *job,
+                  const char *text, size_t size, const JobSlots *slots);
+// A result was deleted: nothing is answered from it any more.
+void intake_forget(Intake *intake, const char *result);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
@@ -60,17 +92,36 @@ void dry_run_clear(DryRun *dry_run);
 // A job by its id, from memory or the store. STATUS_NOT_FOUND.
 Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// Dismisses; STATUS_CONFLICT if it is finished already.
+// Dismisses, for all at once and kept soon (job_kept); STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is
-// NULL and the return is STATUS_OK while it is being computed: `waker` is then called once when it
-// is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
+// The series-bearing Outcome of a result: from memory, from the database where it is kept (its
+// plan, summary and warnings are empty then), or computed anew by a worker. *outcome is NULL and
+// the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
+// asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
 
+// One layer of what is known.
+typedef struct LayerTally {
+    uint64_t hits, misses, evictions;
+    size_t count, bytes, most_bytes;
+} LayerTally;
+
+// Where a result is known.
+typedef struct IntakeLayers {
+    bool in_memory, in_database, series_in_memory, series_in_database;
+} IntakeLayers;
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers);
+
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
+    size_t saving;     // computations that have run and are not yet in the store
+    LayerTally known;  // whole answers, by body
+    LayerTally heads;  // in memory, by result: plan, summary, work and notes
+    LayerTally series; // in memory, by result; its bytes are those of both
+    LayerTally rows;   // results in the database: those found there and not
+    LayerTally stored; // series in the database
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
 // What was done since the start; counted on.

@@ -1,58 +1,84 @@
-// How a scene becomes a job that is durable before anyone hears of it: known results finish it at
-// once, equal scenes in flight share one computation, and jobs of an earlier life of the daemon
-// come in by the same way.
+// How a scene becomes a job. Its row is on the way to the store while it is computed already;
+// nobody hears of it before the store has it. Known results finish it at once, equal scenes in
+// flight share one computation, and jobs of an earlier life of the daemon come in by the same way.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/intake_state.h"
+#include "server/jobs/job_id.h"
 
-static Status make_id(char id[40]) {
-    unsigned char bytes[12];
-    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
-        return STATUS_INTERNAL;
-    size_t at = (size_t)snprintf(id, 40, "j-");
-    for (size_t i = 0; i < sizeof bytes; i++)
-        at += (size_t)snprintf(id + at, 40 - at, "%02x", (unsigned)bytes[i]);
-    return STATUS_OK;
+// With the lock held: one of this scene that is under way, to be shared. One for readers alone
+// saves nothing.
+static Computation *find_shared(const Intake *intake, const char *result) {
+    Computation *computation = index_find(intake->in_flight, result);
+    return computation != NULL && computation->is_again ? NULL : computation;
 }
 
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
 static Status find_known(Intake *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
-    Outcome *outcome = cache_find(intake->cache, job->row.result);
+    job->head = cache_head(intake->cache, job->row.result);
+    // What is in flight is not there either.
+    const bool is_new = job->head == NULL && find_shared(intake, job->row.result) != NULL;
     pthread_mutex_unlock(&intake->lock);
-    if (outcome != NULL) {
-        Bytes plan = {0}, summary = {0}, work = {0}, notes = {0};
-        document_plan(&plan, &outcome->plan);
-        document_summary(&summary, &outcome->summary);
-        document_work(&work, &outcome->work);
-        document_warnings(&notes, &outcome->warnings);
-        job->plan = bytes_take(&plan, NULL);
-        job->summary = bytes_take(&summary, NULL);
-        job->work = bytes_take(&work, NULL);
-        job->notes = bytes_take(&notes, NULL);
-        outcome_drop(outcome);
+    if (job->head != NULL)
         return STATUS_OK;
-    }
+    if (is_new)
+        return STATUS_NOT_FOUND;
     ResultRow row = {0};
     const Status status = store_result_head(intake->store, job->row.result, &row, NULL);
-    if (status == STATUS_OK) {
-        job->plan = row.plan;
-        job->summary = row.summary;
-        job->work = row.work;
-        job->notes = row.notes;
-        row.plan = row.summary = row.work = row.notes = NULL;
-    }
+    if (status == STATUS_OK)
+        job->head = head_new(&row);
     result_row_clear(&row);
+    pthread_mutex_lock(&intake->lock);
+    intake->rows.hits += status == STATUS_OK;
+    intake->rows.misses += status == STATUS_NOT_FOUND;
+    if (job->head != NULL)
+        cache_put(intake->cache, job->row.result, NULL, job->head);
+    pthread_mutex_unlock(&intake->lock);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)
         return status;
     return problem_set(problem, status, "the results could not be searched");
+}
+
+// The store has answered that it was accepted.
+static void opened(void *context, Status status, const char *detail) {
+    Job *job = context;
+    Intake *intake = job->intake;
+    pthread_mutex_lock(&intake->lock);
+    job->ticket = NULL;
+    // What closes it saves the whole, and tells.
+    if (!job->is_closing) {
+        free(job->row.scene);
+        job->row.scene = NULL;
+    }
+    if (!job->is_closing && status != STATUS_OK)
+        intake_refuse(job, status, detail);
+    if (status == STATUS_OK && (!job->is_closing || !job_state_is_final(job->row.state))) {
+        job->is_kept = true;
+        wakers_call(&job->keepers);
+    }
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    job_drop(job); // the post's hold
+}
+
+// With the lock held.
+static Status post(Intake *intake, Job *job, Problem *problem) {
+    const StoreDone done = {opened, job_hold(job)};
+    job->opening = job->row;
+    const Status status = store_job_post(intake->store, &job->opening, &done, &job->ticket);
+    if (status == STATUS_OK) {
+        intake->posted++;
+        return STATUS_OK;
+    }
+    job_drop(job); // the post's hold
+    return problem_set(problem, status, "no memory for a job");
 }
 
 static Status finish_known(Intake *intake, Job *job, Problem *problem) {
@@ -61,45 +87,41 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    TRY(store_job_add(intake->store, row, problem));
-    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
-    return STATUS_OK;
-}
-
-// Room in the queue, or why there is none; the job counts from here on.
-static Status enter(Intake *intake, Job *job, Problem *problem) {
-    Status status = STATUS_OK;
+    // That a known answer was given once more need not wait for the disk.
+    if (store_job_late(intake->store, row)) {
+        job->is_kept = true;
+        totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+        return STATUS_OK;
+    }
     pthread_mutex_lock(&intake->lock);
-    if (intake->is_closing)
-        status = problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    else if (intake->live >= intake->settings.queue_most)
-        status = problem_set(problem, STATUS_BUSY,
-                             "the queue is full: %zu jobs are unfinished, %zu are allowed",
-                             intake->live, intake->settings.queue_most);
-    else if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
-        status = problem_set(problem, STATUS_BUSY,
-                             "the queue is full: %zu bytes of scenes wait, %zu are allowed",
-                             intake->scene_bytes, intake->settings.queue_bytes);
-    else
-        intake_admit(intake, job);
+    const Status status = post(intake, job, problem);
     pthread_mutex_unlock(&intake->lock);
+    if (status == STATUS_OK)
+        totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
     return status;
 }
 
-static void leave(Intake *intake, Job *job) {
-    pthread_mutex_lock(&intake->lock);
-    intake_retire(job);
-    pthread_mutex_unlock(&intake->lock);
+// With the lock held: whether there is room in the queue.
+static Status find_room(const Intake *intake, const Job *job, Problem *problem) {
+    if (intake->is_closing)
+        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    if (intake->live >= intake->settings.queue_most)
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: %zu jobs are unfinished, %zu are allowed",
+                           intake->live, intake->settings.queue_most);
+    if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: %zu bytes of scenes wait, %zu are allowed",
+                           intake->scene_bytes, intake->settings.queue_bytes);
+    return STATUS_OK;
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Computation *begin(const char *result, Inquiry *inquiry, const char *warnings) {
-    Computation *computation = computation_new(result);
-    Bytes scene = {0};
+static Computation *begin(const JobRow *row, Inquiry *inquiry) {
+    Computation *computation = computation_new(row->result);
     if (computation != NULL) {
-        document_scene(&scene, inquiry);
-        computation->scene = bytes_take(&scene, NULL);
-        computation->warnings = strdup(warnings);
+        computation->scene = strdup(row->scene);
+        computation->warnings = strdup(row->warnings);
         computation->inquiry = *inquiry;
         *inquiry = (Inquiry){0};
         if (computation->scene != NULL && computation->warnings != NULL)
@@ -110,25 +132,31 @@ static Computation *begin(const char *result, Inquiry *inquiry, const char *warn
     return NULL;
 }
 
-// Takes the inquiry unless the computation is under way already.
+// Queues it, or lets it share what is under way. Takes the inquiry.
 static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
-    Status status = STATUS_OK;
+    Computation *computation = begin(&job->row, inquiry);
+    if (computation == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
-    Computation *computation = index_find(intake->in_flight, job->row.result);
-    // It may have been dismissed meanwhile, by whoever saw it in the store.
-    if (!job_state_is_final(job->row.state)) {
-        if (computation == NULL &&
-            (computation = begin(job->row.result, inquiry, job->row.warnings)) != NULL)
-            intake_enqueue(intake, computation, false);
-        if (computation != NULL)
-            intake_attach(job, computation);
-        else
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    Computation *other = find_shared(intake, job->row.result);
+    // It may have become known meanwhile.
+    if (other == NULL && (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
+        pthread_mutex_unlock(&intake->lock);
+        computation_free(computation);
+        return finish_known(intake, job, problem);
     }
-    // The store has it, and the computation.
-    free(job->row.scene);
-    job->row.scene = NULL;
+    Status status = find_room(intake, job, problem);
+    if (status == STATUS_OK)
+        status = post(intake, job, problem);
+    if (status == STATUS_OK) {
+        intake_admit(intake, job);
+        if (other == NULL)
+            intake_enqueue(intake, computation, false);
+        intake_attach(job, other != NULL ? other : computation);
+    }
     pthread_mutex_unlock(&intake->lock);
+    if (status != STATUS_OK || other != NULL)
+        computation_free(computation);
     return status;
 }
 
@@ -137,9 +165,8 @@ static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warning
     JobRow *row = &job->row;
     const char *title = inquiry->simulation.title;
     Bytes scene = {0}, told = {0};
-    TRY(make_id(row->id) == STATUS_OK
-            ? STATUS_OK
-            : problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id"));
+    if (!job_id_make(row->id))
+        return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
     job->indexed.key = row->id;
     row->created_unix_ms = clock_unix_ms();
     intake_result_id(inquiry, row->result);
@@ -168,16 +195,7 @@ static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *proble
         return finish_known(intake, job, problem);
     if (known != STATUS_NOT_FOUND)
         return known;
-    TRY(enter(intake, job, problem));
-    Status status = store_job_add(intake->store, &job->row, problem);
-    if (status == STATUS_OK && (status = start(intake, job, inquiry, problem)) != STATUS_OK) {
-        // The client is told that it was refused: the next start must not run it all the same.
-        fail_row(&job->row, problem);
-        (void)store_job_update(intake->store, &job->row, NULL);
-    }
-    if (status != STATUS_OK)
-        leave(intake, job);
-    return status;
+    return start(intake, job, inquiry, problem);
 }
 
 Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
@@ -212,7 +230,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
     intake_result_id(inquiry, row->result);
     if (job != NULL && row->result[0] != '\0' &&
         (computation = index_find(intake->in_flight, row->result)) == NULL &&
-        (computation = begin(row->result, inquiry, row->warnings)) != NULL)
+        (computation = begin(row, inquiry)) != NULL)
         intake_enqueue(intake, computation, false);
     if (computation == NULL) {
         job_drop(job);
@@ -223,6 +241,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
     job->submitted_ns = clock_monotonic_ns() - (age_ms > 0 ? age_ms : 0) * 1000000;
     job->row = *row;
     *row = (JobRow){0};
+    job->is_kept = true;
     job->row.state = JOB_ACCEPTED;
     job->indexed.key = job->row.id;
     intake_admit(intake, job);
@@ -270,10 +289,6 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
     intake_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
     TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    pthread_mutex_lock(&intake->lock);
-    Outcome *outcome = cache_find(intake->cache, dry_run->result);
-    pthread_mutex_unlock(&intake->lock);
-    dry_run->is_cached = outcome != NULL || store_result_exists(intake->store, dry_run->result);
-    outcome_drop(outcome);
+    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
     return STATUS_OK;
 }

@@ -3,6 +3,8 @@
 #ifndef SERVER_STORE_ACCESS_H
 #define SERVER_STORE_ACCESS_H
 
+#include <stdatomic.h>
+
 #include "server/store/database.h"
 #include "server/store/row.h"
 #include "server/store/store.h"
@@ -14,6 +16,18 @@ typedef Status StoreApply(Database *database, const void *work, Problem *problem
 // Has `apply` done within the next transaction and returns when that is durable, or with what went
 // wrong; a failed apply leaves no trace.
 Status store_write(Store *store, StoreApply *apply, const void *work, Problem *problem);
+
+// The same without waiting: `done` is told. `size` bytes of `work` are copied; 0: it is borrowed
+// until then. *ticket (may be NULL) is set before `done` can be told. STATUS_NO_MEMORY: nothing was
+// queued.
+Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
+                  const StoreDone *done, StoreTicket **ticket);
+
+// The same when nothing else is queued; `work` is borrowed until then.
+Status store_post_low(Store *store, StoreApply *apply, const void *work, const StoreDone *done);
+
+atomic_uint_fast64_t *store_evictions(Store *store); // of series
+struct Late *store_late(Store *store);               // NULL: its database is in memory
 
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);

@@ -4,10 +4,12 @@
 #include <string.h>
 
 #include "server/store/job_rows.h"
+#include "server/store/late.h"
+#include "server/store/pack.h"
 #include "server/store/store.h"
 
 // clang-format off
-static const RowColumn job_columns[] = {
+const RowColumn job_columns[] = {
     ROW_COLUMN(JobRow, id, COLUMN_NAME),
     ROW_COLUMN(JobRow, state, COLUMN_CHOICE),
     ROW_COLUMN(JobRow, result, COLUMN_NAME),
@@ -46,12 +48,20 @@ static Status not_found(const char *id, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", id);
 }
 
+// The scene of a successful job is its result's.
+#define JOB_INSERT                                                                                 \
+    "INSERT INTO jobs (" JOB_SHORT                                                                 \
+    ", scene) VALUES (:id, :state, :result, :is_cached, :created_unix_ms, "                        \
+    ":started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, :problem, :warnings, "    \
+    "CASE :state WHEN 2 THEN '' ELSE coalesce(:scene, '') END)"
+#define JOB_CHANGE                                                                                 \
+    "SET state = :state, result = :result, is_cached = :is_cached, "                               \
+    "started_unix_ms = :started_unix_ms, finished_unix_ms = :finished_unix_ms, "                   \
+    "queued = :queued, run = :run, total = :total, problem = :problem, "                           \
+    "scene = CASE :state WHEN 2 THEN '' ELSE scene END"
+
 static Status add(Database *database, const void *work, Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO jobs (" JOB_SHORT
-        ", scene) VALUES (:id, :state, :result, :is_cached, :created_unix_ms, "
-        ":started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, :problem, :warnings, "
-        "CASE :state WHEN 2 THEN '' ELSE :scene END)"; // its result has it
+    static const char sql[] = JOB_INSERT;
     return database_change(database, sql, job_columns, work, NULL, problem);
 }
 
@@ -59,25 +69,61 @@ Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
     return store_write(store, add, row, problem);
 }
 
-Status job_row_update(Database *database, const JobRow *row, Problem *problem) {
-    static const char sql[] = "UPDATE jobs SET state = :state, result = :result, is_cached = "
-                              ":is_cached, started_unix_ms = :started_unix_ms, "
-                              "finished_unix_ms = :finished_unix_ms, queued = :queued, run = :run, "
-                              "total = :total, problem = :problem, "
-                              // Its result has it.
-                              "scene = CASE :state WHEN 2 THEN '' ELSE scene END "
-                              "WHERE id = :id";
+Status store_job_post(Store *store, const JobRow *row, const StoreDone *done,
+                      StoreTicket **ticket) {
+    return store_post(store, add, row, 0, done, ticket);
+}
+
+Status job_row_save(Database *database, const JobRow *row, Problem *problem) {
+    static const char change_sql[] = "UPDATE jobs " JOB_CHANGE " WHERE id = :id";
+    static const char put_sql[] = JOB_INSERT " ON CONFLICT (id) DO UPDATE " JOB_CHANGE;
     int changes;
-    TRY(database_change(database, sql, job_columns, row, &changes, problem));
+    TRY(database_change(database, row->is_unsaved ? put_sql : change_sql, job_columns, row,
+                        &changes, problem));
     return changes > 0 ? STATUS_OK : not_found(row->id, problem);
 }
 
-static Status update(Database *database, const void *work, Problem *problem) {
-    return job_row_update(database, work, problem);
+static Status save(Database *database, const void *work, Problem *problem) {
+    return job_row_save(database, work, problem);
 }
 
 Status store_job_update(Store *store, const JobRow *row, Problem *problem) {
-    return store_write(store, update, row, problem);
+    return store_write(store, save, row, problem);
+}
+
+Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done) {
+    return store_post(store, save, row, 0, done, NULL);
+}
+
+typedef struct Batch {
+    const void *const *at;
+    size_t count;
+} Batch;
+
+static Status add_rows(Database *database, const void *work, Problem *problem) {
+    static const char sql[] = JOB_INSERT " ON CONFLICT DO NOTHING";
+    const Batch *rows = work;
+    for (size_t i = 0; i < rows->count; i++)
+        TRY(database_change(database, sql, job_columns, rows->at[i], NULL, problem));
+    return STATUS_OK;
+}
+
+Status job_rows_add(Store *store, const void *const *rows, size_t count, Problem *problem) {
+    return store_write(store, add_rows, &(Batch){rows, count}, problem);
+}
+
+bool store_job_late(Store *store, const JobRow *row) {
+    return store_late(store) != NULL && late_add(store_late(store), row);
+}
+
+void store_job_settle(Store *store) {
+    if (store_late(store) != NULL)
+        late_flush(store_late(store));
+}
+
+bool job_row_copy(const JobRow *row, JobRow *copy) {
+    *copy = *row;
+    return pack_own(job_columns, copy);
 }
 
 typedef struct Key {
@@ -91,6 +137,10 @@ Status store_job_load(Store *store, const char *id, JobRow *row, Problem *proble
     static const char sql[] = "SELECT " JOB_SHORT " FROM jobs WHERE id = :id";
     const Key key = {(char *)id, 0};
     bool is_found;
+    memset(row, 0, sizeof *row);
+    // It is there until the database has it, so this is the order to look in.
+    if (store_late(store) != NULL && late_find(store_late(store), id, row))
+        return STATUS_OK;
     memset(row, 0, sizeof *row);
     TRY(store_first(store, sql, key_columns, &key, job_columns, row, &is_found, problem));
     return is_found ? STATUS_OK : not_found(id, problem);

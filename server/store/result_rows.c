@@ -47,13 +47,19 @@ static Status finish(Database *database, const void *work, Problem *problem) {
     if (both->result != NULL)
         TRY(database_change(database, sql, result_columns, both->result, NULL, problem));
     for (size_t i = 0; i < both->job_count; i++)
-        TRY(job_row_update(database, both->jobs[i], problem));
+        TRY(job_row_save(database, both->jobs[i], problem));
     return STATUS_OK;
 }
 
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem) {
     return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
+}
+
+Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, const StoreDone *done) {
+    const Finish work = {result, jobs, job_count};
+    return store_post(store, finish, &work, sizeof work, done, NULL);
 }
 
 typedef struct Key {
@@ -94,4 +100,31 @@ bool store_result_exists(Store *store, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
     return load(store, sql, id, &row, NULL) == STATUS_OK;
+}
+
+typedef struct Recent {
+    uint64_t most, scene_most;
+} Recent;
+static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
+                                           ROW_COLUMN(Recent, scene_most, COLUMN_COUNT), ROW_END};
+
+Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+                           Problem *problem) {
+    static const char sql[] =
+        "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
+        "WHERE length(scene) <= :scene_most";
+    void *at;
+    const Status status = store_all(store, sql, recent_columns, &(Recent){most, scene_most},
+                                    result_columns, sizeof *rows->at, &at, &rows->count, problem);
+    rows->at = at;
+    if (status != STATUS_OK)
+        result_rows_clear(rows);
+    return status;
+}
+
+void result_rows_clear(ResultRows *rows) {
+    for (size_t i = 0; i < rows->count; i++)
+        result_row_clear(&rows->at[i]);
+    free(rows->at);
+    *rows = (ResultRows){0};
 }

@@ -23,6 +23,23 @@ Status store_open(const char *directory, Store **store, Problem *problem);
 Status store_open_beside(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
 
+// Writes are called "posted" where nobody waits for them. They are done in the order in which they
+// were posted, some at a time. `call` comes once, from the writer's thread, when the write is
+// durable or has failed (then with the reason), and must be quick; it may post.
+typedef struct StoreDone {
+    void (*call)(void *context, Status status, const char *detail);
+    void *context;
+} StoreDone;
+typedef struct StoreTicket StoreTicket; // lives until `call` returns
+// True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
+bool store_withdraw(Store *store, StoreTicket *ticket);
+
+// Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
+// material's head, a review, a record. Whoever writes those calls store_catalogue_changed once it
+// is durable.
+uint64_t store_generation(Store *store);
+void store_catalogue_changed(Store *store);
+
 // What was written since the start; counted on.
 typedef struct StoreTotals {
     Counter writes, rows, errors;
@@ -57,12 +74,24 @@ typedef struct JobRow {
     double queued, run, total; // [s]
     char *scene;               // canonical JSON, resolved
     char *problem, *warnings, *title;
+    bool is_unsaved; // no column: the store may not have it yet, so that saving it adds it
 } JobRow;
 void job_row_clear(JobRow *row);
+// With texts of its own; false without memory, and then it has none.
+bool job_row_copy(const JobRow *row, JobRow *copy);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
-// State, is_cached, times, problem, result. STATUS_NOT_FOUND.
+// The same, posted; `row` is borrowed until then.
+Status store_job_post(Store *store, const JobRow *row, const StoreDone *done, StoreTicket **ticket);
+// The same behind the answer, for a finished job that computed nothing: found by its id at once, in
+// the database some 20 ms later. A killed process loses none, a power failure may lose the last
+// ones. False where there is no room for it now: it is to be added the usual way.
+bool store_job_late(Store *store, const JobRow *row);
+// Returns when those are in the database, or could not be written: before they are listed.
+void store_job_settle(Store *store);
+// State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status store_job_update(Store *store, const JobRow *row, Problem *problem);
+Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done);
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
@@ -94,11 +123,32 @@ void result_row_clear(ResultRow *row);
 // stays as it is.
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem);
+// The same, posted; all of it is borrowed until then.
+Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, const StoreDone *done);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
+// Id, engine and scene of the newest ones, newest first, without scenes longer than that.
+typedef struct ResultRows {
+    ResultRow *at;
+    size_t count;
+} ResultRows;
+Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+                           Problem *problem);
+void result_rows_clear(ResultRows *rows);
+
+// Series of results as bytes, at most `most` of them in all: the longest unused make room. Posted
+// behind all else that is to be written. Takes `body`, which is to be freed, also when it fails.
+Status store_series_post(Store *store, const char *result, char *body, size_t size, uint64_t most,
+                         const StoreDone *done);
+// *body is to be freed. STATUS_NOT_FOUND.
+Status store_series_load(Store *store, const char *result, char **body, size_t *size,
+                         Problem *problem);
+bool store_series_exists(Store *store, const char *result);
+void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
 #endif

@@ -78,7 +78,21 @@ static Status submit_text(Intake *intake, const char *text, Job **job, Problem *
     return intake_submit(intake, &submission, job, told);
 }
 
-static Job *submit(Room *room, double displacement, double duration) {
+static const struct timespec moment = {0, 1000000};
+
+static Status wait_until_kept(Job *job, Problem *told) {
+    bool is_kept = false;
+    Status status = STATUS_OK;
+    for (int i = 0; i < 60000 && status == STATUS_OK && !is_kept; i++) {
+        status = job_kept(job, &is_kept, told);
+        if (!is_kept)
+            nanosleep(&moment, NULL);
+    }
+    assert_true(is_kept || status != STATUS_OK);
+    return status;
+}
+
+static Job *submit_unkept(Room *room, double displacement, double duration) {
     char text[1024];
     Job *job = NULL;
     scene_text(text, displacement, duration, "sponge");
@@ -88,8 +102,14 @@ static Job *submit(Room *room, double displacement, double duration) {
     return job;
 }
 
+static Job *submit(Room *room, double displacement, double duration) {
+    Job *job = submit_unkept(room, displacement, duration);
+    if (wait_until_kept(job, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return job;
+}
+
 static void wait_for(Job *job) {
-    const struct timespec moment = {0, 1000000};
     for (int i = 0; i < 60000 && !job_is_finished(job); i++)
         nanosleep(&moment, NULL);
     assert_true(job_is_finished(job));
@@ -174,7 +194,6 @@ static void a_dismissed_job_stops_and_stays_dismissed(void **state) {
     Job *running = submit(&room, 0.001, 30000), *queued = submit(&room, 0.002, 30000),
         *again = NULL;
     JobShow a = show(running), b = show(queued);
-    const struct timespec moment = {0, 5000000};
     for (int i = 0; i < 2000 && a.state != JOB_RUNNING; i++) {
         nanosleep(&moment, NULL);
         job_show_clear(&a);
@@ -256,7 +275,6 @@ static Outcome *outcome_of(Room *room, const char *result) {
     atomic_int wakes;
     atomic_init(&wakes, 0);
     const Waker waker = {&wakes, note_wake};
-    const struct timespec moment = {0, 1000000};
     Outcome *outcome = NULL;
     for (int i = 0; i < 20000; i++) {
         const int seen = atomic_load(&wakes);
@@ -362,7 +380,6 @@ static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **s
     (void)state;
     Room room = room_make(1);
     Job *job = submit_study(&room, 1000), *gone = NULL;
-    const struct timespec moment = {0, 1000000};
     JobShow now = show(job);
     for (int i = 0; i < 60000 && now.progress <= 5; i++) { // beyond the scene's own run
         nanosleep(&moment, NULL);
@@ -441,10 +458,164 @@ static void names_are_resolved_and_all_faults_told(void **state) {
     room_end(&room);
 }
 
+// A document like the API's.
+static const char known_text[] =
+    "{\"id\": \"j-34567890123456789012345678901\", \"created\": \"2026-11-21T09:00:00.000Z\", "
+    "\"started\": \"2026-11-21T09:00:00.000Z\", \"finished\": \"2026-11-21T09:00:00.000Z\", "
+    "\"total\": 0.000000, \"self\": \"/v1/jobs/j-34567890123456789012345678901x\"}";
+
+static JobSlots known_slots(void) {
+    const size_t created = (size_t)(strstr(known_text, "2026") - known_text);
+    const size_t started = (size_t)(strstr(known_text, "started") - known_text) + 11;
+    const size_t finished = (size_t)(strstr(known_text, "finished") - known_text) + 12;
+    return (JobSlots){.id = 8,
+                      .created = created,
+                      .started = started,
+                      .finished = finished,
+                      .total = (size_t)(strstr(known_text, "0.000000") - known_text),
+                      .self = (size_t)(strstr(known_text, "/v1/jobs/") - known_text) + 9};
+}
+
+// Submits a scene that is known and has its answer learnt.
+static void learn(Room *room, const char *text) {
+    const Submission submission = {.text = text, .size = strlen(text)};
+    const JobSlots slots = known_slots();
+    const uint64_t mark = intake_mark(room->intake);
+    Job *job = NULL;
+    assert_int_equal(intake_submit(room->intake, &submission, &job, NULL), STATUS_OK);
+    if (job_is_finished(job))
+        intake_learn(room->intake, &submission, mark, job, known_text, sizeof known_text - 1,
+                     &slots);
+    job_drop(job);
+}
+
+static void a_known_body_is_answered_with_a_job_of_its_own(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    char text[1024];
+    KnownAnswer answer, other;
+    scene_text(text, 0.015, 2, "sponge");
+    const Submission submission = {.text = text, .size = strlen(text)};
+    Job *job = submit(&room, 0.015, 2), *found = NULL;
+    wait_for(job);
+    assert_false(intake_known(room.intake, &submission, &answer));
+    learn(&room, text);
+    assert_true(intake_known(room.intake, &submission, &answer));
+    assert_true(intake_known(room.intake, &submission, &other));
+    assert_int_equal(answer.size, strlen(answer.body));
+    assert_int_equal(answer.size, sizeof known_text - 1);
+    assert_true(strcmp(answer.job, other.job) < 0);
+    assert_memory_equal(answer.body + 8, answer.job, 32);
+    assert_non_null(strstr(answer.body, "\"/v1/jobs/j-"));
+    assert_memory_equal(strstr(answer.body, "/v1/jobs/") + 9, answer.job, 32);
+    assert_null(strstr(answer.body, "2026-11-21T09:00:00.000Z"));
+    assert_int_equal(intake_find(room.intake, answer.job, &found, &problem), STATUS_OK);
+    JobShow first = show(job), now = show(found);
+    assert_true(now.is_cached && now.state == JOB_SUCCESSFUL);
+    assert_string_equal(now.result, first.result);
+    assert_string_equal(now.summary, first.summary);
+    job_drop(found);
+    // A name may mean something else now.
+    store_catalogue_changed(room.store);
+    free(other.body);
+    assert_false(intake_known(room.intake, &submission, &other));
+    learn(&room, text);
+    assert_true(intake_known(room.intake, &submission, &other));
+    free(other.body);
+    intake_forget(room.intake, first.result);
+    assert_false(intake_known(room.intake, &submission, &other));
+    IntakeTally tally;
+    intake_tally(room.intake, &tally);
+    assert_int_equal(tally.known.hits, 3);
+    assert_int_equal(tally.known.count, 0);
+    room_close(&room);
+    room_open(&room);
+    assert_int_equal(intake_find(room.intake, answer.job, &found, &problem), STATUS_OK);
+    free(answer.body);
+    job_show_clear(&first);
+    job_show_clear(&now);
+    job_drop(found);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void change_engine(const Room *room) {
+    char path[128];
+    Database *other;
+    snprintf(path, sizeof path, "%s/impactd.db", room->directory);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(
+        database_execute(other, "UPDATE results SET engine = 'an earlier one'", &problem),
+        STATUS_OK);
+    database_close(other);
+}
+
+static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    room_close(&room);
+    room.settings.store_bytes = 1 << 26;
+    room_open(&room);
+    // Few samples of a long run, and none at all.
+    static const char dear[] =
+        "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"dampers\": [{\"mass\": 0.1107, "
+        "\"clearance\": 0.015, \"buffer\": \"aluminium\"}], \"excitation\": {\"kind\": \"sine\", "
+        "\"frequency\": 1, \"amplitude\": 1}, \"duration\": 20000, \"sample_rate\": 1}";
+    static const char none_asked[] =
+        "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"excitation\": {\"kind\": "
+        "\"free\", \"displacement\": 0.01}, \"duration\": 20, \"sample_rate\": 100, "
+        "\"output\": {\"channels\": []}}";
+    const char *const texts[] = {dear, none_asked};
+    char results[2][72];
+    Outcome *before = NULL, *after = NULL, *none = NULL;
+    for (size_t i = 0; i < 2; i++) {
+        Job *job = NULL;
+        problem_clear(&problem);
+        if (submit_text(room.intake, texts[i], &job, &problem) != STATUS_OK)
+            fail_msg("%s", problem.detail);
+        wait_for(job);
+        JobShow now = show(job);
+        assert_int_equal(now.state, JOB_SUCCESSFUL);
+        strcpy(results[i], now.result);
+        job_show_clear(&now);
+        job_drop(job);
+    }
+    before = outcome_of(&room, results[0]);
+    for (int i = 0; i < 10000 && !store_series_exists(room.store, results[0]); i++)
+        nanosleep(&moment, NULL);
+    assert_true(store_series_exists(room.store, results[0]));
+    assert_false(store_series_exists(room.store, results[1]));
+    room_close(&room);
+    change_engine(&room);
+    room_open(&room);
+    after = outcome_of(&room, results[0]);
+    assert_true(after != before);
+    assert_int_equal(after->response.count, before->response.count);
+    assert_memory_equal(after->response.series.block, before->response.series.block,
+                        before->response.series.count * before->response.series.rows *
+                            sizeof(double));
+    assert_int_equal(after->response.impacts.count, before->response.impacts.count);
+    const Waker waker = {NULL, note_wake};
+    problem_clear(&problem);
+    assert_int_equal(intake_outcome(room.intake, results[1], &waker, &none, &problem), STATUS_GONE);
+    assert_non_null(strstr(problem.detail, "/manifest to /v1/jobs"));
+    // Its documents were not kept with it, nor are they looked for there.
+    Job *again = NULL;
+    assert_int_equal(submit_text(room.intake, dear, &again, &problem), STATUS_OK);
+    JobShow now = show(again);
+    assert_true(now.is_cached);
+    assert_non_null(strstr(now.summary, "\"impacts\": "));
+    job_show_clear(&now);
+    job_drop(again);
+    outcome_drop(before);
+    outcome_drop(after);
+    room_end(&room);
+}
+
 typedef struct Hammer {
     Room *room;
     unsigned seed;
-    int finished, dismissed;
+    int finished, dismissed, known, lost;
 } Hammer;
 
 // Submits from a few scenes, dismisses some, asks for outcomes; every job ends in one state.
@@ -473,6 +644,19 @@ static void *hammer(void *context) {
         if (job_show(job, &now) == STATUS_OK && now.state == JOB_SUCCESSFUL)
             (void)intake_outcome(own->room->intake, now.result, &waker, &outcome, fault);
         own->finished++;
+        learn(own->room, text);
+        const Submission submission = {.text = text, .size = strlen(text)};
+        KnownAnswer answer;
+        if (intake_known(own->room->intake, &submission, &answer)) {
+            Job *known = NULL;
+            own->known++;
+            if (intake_find(own->room->intake, answer.job, &known, fault) != STATUS_OK)
+                own->lost++;
+            job_drop(known);
+            free(answer.body);
+        }
+        if (rand_r(&own->seed) % 8 == 0)
+            store_catalogue_changed(own->room->store);
         outcome_drop(outcome);
         job_show_clear(&now);
         job_drop(job);
@@ -487,7 +671,7 @@ static void many_clients_at_once_leave_nothing_behind(void **state) {
     Room room = room_make(3);
     Hammer hammers[6];
     pthread_t threads[6];
-    int finished = 0;
+    int finished = 0, known = 0;
     for (unsigned i = 0; i < 6; i++) {
         hammers[i] = (Hammer){.room = &room, .seed = i + 1};
         assert_int_equal(pthread_create(&threads[i], NULL, hammer, &hammers[i]), 0);
@@ -495,8 +679,11 @@ static void many_clients_at_once_leave_nothing_behind(void **state) {
     for (int i = 0; i < 6; i++) {
         pthread_join(threads[i], NULL);
         finished += hammers[i].finished;
+        known += hammers[i].known;
+        assert_int_equal(hammers[i].lost, 0);
     }
     assert_int_equal(finished, 360);
+    assert_true(known > 0);
     JobRows rows = {NULL, 0};
     assert_int_equal(store_job_unfinished(room.store, &rows, &problem), STATUS_OK);
     assert_int_equal(rows.count, 0);
@@ -543,6 +730,96 @@ static void a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost(v
     assert_int_equal(second.state, JOB_SUCCESSFUL);
     job_show_clear(&second);
     job_show_clear(&failed);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void a_job_that_cannot_be_kept_never_was(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    signal(SIGXFSZ, SIG_IGN);
+    limit_files(1);
+    Job *job = submit_unkept(&room, 0.015, 20000), *found = NULL;
+    problem_clear(&problem);
+    assert_int_equal(wait_until_kept(job, &problem), STATUS_IO);
+    assert_non_null(strstr(problem.detail, "impactd.db"));
+    Job *quick = submit_unkept(&room, 0.016, 0.1);
+    problem_clear(&problem);
+    assert_int_equal(wait_until_kept(quick, &problem), STATUS_IO);
+    limit_files(RLIM_INFINITY);
+    Job *const both[] = {job, quick};
+    for (size_t i = 0; i < 2; i++) {
+        JobShow now = show(both[i]);
+        assert_true(job_is_finished(both[i]));
+        assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_NOT_FOUND);
+        assert_false(store_result_exists(room.store, now.result));
+        job_show_clear(&now);
+        job_drop(both[i]);
+    }
+    // Its place is free, and nobody computes for it: 20,000 s would take long.
+    Job *next = submit(&room, 0.017, 1);
+    wait_for(next);
+    job_drop(next);
+    IntakeTally tally;
+    intake_tally(room.intake, &tally);
+    assert_int_equal(tally.queued + tally.running, 0);
+    room_end(&room);
+}
+
+static void a_job_that_is_done_before_it_was_written_is_written_once(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    char path[128];
+    Database *other;
+    snprintf(path, sizeof path, "%s/impactd.db", room.directory);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    // The first one's row holds the writer up; the others' are still queued when they are done.
+    Job *jobs[4];
+    for (size_t i = 0; i < 4; i++)
+        jobs[i] = submit_unkept(&room, 0.001 * (double)(i + 1), 0.5);
+    for (int i = 0; i < 300; i++)
+        nanosleep(&moment, NULL);
+    bool is_kept;
+    for (size_t i = 0; i < 4; i++) {
+        assert_false(job_is_finished(jobs[i]));
+        assert_int_equal(job_kept(jobs[i], &is_kept, &problem), STATUS_OK);
+        assert_false(is_kept);
+    }
+    assert_int_equal(database_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    database_close(other);
+    for (size_t i = 0; i < 4; i++) {
+        wait_for(jobs[i]);
+        assert_int_equal(wait_until_kept(jobs[i], &problem), STATUS_OK);
+        JobShow now = show(jobs[i]);
+        JobRow row;
+        assert_int_equal(now.state, JOB_SUCCESSFUL);
+        assert_int_equal(store_job_load(room.store, now.id, &row, &problem), STATUS_OK);
+        assert_int_equal(row.state, JOB_SUCCESSFUL);
+        assert_string_equal(row.result, now.result);
+        job_row_clear(&row);
+        job_show_clear(&now);
+        job_drop(jobs[i]);
+    }
+    JobRows rows;
+    assert_int_equal(store_job_list(room.store, NULL, 100, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 4);
+    job_rows_clear(&rows);
+    room_end(&room);
+}
+
+static void whoever_waits_for_a_job_to_be_kept_is_woken(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    static atomic_int wakes;
+    const Waker waker = {&wakes, note_wake};
+    Job *job = submit_unkept(&room, 0.015, 20000);
+    assert_true(job_watch_kept(job, &waker));
+    assert_int_equal(wait_until_kept(job, &problem), STATUS_OK);
+    assert_int_equal(atomic_load(&wakes), 1);
+    assert_false(job_is_finished(job));
+    assert_true(job_watch_kept(job, &waker)); // at once
+    assert_int_equal(atomic_load(&wakes), 2);
     job_drop(job);
     room_end(&room);
 }
@@ -653,8 +930,13 @@ int main(void) {
         cmocka_unit_test(a_studys_answer_is_kept_with_the_result_of_its_scene),
         cmocka_unit_test(a_study_is_stopped_with_its_job_and_goes_on_after_a_restart),
         cmocka_unit_test(names_are_resolved_and_all_faults_told),
+        cmocka_unit_test(a_known_body_is_answered_with_a_job_of_its_own),
+        cmocka_unit_test(a_dear_series_is_kept_and_outlasts_its_engine),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
         cmocka_unit_test(a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost),
+        cmocka_unit_test(a_job_that_cannot_be_kept_never_was),
+        cmocka_unit_test(a_job_that_is_done_before_it_was_written_is_written_once),
+        cmocka_unit_test(whoever_waits_for_a_job_to_be_kept_is_woken),
         cmocka_unit_test(a_job_may_outlive_the_intake),
         cmocka_unit_test(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it),
         cmocka_unit_test(waiting_scenes_have_a_limit_in_bytes),
