@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/codec/differ.h"
+#include "server/codec/unlike.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
@@ -53,14 +53,14 @@ static void put_value(Bytes *bytes, const char *name, const char *json) {
         bytes_format(bytes, ", \"%s\": %s", name, json);
 }
 
-static void put_nearest(Bytes *bytes, const ResultRow *row, const Differences *differences) {
+static void put_nearest(Bytes *bytes, const ResultRow *row, const Unlikes *differences) {
     const bool is_other = strcmp(row->engine, engine_version) != 0;
     bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", row->id);
     bytes_json_string(bytes, row->engine);
     bytes_format(bytes, ", \"engine_differs\": %s, \"count\": %zu, \"differences\": [",
                  flag(is_other), differences->count);
-    for (size_t i = 0; i < differences->count && i < DIFFER_MOST; i++) {
-        const Difference *one = &differences->at[i];
+    for (size_t i = 0; i < differences->count && i < UNLIKE_MOST; i++) {
+        const Unlike *one = &differences->at[i];
         bytes_text(bytes, i > 0 ? ", {\"pointer\": " : "{\"pointer\": ");
         bytes_json_string(bytes, one->pointer);
         put_value(bytes, "here", one->here);
@@ -73,17 +73,17 @@ static void put_nearest(Bytes *bytes, const ResultRow *row, const Differences *d
 // The known scene that differs least, or none.
 static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *problem) {
     ResultRows rows = {NULL, 0};
-    Differences *own = malloc(2 * sizeof *own);
-    Differences *least = own, *other = own + 1;
+    Unlikes *own = malloc(2 * sizeof *own);
+    Unlikes *least = own, *other = own + 1;
     const ResultRow *nearest = NULL;
     Status status = own == NULL
                         ? STATUS_NO_MEMORY
                         : store_result_recent(app->store, RECENT_MOST, SCENE_MOST, &rows, problem);
     for (size_t i = 0; i < rows.count && status == STATUS_OK; i++) {
-        if (differ_json(scene, rows.at[i].scene, other) != STATUS_OK)
+        if (unlike_json(scene, rows.at[i].scene, other) != STATUS_OK)
             continue;
         if (nearest == NULL || other->count < least->count) {
-            Differences *more = least;
+            Unlikes *more = least;
             least = other;
             other = more;
             nearest = &rows.at[i];

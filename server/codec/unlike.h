@@ -1,24 +1,24 @@
 // In which members two JSON documents differ, by JSON Pointer. Not a comparison of results. Used by
 // api/cache.c.
-#ifndef SERVER_CODEC_DIFFER_H
-#define SERVER_CODEC_DIFFER_H
+#ifndef SERVER_CODEC_UNLIKE_H
+#define SERVER_CODEC_UNLIKE_H
 
 #include "core/base/status.h"
 
-enum { DIFFER_MOST = 100 };
+enum { UNLIKE_MOST = 100 };
 
-typedef struct Difference {
+typedef struct Unlike {
     char pointer[256];
     char here[128], there[128]; // JSON; a text where it is long, "" where there is none
-} Difference;
+} Unlike;
 
 // The first of them are listed.
-typedef struct Differences {
+typedef struct Unlikes {
     size_t count;
-    Difference at[DIFFER_MOST];
-} Differences;
+    Unlike at[UNLIKE_MOST];
+} Unlikes;
 
 // STATUS_INTERNAL for what is no JSON.
-Status differ_json(const char *here, const char *there, Differences *differences);
+Status unlike_json(const char *here, const char *there, Unlikes *differences);
 
 #endif

@@ -1,6 +1,6 @@
 // Two trees walked together. Lists differ place by place; one that is longer has members the other
 // lacks.
-#include "server/codec/differ.h"
+#include "server/codec/unlike.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -21,17 +21,17 @@ static void put_value(char target[128], const json_t *value) {
         snprintf(target, 128, "\"%zu bytes of JSON\"", size);
 }
 
-static void add(Differences *differences, const char *pointer, const json_t *here,
+static void add(Unlikes *differences, const char *pointer, const json_t *here,
                 const json_t *there) {
-    if (differences->count++ >= DIFFER_MOST)
+    if (differences->count++ >= UNLIKE_MOST)
         return;
-    Difference *one = &differences->at[differences->count - 1];
+    Unlike *one = &differences->at[differences->count - 1];
     text_fit(one->pointer, sizeof one->pointer, pointer);
     put_value(one->here, here);
     put_value(one->there, there);
 }
 
-static void walk(json_t *here, json_t *there, const char *pointer, Differences *differences) {
+static void walk(json_t *here, json_t *there, const char *pointer, Unlikes *differences) {
     char place[256];
     if (json_is_object(here) && json_is_object(there)) {
         const char *name;
@@ -59,7 +59,7 @@ static void walk(json_t *here, json_t *there, const char *pointer, Differences *
     }
 }
 
-Status differ_json(const char *here, const char *there, Differences *differences) {
+Status unlike_json(const char *here, const char *there, Unlikes *differences) {
     differences->count = 0;
     json_t *a = json_loadb(here, strlen(here), JSON_REJECT_DUPLICATES, NULL);
     json_t *b = json_loadb(there, strlen(there), JSON_REJECT_DUPLICATES, NULL);
