@@ -75,6 +75,8 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
             strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
         bytes_format(bytes, ", \"%.*s\": \"/v1/results/%s/%s\"", (int)size, ways[i], id, ways[i]);
     }
+    // A template (RFC 6570): the impact's place in the ledger, from 1.
+    bytes_format(bytes, ", \"force\": \"/v1/results/%s/impacts/{number}/force.json\"", id);
     if (answer->study != NULL) {
         const char *name = answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);

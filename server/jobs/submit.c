@@ -30,7 +30,7 @@ static Status find_known(Intake *intake, Job *job, Problem *problem) {
     if (outcome != NULL) {
         Bytes plan = {0}, summary = {0}, work = {0}, notes = {0};
         document_plan(&plan, &outcome->plan);
-        document_summary(&summary, &outcome->summary);
+        document_summary(&summary, outcome);
         document_work(&work, &outcome->work);
         document_warnings(&notes, &outcome->warnings);
         job->plan = bytes_take(&plan, NULL);
