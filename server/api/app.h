@@ -14,8 +14,13 @@
 struct App {
     Store *store;
     Intake *intake;
-    Asides *asides;    // for readers of what takes a run
-    size_t reply_most; // bytes of one answer
+    Asides *asides; // for readers of what takes a run
+    const struct Meter *meter;
+    struct Hot *hot;
+    _Atomic(struct Listener *) listener; // NULL until it is open
+    size_t reply_most;                   // bytes of one answer
+    char base_url[256]; // as clients see us, without a slash at its end; "": by their Host
+    bool has_tls;
     int64_t started_unix_ms;
     atomic_bool is_stopping;
 };
@@ -29,6 +34,6 @@ Handler results_show, results_manifest, results_series, results_psd, results_imp
     results_energy, results_force, results_bundle, results_tradeoff, results_ensemble;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
-Handler health_live, health_ready, version_show, landing_show;
+Handler health_live, health_ready, metrics_show, version_show, landing_show;
 
 #endif
