@@ -78,7 +78,8 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
                      id, ways[i]);
     }
     // A template (RFC 6570): the impact's place in the ledger, from 1.
-    bytes_format(bytes, ", \"force\": \"/v1/results/%s/impacts/{number}/force.json\"", id);
+    bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
+                 link_base(), id);
     if (answer->study != NULL) {
         const char *name = answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);
