@@ -39,7 +39,7 @@ typedef struct StudyKind {
 
 extern const StudyKind *const studies[]; // NULL-terminated
 extern const KindTable study_kinds, study_answer_kinds;
-extern const StudyKind study_tradeoff, study_ensemble;
+extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;
