@@ -322,6 +322,7 @@ static bool all_empty(const Field *fields, const void *item) {
 bool field_is_absent(const Field *field, const void *item) {
     switch (field->kind) {
     case FIELD_KIND_FLAG:
+        return (field->flags & FIELD_RARE) != 0 && !*(const bool *)member_of(field, item);
     case FIELD_KIND_BASE:
         return false;
     case FIELD_KIND_REALS:

@@ -105,6 +105,9 @@ enum {
     FIELD_LONE = 8,
     // TEXTS: a text allowed may carry a number from 1: "displacement_2".
     FIELD_NUMBERED = 16,
+    // FLAG: false counts as absent, so that the canonical form without it is as it was before there
+    // was such a row.
+    FIELD_RARE = 32,
 };
 
 struct Field {
@@ -164,6 +167,9 @@ struct Field {
 #define FIELD_FLAG(Type, member, default_, doc_) \
     {.name = #member, .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(Type, member, bool), \
      .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
+#define FIELD_RARE_FLAG(Type, member, doc_) \
+    {.name = #member, .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(Type, member, bool), \
+     .presence = PRESENCE_DEFAULT, .flags = FIELD_RARE, .doc = doc_}
 #define FIELD_TEXT(Type, member, most_, presence_, flags_, doc_) \
     {.name = #member, .kind = FIELD_KIND_TEXT, .offset = FIELD_AT(Type, member, char *), .most = most_, \
      .presence = presence_, .flags = flags_, .doc = doc_}
@@ -219,7 +225,7 @@ void fields_clear(const Field *fields, void *item);
 Status fields_copy(const Field *fields, const void *source, void *target);
 
 // Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ...
-// Never absent are FLAG, BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty
+// Never absent are FLAG (but FIELD_RARE), BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty
 // list was asked for then). Any other ITEM is absent if all its members are, whatever their
 // presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);

@@ -254,6 +254,7 @@ Status way_apply(const Simulation *simulation, const Way *way, Simulation *targe
     }
     variant_free(target->accuracy);
     target->accuracy = accuracy;
+    target->output.reduction = false; // of the whole, not of each way
     AccuracyExact *settings = (AccuracyExact *)(void *)accuracy;
     settings->tolerance = way->tolerance;
     settings->accuracy.modes = way->modes;

@@ -114,6 +114,7 @@ static Status settle(const Simulation *asked, const SimulationLimits *limits, co
     else if (fields_copy(simulation_fields, asked, &shot->simulation) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
     shot->simulation.output.impacts = true;
+    shot->simulation.output.reduction = false;
     if (ask_for_states(&shot->simulation.output, storeys, dampers) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
     return STATUS_OK;

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/simulation/aim.h"
+#include "core/simulation/bare.h"
 #include "core/simulation/choice.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/frame_work.h"
@@ -176,7 +177,7 @@ static double foretell_bytes(const Simulation *simulation) {
            sizeof(Impact) * fmin(guess_impacts(scene, &rates), IMPACTS_KEPT);
 }
 
-Cost simulation_cost(const Simulation *simulation) {
+static Cost cost_once(const Simulation *simulation) {
     if (aim_is_asked(simulation))
         return aim_cost(simulation);
     const Scene *scene = &simulation->scene;
@@ -193,5 +194,17 @@ Cost simulation_cost(const Simulation *simulation) {
                  (choice_solver(simulation)->cost != NULL ? own_steps(simulation)
                                                           : exact_steps(simulation, &cost.is_fast));
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
+    return cost;
+}
+
+Cost simulation_cost(const Simulation *simulation) {
+    Cost cost = cost_once(simulation);
+    if (!simulation->output.reduction)
+        return cost;
+    const Cost bare = bare_cost(simulation);
+    cost.steps += bare.steps;
+    cost.cpu_seconds += bare.cpu_seconds;
+    cost.base += bare.base;
+    cost.bytes += bare.bytes; // the first outcome is there still
     return cost;
 }

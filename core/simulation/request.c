@@ -30,6 +30,7 @@ static const Field output_fields[] = {
     FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels that are sampled; with several storeys or dampers each with its number from 1, displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
     FIELD_FLAG(Output, impacts, true, "whether the ledger of impacts is kept; false: they are counted, and their peaks and energies summed, but not listed"),
+    FIELD_RARE_FLAG(Output, reduction, "whether the summary tells by how much the dampers lower peaks and rms; the scene without them is run beside it"),
     FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
     FIELD_END
 };
@@ -53,6 +54,14 @@ const Field summary_fields[] = {
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
     FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
     FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
+    FIELD_END
+};
+
+const Field reduction_fields[] = {
+    FIELD_REAL(Reduction, peak_displacement_reduction, NULL, ANY, OPTIONAL, "1 - peak_displacement over that without dampers"),
+    FIELD_REAL(Reduction, rms_displacement_reduction, NULL, ANY, OPTIONAL, "1 - rms_displacement over that without dampers"),
+    FIELD_REAL(Reduction, peak_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - peak_acceleration over that without dampers"),
+    FIELD_REAL(Reduction, rms_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - rms_acceleration over that without dampers"),
     FIELD_END
 };
 // clang-format on

@@ -6,6 +6,7 @@
 
 #include "core/plan/keep.h"
 #include "core/simulation/aim.h"
+#include "core/simulation/bare.h"
 #include "core/simulation/caution.h"
 #include "core/simulation/choice.h"
 #include "core/simulation/omissions.h"
@@ -295,10 +296,9 @@ static Status travel(Journey *journey, Problem *problem) {
     return STATUS_OK;
 }
 
-Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Workspace *workspace, Outcome **outcome,
-                      Problem *problem) {
-    *outcome = NULL;
+static Status run_once(const Simulation *simulation, const SimulationLimits *limits,
+                       const Watch *watch, Workspace *workspace, Outcome **outcome,
+                       Problem *problem) {
     if (aim_is_asked(simulation))
         return aim_run(simulation, limits, watch, workspace, outcome, problem);
     Outcome *made = outcome_new();
@@ -330,6 +330,24 @@ Outcome *outcome_new(void) {
         return NULL;
     atomic_init(&held->holds, 1);
     return &held->outcome;
+}
+
+Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
+                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      Problem *problem) {
+    static const double share = 0.8; // of the whole, where the scene without dampers follows
+    *outcome = NULL;
+    if (!simulation->output.reduction)
+        return run_once(simulation, limits, watch, workspace, outcome, problem);
+    Stage first = stage_of(watch, 0, share), second = stage_of(watch, share, 1 - share);
+    const Watch own = stage_watch(&first), bare = stage_watch(&second);
+    TRY(run_once(simulation, limits, &own, workspace, outcome, problem));
+    const Status status = bare_compare(simulation, limits, &bare, workspace, *outcome, problem);
+    if (status != STATUS_OK) {
+        outcome_drop(*outcome);
+        *outcome = NULL;
+    }
+    return status;
 }
 
 Outcome *outcome_hold(Outcome *outcome) {

@@ -29,6 +29,7 @@ typedef struct Output {
     Texts channels;
     SpectrumRequest psd;
     bool impacts;           // the ledger is kept
+    bool reduction;         // what the dampers save is told
     double statistics_from; // [s]
 } Output;
 
@@ -81,6 +82,14 @@ typedef struct Summary {
 } Summary;
 extern const Field summary_fields[];
 
+// By how much the dampers make the summary's numbers smaller: 1 - with over without, where without
+// is the same scene with no damper. NAN is unknown, as where nothing moves.
+typedef struct Reduction {
+    double peak_displacement_reduction, rms_displacement_reduction, peak_acceleration_reduction,
+        rms_acceleration_reduction;
+} Reduction;
+extern const Field reduction_fields[];
+
 // All that a run came to. Frozen once made; counted, because jobs, caches and replies share it.
 typedef struct Outcome Outcome;
 struct Outcome {
@@ -88,6 +97,8 @@ struct Outcome {
     Response response; // response.series holds output.channels in that order
     Spectrum spectrum; // of output.psd; empty where none was asked for
     Summary summary;
+    bool has_reduction; // it was asked for
+    Reduction reduction;
     Warnings warnings; // what only the run could tell
     double steps;      // solver steps, counted
     Work work;         // what was done, kind by kind

@@ -35,10 +35,6 @@ Handler results_show, results_manifest, results_series, results_psd, results_imp
     results_compare, results_sensitivity;
 Handler cache_show, cache_explain;
 Handler compare_results, compare_measured;
-<<<<<<< HEAD
-Handler cache_show, cache_explain;
-=======
->>>>>>> jobs-cost
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;

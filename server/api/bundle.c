@@ -5,6 +5,7 @@
 #include "server/api/results.h"
 #include "server/api/tables.h"
 #include "server/base/digest.h"
+#include "server/base/link.h"
 #include "server/encode/csv.h"
 #include "server/encode/impacts_csv.h"
 #include "server/encode/npz.h"
@@ -119,14 +120,15 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, Sheet *sheet
     return put_text(zip, "impacts.csv", &impacts, problem);
 }
 
-// By its content: a material's status, which the manifest tells, may change. Sets the entity tag;
-// true if the client has it.
+// By what in it may change: a material's status, which the manifest tells, and the base of its
+// links. Sets the entity tag; true if the client has it.
 static bool is_known(const Request *request, Reply *reply, const ResultRow *row,
                      const Bytes *manifest) {
     char digits[65] = "", tag[104];
     Digest *digest = digest_new();
-    if (digest != NULL && manifest->count > 0) {
+    if (digest != NULL) {
         digest_take(digest, manifest->at, manifest->count);
+        digest_take(digest, link_base(), strlen(link_base()));
         digest_end(digest, digits);
     }
     snprintf(tag, sizeof tag, "%.72s-bundle-%.16s", row->id, digits);

@@ -77,6 +77,9 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
         bytes_format(bytes, ", \"%.*s\": \"%s/v1/results/%s/%s\"", (int)size, ways[i], link_base(),
                      id, ways[i]);
     }
+    // A template (RFC 6570): the impact's place in the ledger, from 1.
+    bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
+                 link_base(), id);
     if (answer->study != NULL) {
         const char *name = answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);

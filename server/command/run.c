@@ -68,7 +68,7 @@ static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const 
                         const int64_t began_unix_ms, double took, Bytes *bytes) {
     Bytes plan = {0}, summary = {0}, work = {0}, told = {0}, notes = {0};
     document_plan(&plan, &outcome->plan);
-    document_summary(&summary, &outcome->summary);
+    document_summary(&summary, outcome);
     document_work(&work, &outcome->work);
     document_warnings(&told, warnings);
     document_warnings(&notes, &outcome->warnings);

@@ -8,8 +8,14 @@ void document_plan(Bytes *bytes, const PlanReport *plan) {
     write_item(bytes, plan_report_fields, plan, WRITE_REPORT);
 }
 
-void document_summary(Bytes *bytes, const Summary *summary) {
-    write_item(bytes, summary_fields, summary, WRITE_REPORT);
+void document_summary(Bytes *bytes, const Outcome *outcome) {
+    bytes_text(bytes, "{");
+    (void)write_members(bytes, summary_fields, &outcome->summary, WRITE_REPORT);
+    if (outcome->has_reduction) {
+        bytes_text(bytes, ", ");
+        (void)write_members(bytes, reduction_fields, &outcome->reduction, WRITE_REPORT);
+    }
+    bytes_text(bytes, "}");
 }
 
 void document_work(Bytes *bytes, const Work *work) {

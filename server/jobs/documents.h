@@ -8,7 +8,7 @@
 #include "server/base/bytes.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan);
-void document_summary(Bytes *bytes, const Summary *summary);
+void document_summary(Bytes *bytes, const Outcome *outcome); // with what was asked for besides
 void document_work(Bytes *bytes, const Work *work);
 void document_warnings(Bytes *bytes, const Warnings *warnings);
 // Two such arrays as one; NULL is an empty one.

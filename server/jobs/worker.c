@@ -52,7 +52,7 @@ static Status describe(const Computation *computation, Findings *findings) {
     Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
-    document_summary(&summary, &outcome->summary);
+    document_summary(&summary, outcome);
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);

@@ -313,12 +313,42 @@ def test_the_bundle_explains_itself():
         text = archive.read("README.txt").decode()
         for words in ("doi:10.1002/stc.238", result["id"], result["engine"], "UNITS"):
             assert words in text, (words, text)
+        assert result["links"]["force"] == base + "/impacts/{number}/force.json"
         for name, link in result["links"].items():
+            link = link.replace("{number}", "1")
             assert daemon.request("GET", link).status == 200, (name, link)
         bare = program.scene("paper_free_sponge")
         bare["output"] = {"impacts": False, "psd": None}
         names = zipfile.ZipFile(io.BytesIO(get(daemon, finished(daemon, bare) + "/bundle.zip").body)).namelist()
         assert "psd.csv" not in names and "impacts.csv" not in names, names
+
+
+def test_what_the_dampers_save_is_told_when_asked_for():
+    """output.reduction: the summary tells 1 - with over without dampers; without it nothing changes, not even the id."""
+    with program.daemon() as daemon:
+        names = ("peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration")
+        scene, bare = program.scene("paper_random_sponge"), program.scene("paper_random_sponge")
+        bare["dampers"] = []
+        bare["output"] = {"channels": [], "psd": None}
+        plain = program.finished(daemon, scene)
+        scene["output"] = {**scene.get("output", {}), "reduction": False}
+        assert program.finished(daemon, scene)["result"] == plain["result"]
+        scene["output"]["reduction"] = True
+        asked = program.finished(daemon, scene)
+        assert asked["result"] != plain["result"]
+        without = program.finished(daemon, bare)["summary"]
+        for name in names:
+            assert name + "_reduction" not in plain["summary"]
+            assert asked["summary"][name] == plain["summary"][name]
+            assert asked["summary"][name + "_reduction"] == 1 - plain["summary"][name] / without[name], name
+        result = get(daemon, "/v1/results/" + asked["result"]).json()
+        assert result["scene"]["output"]["reduction"] is True and result["summary"] == asked["summary"]
+        rows = npz_columns(get(daemon, f"/v1/results/{asked['result']}/impacts/100/force.npz").body)
+        impact = get(daemon, f"/v1/results/{asked['result']}/impacts.json").json()["impacts"][99]
+        assert abs(np.abs(rows["contact_force"]).max() / impact["peak_force"] - 1) < 1e-9
+        dry = [daemon.request("POST", "/v1/jobs?dry_run=1", json=json_scene).json()["cost"]["cpu_seconds"]
+               for json_scene in (scene, program.scene("paper_random_sponge"))]
+        assert dry[0] > dry[1], dry
 
 
 def test_the_command_writes_every_format():

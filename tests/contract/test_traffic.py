@@ -42,6 +42,11 @@ EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-con
 UNSEEN = {
     (None, "503"): "a queue, memory or connections that are full; tested where they are made small",
     (None, "410"): "results of another engine version; tested below the HTTP interface",
+    ("GET", "/v1/results/{id}/series.{format}", "422"): "a file of 2 or 4 GiB; tested in unit/server/encode",
+    ("GET", "/v1/results/{id}/series", "422"): "a file of 2 or 4 GiB; tested in unit/server/encode",
+    ("GET", "/v1/results/{id}/impacts/{number}/force.{format}", "422"): "states of more than 1 GB",
+    ("GET", "/v1/results/{id}/impacts/{number}/force", "422"): "states of more than 1 GB",
+    ("GET", "/v1/results/{id}/bundle.zip", "422"): "an archive of 4 GiB; tested in unit/server/encode",
     (None, "507"): "a full disk; tested where a small one can be mounted",
     (None, "500"): "a fault of the daemon",
     ("GET", "/v1/results/{id}/bundle.zip", "422"): "an archive of more than 4 GiB",
