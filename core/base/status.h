@@ -24,6 +24,9 @@
     X(GONE, "gone", "Gone")                                                                        \
     X(TIMEOUT, "timeout", "Timed out")                                                             \
     X(BUSY, "busy", "Too busy")                                                                    \
+    X(QUOTA, "quota", "Over the quota")                                                            \
+    X(REUSED, "key-reused", "The key was used for another request")                                \
+    X(FULL, "no-room", "No room left on the disk")                                                 \
     X(CANCELLED, "cancelled", "Cancelled")                                                         \
     X(LIMIT, "limit", "A limit was reached")                                                       \
     X(UNSTABLE, "unstable", "The numbers could not be trusted")                                    \

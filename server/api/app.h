@@ -22,8 +22,8 @@ extern const char program_version[]; // "0.1.0"
 extern const char program_build[];   // the compiler
 
 // The handlers, by file; routes.c lists them with their patterns.
-Handler jobs_create, jobs_list, jobs_show, jobs_dismiss;
-Handler results_show, results_manifest, results_series, results_psd, results_impacts,
+Handler jobs_create, jobs_list, jobs_show, jobs_dismiss, jobs_events;
+Handler results_delete, results_show, results_manifest, results_series, results_psd, results_impacts,
     results_energy, results_tradeoff, results_ensemble;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;

@@ -35,10 +35,16 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
         bytes_text(bytes, ", \"title\": ");
         bytes_json_string(bytes, show->title);
     }
+    if (show->labels != NULL)
+        write_raw(bytes, "labels", show->labels);
+    if (show->study != NULL)
+        bytes_format(bytes, ", \"study\": \"%s\"", show->study);
     bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
     bytes_real(bytes, show->progress);
     bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
     bytes_json_string(bytes, has_result ? show->result : NULL);
+    if (has_result && show->is_result_deleted)
+        bytes_text(bytes, ", \"result_deleted\": true");
     write_time(bytes, "created", show->created_unix_ms);
     write_time(bytes, "started", show->started_unix_ms);
     write_time(bytes, "finished", show->finished_unix_ms);
@@ -58,7 +64,7 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     bytes_real(bytes, show->total);
     bytes_text(bytes, "}");
     if (parts & JOB_PUT_LINKS)
-        write_links(bytes, show->id, show->result, has_result);
+        write_links(bytes, show->id, show->result, has_result && !show->is_result_deleted);
     else
         bytes_text(bytes, ", \"links\": {}");
     bytes_text(bytes, "}");

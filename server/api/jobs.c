@@ -1,4 +1,4 @@
-// Jobs: submit, look, list, dismiss. Waiting works the same for POST and GET: the job is watched,
+// Jobs: submit, look, dismiss. Waiting works the same for POST and GET: the job is watched,
 // the request put to sleep, and when it is woken or its time is up the same handler goes on where
 // it stood.
 #include <stdio.h>
@@ -13,8 +13,6 @@
 #include "server/http/reply.h"
 
 static const double wait_initial = 2, wait_most = 30; // [s]
-
-enum { LIST_INITIAL = 20, LIST_MOST = 100 };
 
 // Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
@@ -108,9 +106,15 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         TRY(body_require_json(request, problem));
         if (is_dry)
             return dry_run(app, request, reply, problem);
-        const Submission submission = {
-            .text = request->body, .size = request->body_size, .client = request->client};
-        TRY(intake_submit(app->intake, &submission, &job, problem));
+        const Submission submission = {.text = request->body,
+                                       .size = request->body_size,
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
+        const Status status = intake_submit(app->intake, &submission, &job, problem);
+        if (status == STATUS_BUSY || status == STATUS_QUOTA)
+            reply->retry_after = intake_retry_after(app->intake, request->client, status);
+        TRY(status);
     }
 
     const Prefer prefer = header_prefer(request->prefer);
@@ -145,61 +149,4 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     Job *job = NULL;
     TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
     return reply_job(app, reply, job, 200, problem);
-}
-
-// A row knows no progress: of an unfinished job the queue is asked.
-static void list_row(App *app, Bytes *bytes, const JobRow *row) {
-    JobShow show = {0};
-    Job *job = NULL;
-    const bool is_unfinished = !job_state_is_final(row->state);
-    if (is_unfinished && intake_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
-        const Status status = job_show(job, &show);
-        job_drop(job);
-        if (status == STATUS_OK)
-            job_put(bytes, &show, JOB_PUT_LINKS);
-        job_show_clear(&show);
-        if (status == STATUS_OK)
-            return;
-    }
-    show = (JobShow){.state = (JobState)row->state,
-                     .progress = row->state == JOB_SUCCESSFUL ? 100 : 0,
-                     .is_cached = row->is_cached,
-                     .created_unix_ms = row->created_unix_ms,
-                     .started_unix_ms = row->started_unix_ms,
-                     .finished_unix_ms = row->finished_unix_ms,
-                     .queued = row->queued,
-                     .run = row->run,
-                     .total = row->total,
-                     .problem = row->problem,
-                     .title = row->title};
-    text_fit(show.id, sizeof show.id, row->id);
-    text_fit(show.result, sizeof show.result, row->result);
-    job_put(bytes, &show, JOB_PUT_LINKS); // borrows the row's texts
-}
-
-Status jobs_list(App *app, const Request *request, Reply *reply, Problem *problem) {
-    double limit;
-    TRY(request_number(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
-    const size_t most = (size_t)limit;
-    JobRows rows = {0};
-    // One more than asked for tells whether there is a next page.
-    const Status status =
-        store_job_list(app->store, request_query(request, "before"), most + 1, &rows, problem);
-    if (status != STATUS_OK) {
-        job_rows_clear(&rows);
-        return status;
-    }
-    const size_t count = rows.count < most ? rows.count : most;
-    if (rows.count > most)
-        snprintf(reply->link, sizeof reply->link, "</v1/jobs?limit=%zu&before=%s>; rel=\"next\"",
-                 most, rows.at[count - 1].id);
-    Bytes bytes = {.most = app->reply_most};
-    bytes_text(&bytes, "{\"jobs\": [");
-    for (size_t i = 0; i < count; i++) {
-        bytes_text(&bytes, i > 0 ? ",\n " : "");
-        list_row(app, &bytes, &rows.at[i]);
-    }
-    bytes_text(&bytes, "]}\n");
-    job_rows_clear(&rows);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

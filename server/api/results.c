@@ -256,3 +256,9 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
 Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
     return results_document(app, request, reply, DOCUMENT_ENERGY, problem);
 }
+
+Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
+    TRY(intake_delete(app->intake, request->parameters[0], problem));
+    reply_borrow(reply, 204, NULL, NULL, 0);
+    return STATUS_OK;
+}

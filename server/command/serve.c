@@ -14,12 +14,14 @@
 #include "server/command/serve.h"
 #include "server/http/dispatch.h"
 #include "server/http/listener.h"
+#include "server/jobs/keeper.h"
 #include "server/options.h"
 
 typedef struct ServeSettings {
     char *listen, *data, *config;
     uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, cache_bytes;
-    double max_cpu_seconds;
+    uint64_t quota, keep_jobs, keep_bytes;
+    double max_cpu_seconds, rate, keep_days;
     bool print_config;
 } ServeSettings;
 
@@ -33,12 +35,17 @@ static const Field serve_fields[] = {
     FIELD_TEXT(ServeSettings, data, 4000, PRESENCE_OPTIONAL, 0, "folder of the database ($XDG_STATE_HOME/impactd, else ~/.local/state/impactd)"),
     FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "simulations at once; 0 takes the number of processors"),
     FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "unfinished jobs at most; more are answered 503"),
+    FIELD_COUNT(ServeSettings, quota, NULL, WITHIN(0, 1e6), 0, "unfinished jobs of one token at most, more are answered 429; 0: as many as the queue takes"),
+    FIELD_REAL(ServeSettings, rate, "1/min", WITHIN(0, 1e9), 0, "jobs one token may send, more are answered 429; 0: any number"),
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
+    FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
+    FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
     FIELD_END,
@@ -76,6 +83,21 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     return STATUS_OK;
 }
 
+// What cannot be kept together is refused with what would mend it.
+static Status check_together(const ServeSettings *settings, Problem *problem) {
+    if (settings->quota > settings->queue)
+        (void)problem_add(problem, STATUS_USAGE, "--quota",
+                          "is %llu, more than the %llu jobs of --queue: no token could ever have "
+                          "so many; lower --quota or raise --queue",
+                          (unsigned long long)settings->quota, (unsigned long long)settings->queue);
+    if (settings->keep_bytes > 0 && settings->keep_bytes < MIB)
+        (void)problem_add(problem, STATUS_USAGE, "--keep-bytes",
+                          "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
+                          "for no limit",
+                          (unsigned long long)settings->keep_bytes, MIB);
+    return problem != NULL && problem->count > 0 ? STATUS_USAGE : STATUS_OK;
+}
+
 static void greet(const Listener *listener, const ServeSettings *settings) {
     const char *url = listener_url(listener);
     printf("impactd %s listens on %s\n", program_version, url);
@@ -93,15 +115,21 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
+                                 .quota = settings->quota,
+                                 .rate = settings->rate,
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
                                             .bytes = (double)settings->max_run_bytes}};
+    const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
     Listener *listener = NULL;
+    Keeper *keeper = NULL;
     fourier_start();
     TRY(address_read(settings->listen, &door.address, problem));
     TRY(store_open(settings->data, &app.store, problem));
     Status status = intake_open(app.store, &work, &app.intake, problem);
+    if (status == STATUS_OK)
+        status = keeper_start(app.store, app.intake, &keep, &keeper, problem);
     if (status == STATUS_OK)
         status = listener_open(&door, &listener, problem);
     if (status == STATUS_OK) {
@@ -113,6 +141,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                 signal == SIGINT ? "interrupted" : "asked to end");
     }
     listener_stop(listener, GRACE_MS);
+    keeper_stop(keeper);
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(listener);
@@ -135,6 +164,7 @@ static int run(int argc, char *const *argv) {
     sigaddset(&stops, SIGINT);
     pthread_sigmask(SIG_BLOCK, &stops, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 
     int code;
     Status status = fields_default(serve_fields, &settings);
@@ -145,6 +175,8 @@ static int run(int argc, char *const *argv) {
                              options.operands[0]);
     if (status == STATUS_OK)
         status = complete(&settings, problem);
+    if (status == STATUS_OK)
+        status = check_together(&settings, problem);
     if (status == STATUS_OK && settings.print_config)
         options_print(serve_fields, &settings, &options, stdout);
     else if (status == STATUS_OK)

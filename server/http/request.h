@@ -87,10 +87,11 @@ typedef struct Reply {
     char location[128]; // "" for none
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[192];
+    char link[1024];
     char preference_applied[48];
     char allow[64];
     char content_range[80];
+    bool is_replayed; // an earlier request's answer, under the same Idempotency-Key
     int retry_after; // seconds, -1 for none
     bool accepts_ranges;
     bool varies_by_accept; // the same path has several representations

@@ -91,6 +91,12 @@ Outcome *cache_find(Cache *cache, const char *id) {
     return outcome_hold(entry->outcome);
 }
 
+void cache_remove(Cache *cache, const char *id) {
+    Entry *entry = index_find(cache->index, id);
+    if (entry != NULL)
+        evict(cache, entry);
+}
+
 size_t cache_count(const Cache *cache) {
     return cache->count;
 }

@@ -2,6 +2,7 @@
 // dismissing.
 #include "server/jobs/intake.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,19 +33,27 @@ void computation_free(Computation *computation) {
     free(computation);
 }
 
-void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent) {
+Computation *computation_of(QueueEntry *entry) {
+    return (Computation *)(void *)((char *)entry - offsetof(Computation, queued));
+}
+
+void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
+    Cost cost = {0};
     index_add(intake->in_flight, &computation->indexed);
-    if (is_urgent) {
-        computation->next = intake->first;
-        intake->first = computation;
-        if (intake->last == NULL)
-            intake->last = computation;
-    } else {
-        *(intake->last != NULL ? &intake->last->next : &intake->first) = computation;
-        intake->last = computation;
-    }
-    intake->queued++;
+    // A series that is computed again needs no study.
+    if (computation->is_again)
+        cost = simulation_cost(&computation->inquiry.simulation);
+    else if (inquiry_cost(&computation->inquiry, &intake->settings.limits, &cost, NULL) !=
+             STATUS_OK)
+        cost.cpu_seconds = queue_quick; // the run will tell
+    computation->queued.seconds = cost.cpu_seconds;
+    if (client == NULL)
+        queue_urge(intake->queue, &computation->queued);
+    else
+        queue_put(intake->queue, &computation->queued, client, 1e-9 * (double)clock_monotonic_ns());
     pthread_cond_signal(&intake->work);
+    if (intake->slow_running >= intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
 }
 
 void intake_release(Job *job) {
@@ -52,6 +61,7 @@ void intake_release(Job *job) {
         return;
     job->is_counted = false;
     job->intake->live--;
+    job->client->live--;
     job->intake->scene_bytes -= job->scene_size;
 }
 
@@ -66,20 +76,10 @@ void intake_drop(Intake *intake) {
     if (intake == NULL || atomic_fetch_sub(&intake->holds, 1) != 1)
         return;
     pthread_cond_destroy(&intake->work);
+    pthread_cond_destroy(&intake->spare_work);
+    pthread_cond_destroy(&intake->keys_free);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
-}
-
-static void dequeue(Intake *intake, Computation *computation) {
-    Computation *before = NULL;
-    for (Computation *at = intake->first; at != NULL; before = at, at = at->next)
-        if (at == computation) {
-            *(before != NULL ? &before->next : &intake->first) = at->next;
-            if (intake->last == at)
-                intake->last = before;
-            intake->queued--;
-            return;
-        }
 }
 
 void intake_detach(Job *job) {
@@ -101,7 +101,7 @@ void intake_detach(Job *job) {
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
     } else {
-        dequeue(job->intake, computation);
+        queue_remove(job->intake->queue, &computation->queued);
         computation_free(computation);
     }
 }
@@ -122,6 +122,7 @@ void intake_admit(Intake *intake, Job *job) {
     index_add(intake->jobs, &job_hold(job)->indexed);
     job->is_counted = true;
     intake->live++;
+    job->client->live++;
     intake->scene_bytes += job->scene_size;
 }
 
@@ -147,22 +148,27 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
     pthread_cond_init(&intake->work, NULL);
+    pthread_cond_init(&intake->spare_work, NULL);
+    pthread_cond_init(&intake->keys_free, NULL);
+    intake->pace = 1;
+    intake->queue = queue_new();
     intake->jobs = index_new();
     intake->in_flight = index_new();
     intake->cache = cache_new(settings->cache_bytes);
-    intake->workers = calloc(settings->workers, sizeof *intake->workers);
+    intake->workers = calloc(settings->workers + 1, sizeof *intake->workers);
     Status status = STATUS_OK;
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
-        intake->workers == NULL)
+        intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
-    while (status == STATUS_OK && intake->worker_count < settings->workers) {
+    while (status == STATUS_OK && intake->worker_count < settings->workers + 1) {
         Worker *worker = &intake->workers[intake->worker_count];
         worker->intake = intake;
+        worker->is_spare = intake->worker_count == settings->workers;
         if (pthread_create(&worker->thread, NULL, worker_main, worker) != 0)
             status = problem_set(problem, STATUS_INTERNAL, "worker %zu of %zu could not be started",
-                                 intake->worker_count + 1, settings->workers);
+                                 intake->worker_count + 1, settings->workers + 1);
         else
             intake->worker_count++;
     }
@@ -196,19 +202,18 @@ void intake_close(Intake *intake) {
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
+    pthread_cond_broadcast(&intake->spare_work);
     pthread_mutex_unlock(&intake->lock);
     for (size_t i = 0; i < intake->worker_count; i++)
         pthread_join(intake->workers[i].thread, NULL);
     // Whoever is still queued stays unfinished in the store, for the next start.
-    while (intake->first != NULL) {
-        Computation *computation = intake->first;
-        dequeue(intake, computation);
-        let_go(computation);
-    }
+    for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
+        let_go(computation_of(entry));
     // Those whose end could not be stored are still here.
     for (Job *job; (job = index_any(intake->jobs)) != NULL;)
         intake_retire(job);
     cache_free(intake->cache);
+    queue_free(intake->queue);
     index_free(intake->jobs);
     index_free(intake->in_flight);
     free(intake->workers);
@@ -299,14 +304,32 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
     return STATUS_OK;
 }
 
+void intake_forget(Intake *intake, const char *result) {
+    pthread_mutex_lock(&intake->lock);
+    cache_remove(intake->cache, result);
+    pthread_mutex_unlock(&intake->lock);
+}
+
+Status intake_delete(Intake *intake, const char *result, Problem *problem) {
+    pthread_mutex_lock(&intake->lock);
+    const bool is_wanted = index_find(intake->in_flight, result) != NULL;
+    pthread_mutex_unlock(&intake->lock);
+    if (is_wanted)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the result is being computed; dismiss its job first, or wait");
+    TRY(store_result_delete(intake->store, result, problem));
+    intake_forget(intake, result);
+    return STATUS_OK;
+}
+
 void intake_tally(Intake *intake, IntakeTally *tally) {
     pthread_mutex_lock(&intake->lock);
-    *tally = (IntakeTally){.queued = intake->queued,
+    *tally = (IntakeTally){.queued = queue_count(intake->queue),
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
                            .cached_outcomes = cache_count(intake->cache),
                            .cached_bytes = cache_bytes(intake->cache)};
-    for (size_t i = 0; i < intake->settings.workers; i++)
+    for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL;
     pthread_mutex_unlock(&intake->lock);
 }

@@ -15,6 +15,8 @@ typedef struct IntakeSettings {
     size_t queue_most;  // unfinished jobs at most
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
     size_t cache_bytes; // of finished outcomes in memory
+    size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
+    double rate;        // jobs a minute of one client by name; 0: any number
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -36,13 +38,20 @@ void intake_close(Intake *intake);
 typedef struct Submission {
     const char *text; // the scene's JSON, perhaps with a study
     size_t size;
-    const char *client; // its token's name; NULL: nobody in particular
+    const char *client;          // its token's name; NULL: nobody in particular
+    const char *idempotency_key; // as it came, perhaps in quotes; NULL: none
+    bool *is_replayed;           // set where the job is an earlier request's; NULL: not told
 } Submission;
 
 // Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
-// (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
-// STATUS_INVALID with the faults. The Job is a hold of the caller's.
+// (cached), a scene in flight shares that computation, and a key that its client used before for
+// the same body answers with that job (STATUS_REUSED for another body). STATUS_BUSY when the queue
+// is full, STATUS_QUOTA, STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
+
+// Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
+// another try, as far as can be told.
+int intake_retry_after(Intake *intake, const char *client, Status status);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
@@ -68,6 +77,12 @@ Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *proble
 // is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
+
+// Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
+// STATUS_NOT_FOUND.
+Status intake_delete(Intake *intake, const char *result, Problem *problem);
+// It is gone from the store: it counts as known no more.
+void intake_forget(Intake *intake, const char *result);
 
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;

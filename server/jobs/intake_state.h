@@ -9,6 +9,7 @@
 #include "server/jobs/cache.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
+#include "server/jobs/queue.h"
 
 enum { OUTCOME_FAILURES = 64 };
 
@@ -22,9 +23,10 @@ typedef struct Computation {
     IndexEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
     Inquiry inquiry;
-    char *scene, *warnings;   // documents
-    struct Computation *next; // in the queue
+    char *scene, *warnings; // documents
+    QueueEntry queued;
     bool is_running;
+    int64_t began_ns;
     bool is_again; // only its series is wanted: the result is saved already
     Job *jobs;     // those who wait for it, by next_shared
     Wakers askers; // readers of the outcome
@@ -43,6 +45,7 @@ struct Job {
     bool is_counted;                     // takes a place in the queue
     char *plan, *summary, *work, *notes; // of the result
     Computation *computation;            // NULL: not yet or no more
+    Client *client;                      // NULL while it was not admitted
     Job *next_shared;
     int64_t submitted_ns, started_ns;
     Wakers wakers;
@@ -58,6 +61,7 @@ typedef struct Worker {
     Intake *intake;
     pthread_t thread;
     Computation *running; // or NULL
+    bool is_spare;        // beyond the number asked for: takes quick work while all others are slow
     Workspace workspace;  // of its thread alone
 } Worker;
 
@@ -68,14 +72,19 @@ struct Intake {
     IntakeSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;
-    Worker *workers;     // settings.workers of them
+    pthread_cond_t spare_work; // for the spare worker alone
+    pthread_cond_t keys_free;  // a KeyHold was given up
+    struct KeyHold *keys;
+    Worker *workers;     // settings.workers of them, and the spare one
     size_t worker_count; // started
+    size_t slow_running;
+    double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;      // not yet finished
-    Index *in_flight; // computations
-    Computation *first, *last;
-    size_t queued, live; // computations in the queue; jobs not yet finished
-    size_t scene_bytes;  // of all live jobs
+    Index *jobs;        // not yet finished
+    Index *in_flight;   // computations
+    Queue *queue;       // of computations
+    size_t live;        // jobs not yet finished
+    size_t scene_bytes; // of them all
     Cache *cache;
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
@@ -96,7 +105,9 @@ void intake_drop(Intake *intake); // frees what is left with the last hold
 // Gives back its place in the queue; it can still be found.
 void intake_release(Job *job);
 void intake_retire(Job *job); // it is live no more; drops the index's hold
-void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent);
+// `client` NULL: ahead of all.
+void intake_enqueue(Intake *intake, Computation *computation, Client *client);
+Computation *computation_of(QueueEntry *entry);
 void intake_admit(Intake *intake, Job *job); // it is live, held by the index
 void intake_attach(Job *job, Computation *computation);
 void intake_detach(Job *job); // from its computation, which stops when nobody is left

@@ -107,6 +107,7 @@ Status job_show(Job *job, JobShow *show) {
     if (row->state == JOB_SUCCESSFUL) {
         text_fit(show->result, sizeof show->result, row->result);
         show->progress = 100;
+        show->is_result_deleted = job->intake == NULL && !row->has_result;
     } else if (job->computation != NULL) {
         show->progress = atomic_load(&job->computation->progress) / 100.0;
     }
@@ -119,7 +120,8 @@ Status job_show(Job *job, JobShow *show) {
     const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
                           copy(&show->summary, job->summary) && copy(&show->work, job->work) &&
                           copy(&show->notes, job->notes) && copy(&show->warnings, row->warnings) &&
-                          copy(&show->title, row->title);
+                          copy(&show->title, row->title) && copy(&show->labels, row->labels) &&
+                          copy(&show->study, row->study);
     unlock(job);
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
@@ -132,7 +134,19 @@ void job_show_clear(JobShow *show) {
     free(show->work);
     free(show->notes);
     free(show->title);
+    free(show->labels);
+    free(show->study);
     *show = (JobShow){0};
+}
+
+JobState job_glance(Job *job, double *progress) {
+    lock(job);
+    const JobState state = (JobState)job->row.state;
+    *progress = state == JOB_SUCCESSFUL    ? 100
+                : job->computation == NULL ? 0
+                                           : atomic_load(&job->computation->progress) / 100.0;
+    unlock(job);
+    return state;
 }
 
 bool job_watch(Job *job, const Waker *waker) {

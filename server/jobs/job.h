@@ -41,6 +41,9 @@ typedef struct JobShow {
     char *warnings; // JSON array, of the scene
     char *notes;    // JSON array, of the run; NULL: none
     char *title;    // NULL if none
+    char *labels;   // JSON array; NULL: none
+    char *study;    // the kind of its study; NULL: none
+    bool is_result_deleted;
 } JobShow;
 
 Job *job_hold(Job *job);
@@ -48,6 +51,8 @@ void job_drop(Job *job);
 bool job_is_finished(Job *job);
 Status job_show(Job *job, JobShow *show);
 void job_show_clear(JobShow *show);
+// Its state and, in *progress, percent: what may be looked at often.
+JobState job_glance(Job *job, double *progress);
 
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.
 bool job_watch(Job *job, const Waker *waker);

@@ -168,7 +168,8 @@ static size_t close_jobs(Computation *computation, const Findings *findings, Job
 
 // A full disk and the like pass; then the jobs are worth another try.
 static bool is_passing(Status status) {
-    return status == STATUS_IO || status == STATUS_BUSY || status == STATUS_NO_MEMORY;
+    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
+           status == STATUS_NO_MEMORY;
 }
 
 // A result that can never be saved, because it is too large, makes its jobs failed ones.
@@ -253,7 +254,9 @@ static void finish(Intake *intake, Computation *computation, const Findings *fin
         publish(findings, jobs, count, saved, problem);
         pthread_mutex_unlock(&intake->lock);
     }
-    if (findings->outcome != NULL && computation->is_again)
+    // It may have been deleted meanwhile, and what is in the cache counts as known.
+    if (findings->outcome != NULL && computation->is_again &&
+        store_result_exists(intake->store, computation->result))
         cache_put(intake->cache, computation->result, findings->outcome);
     index_remove(intake->in_flight, &computation->indexed);
     tell_askers(intake, computation, findings);
@@ -283,21 +286,32 @@ static void abandon(Intake *intake, Computation *computation) {
     wakers_call(&computation->askers);
 }
 
+static bool is_slow(const Computation *computation) {
+    return computation->queued.seconds > queue_quick;
+}
+
+// The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
+static QueueEntry *take_entry(const Worker *worker) {
+    Intake *intake = worker->intake;
+    if (worker->is_spare && intake->slow_running < intake->settings.workers)
+        return NULL;
+    return queue_take(intake->queue, worker->is_spare);
+}
+
 static Computation *next_computation(Worker *worker) {
     Intake *intake = worker->intake;
-    while (intake->first == NULL && !intake->is_closing)
-        pthread_cond_wait(&intake->work, &intake->lock);
-    if (intake->is_closing)
+    QueueEntry *entry = NULL;
+    while (!intake->is_closing && (entry = take_entry(worker)) == NULL)
+        pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
+    if (entry == NULL)
         return NULL;
-    Computation *computation = intake->first;
-    intake->first = computation->next;
-    if (intake->first == NULL)
-        intake->last = NULL;
-    intake->queued--;
-    computation->next = NULL;
+    Computation *computation = computation_of(entry);
     computation->is_running = true;
     worker->running = computation;
+    if (is_slow(computation) && ++intake->slow_running == intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
+    computation->began_ns = now_ns;
     for (Job *job = computation->jobs; job != NULL; job = job->next_shared) {
         job->row.state = JOB_RUNNING;
         job->row.started_unix_ms = now_ms;
@@ -305,6 +319,14 @@ static Computation *next_computation(Worker *worker) {
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
     }
     return computation;
+}
+
+// How long runs take beside what was foretold, for those who ask when to come back.
+static void keep_pace(Intake *intake, const Computation *computation, const Findings *findings) {
+    const double foretold = computation->queued.seconds;
+    const double ratio = 1e-9 * (double)(findings->ended_ns - findings->began_ns) / foretold;
+    if (foretold > 0 && ratio > 1e-3 && ratio < 1e3)
+        intake->pace += 0.1 * (ratio - intake->pace);
 }
 
 void *worker_main(void *context) {
@@ -321,6 +343,9 @@ void *worker_main(void *context) {
             finish(intake, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
         worker->running = NULL;
+        intake->slow_running -= is_slow(computation);
+        if (findings.status == STATUS_OK)
+            keep_pace(intake, computation, &findings);
         if (findings.status == STATUS_CANCELLED)
             abandon(intake, computation);
         pthread_mutex_unlock(&intake->lock);

@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <sqlite3.h>
@@ -24,6 +25,26 @@ struct Database {
     } kept[STATEMENTS];
     size_t kept_count;
 };
+
+// Room ran out under what SQLite calls an error of writing: a quota, or a limit on a file's size.
+static bool is_full(sqlite3 *connection) {
+    const int code = sqlite3_errcode(connection) & 0xFF, cause = sqlite3_system_errno(connection);
+    return code == SQLITE_FULL ||
+           (code == SQLITE_IOERR && (cause == ENOSPC || cause == EDQUOT || cause == EFBIG));
+}
+
+static Status report_full(const char *path, Problem *problem) {
+    struct statvfs disk;
+    const char *slash = path != NULL ? strrchr(path, '/') : NULL;
+    const int size = slash != NULL ? (int)(slash - path) : 0;
+    if (slash == NULL || statvfs(path, &disk) != 0)
+        return problem_set(problem, STATUS_FULL, "there is no room left for the database");
+    return problem_set(problem, STATUS_FULL,
+                       "there is no room left in %.*s: %llu bytes are free on its disk; what is "
+                       "stored can be read, and writing goes on when there is room",
+                       size, path,
+                       (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize);
+}
 
 // What SQLite says, in words and as a status.
 static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
@@ -51,6 +72,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
         break;
     }
     const char *path = sqlite3_db_filename(connection, "main");
+    if (is_full(connection))
+        return report_full(path, problem);
     const bool has_path = path != NULL && path[0] != '\0';
     return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
                        has_path ? ", in " : "", has_path ? path : "");

@@ -1,5 +1,6 @@
 // The store from outside: durable when a call returns, one daemon a folder, seeds, jobs and
 // results.
+#include "server/store/job_search.h"
 #include "server/store/store.h"
 
 #include <pthread.h>
@@ -109,16 +110,19 @@ static void jobs_survive_closing_and_are_listed_newest_first(void **state) {
     assert_int_equal(store_job_load(store, "j-9", &row, NULL), STATUS_NOT_FOUND);
 
     JobRows rows;
-    assert_int_equal(store_job_list(store, NULL, 2, &rows, NULL), STATUS_OK);
+    JobSearch search = job_search_all(2);
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].id, "j-3");
     assert_string_equal(rows.at[1].id, "j-2");
     job_rows_clear(&rows);
-    assert_int_equal(store_job_list(store, "j-2", 2, &rows, NULL), STATUS_OK);
+    search.before = "j-2";
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].id, "j-1");
     job_rows_clear(&rows);
-    assert_int_equal(store_job_list(store, "j-9", 2, &rows, NULL), STATUS_NOT_FOUND);
+    search.before = "j-9";
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_NOT_FOUND);
     assert_int_equal(rows.count, 0);
 
     assert_int_equal(store_job_unfinished(store, &rows, NULL), STATUS_OK);
