@@ -14,6 +14,8 @@
 
 static const double wait_initial = 2, wait_most = 30; // [s]
 
+enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
+
 // Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
     JobShow show = {0};
@@ -54,22 +56,46 @@ static void pause_forget(void *kept) {
     job_drop(pause_end(kept));
 }
 
+// Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
+// there is no memory; the hold stays with the caller then.
+static bool sleep_until(const Request *request, Reply *reply, Job *job,
+                        bool (*watch)(Job *job, const Waker *waker), int wait_ms) {
+    Pause *pause = malloc(sizeof *pause);
+    if (pause == NULL)
+        return false;
+    *pause = (Pause){job, request->waker};
+    if (!watch(job, request->waker)) {
+        free(pause);
+        return false;
+    }
+    reply_wait(reply, wait_ms, pause, pause_forget);
+    return true;
+}
+
 // Puts the request to sleep until the job is finished, `wait` seconds after the request came at
 // most. False if there is nothing to wait for; the hold stays with the caller then.
 static bool pause_begin(const Request *request, Reply *reply, Job *job, double wait) {
     const double left = wait - 1e-9 * (double)(clock_monotonic_ns() - request->started_ns);
     if (request->is_expired || left <= 0 || job_is_finished(job))
         return false;
-    Pause *pause = malloc(sizeof *pause);
-    if (pause == NULL)
-        return false;
-    *pause = (Pause){job, request->waker};
-    if (!job_watch(job, request->waker)) {
-        free(pause);
-        return false;
+    return sleep_until(request, reply, job, job_watch, (int)(1000 * left) + 1);
+}
+
+// The same until the store has the job: nobody is told of it before. Where that fails, the hold is
+// dropped.
+static Status pause_until_kept(const Request *request, Reply *reply, Job *job, bool *is_paused,
+                               Problem *problem) {
+    bool is_kept;
+    *is_paused = false;
+    Status status = job_kept(job, &is_kept, problem);
+    if (status == STATUS_OK && !is_kept) {
+        *is_paused = sleep_until(request, reply, job, job_watch_kept, KEEP_WAIT_MS);
+        if (!*is_paused)
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory to wait for the job");
     }
-    reply_wait(reply, (int)(1000 * left) + 1, pause, pause_forget);
-    return true;
+    if (status != STATUS_OK)
+        job_drop(job);
+    return status;
 }
 
 static Status dry_run(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -123,6 +149,10 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         wait = prefer.wait < wait_most ? prefer.wait : wait_most;
     if (pause_begin(request, reply, job, wait))
         return STATUS_OK;
+    bool is_paused;
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
     char applied[24] = "";
     if (prefer.has_wait)
         snprintf(applied, sizeof applied, "wait=%.4g", wait);
@@ -147,6 +177,13 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
 
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
-    TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    bool is_paused;
+    if (request->kept != NULL)
+        job = pause_end(request->kept);
+    else
+        TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
 }

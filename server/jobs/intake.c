@@ -66,10 +66,35 @@ void intake_release(Job *job) {
 }
 
 void intake_retire(Job *job) {
-    Intake *intake = job->intake;
     intake_release(job);
-    index_remove(intake->jobs, &job->indexed);
+    if (!job->is_live)
+        return;
+    job->is_live = false;
+    index_remove(job->intake->jobs, &job->indexed);
     job_drop(job);
+}
+
+void intake_settle(Intake *intake) {
+    if (--intake->posted == 0)
+        pthread_cond_broadcast(&intake->settled);
+}
+
+void intake_refuse(Job *job, Status status, const char *detail) {
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    job->row.state = JOB_FAILED;
+    wakers_call(&job->wakers);
+    wakers_call(&job->keepers);
+    intake_detach(job);
+    intake_retire(job);
+}
+
+void intake_withdraw(Job *job) {
+    if (job->ticket == NULL || !store_withdraw(job->intake->store, job->ticket))
+        return;
+    job->ticket = NULL;
+    intake_settle(job->intake);
+    job_drop(job); // the post's hold
 }
 
 void intake_drop(Intake *intake) {
@@ -78,6 +103,7 @@ void intake_drop(Intake *intake) {
     pthread_cond_destroy(&intake->work);
     pthread_cond_destroy(&intake->spare_work);
     pthread_cond_destroy(&intake->keys_free);
+    pthread_cond_destroy(&intake->settled);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
 }
@@ -120,6 +146,7 @@ void intake_attach(Job *job, Computation *computation) {
 void intake_admit(Intake *intake, Job *job) {
     job->scene_size = strlen(job->row.scene);
     index_add(intake->jobs, &job_hold(job)->indexed);
+    job->is_live = true;
     job->is_counted = true;
     intake->live++;
     job->client->live++;
@@ -152,6 +179,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     pthread_cond_init(&intake->keys_free, NULL);
     intake->pace = 1;
     intake->queue = queue_new();
+    pthread_cond_init(&intake->settled, NULL);
     intake->jobs = index_new();
     intake->in_flight = index_new();
     intake->cache = cache_new(settings->cache_bytes);
@@ -206,9 +234,22 @@ void intake_close(Intake *intake) {
     pthread_mutex_unlock(&intake->lock);
     for (size_t i = 0; i < intake->worker_count; i++)
         pthread_join(intake->workers[i].thread, NULL);
+    pthread_mutex_lock(&intake->lock);
+    while (intake->posted > 0)
+        pthread_cond_wait(&intake->settled, &intake->lock);
+    pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
     for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
         let_go(computation_of(entry));
+    intake_abandon_delayed(intake);
+    for (Job *job; (job = intake->undismissed) != NULL;) {
+        intake->undismissed = job->next_undismissed;
+        job_drop(job);
+    }
+    for (Job *job; (job = intake->keyed) != NULL;) {
+        intake->keyed = job->next_keyed;
+        job_drop(job);
+    }
     // Those whose end could not be stored are still here.
     for (Job *job; (job = index_any(intake->jobs)) != NULL;)
         intake_retire(job);
@@ -236,6 +277,7 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     Job *job = job_new(NULL);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    job->is_kept = true;
     const Status status = store_job_load(intake->store, id, &job->row, problem);
     if (status != STATUS_OK) {
         job_drop(job);
@@ -243,13 +285,8 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
     }
     ResultRow result = {0};
     if (job->row.state == JOB_SUCCESSFUL &&
-        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK) {
-        job->plan = result.plan;
-        job->summary = result.summary;
-        job->work = result.work;
-        job->notes = result.notes;
-        result.plan = result.summary = result.work = result.notes = NULL;
-    }
+        store_result_head(intake->store, job->row.result, &result, NULL) == STATUS_OK)
+        job->head = head_new(&result);
     result_row_clear(&result);
     *found = job;
     return STATUS_OK;
@@ -261,7 +298,42 @@ static Status refuse_finished(const char *id, int state, Problem *problem) {
                        job_state_names[state]);
 }
 
-// Live jobs only. The row is as it goes to the store.
+static void dismissed(void *context, Status status, const char *detail) {
+    Job *job = context;
+    Intake *intake = job->intake;
+    pthread_mutex_lock(&intake->lock);
+    job->is_kept = status == STATUS_OK;
+    job->refusal = status;
+    text_fit(job->refused, sizeof job->refused, detail);
+    // Until the store has it, the job is found here.
+    if (status == STATUS_OK) {
+        intake_retire(job);
+    } else if (!intake->is_closing) {
+        job->next_undismissed = intake->undismissed;
+        intake->undismissed = job_hold(job);
+    }
+    wakers_call(&job->keepers);
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    job_drop(job); // the post's hold
+}
+
+void intake_retry_dismissed(Intake *intake) {
+    Job *job = intake->undismissed, *next;
+    intake->undismissed = NULL;
+    for (; job != NULL; job = next) {
+        next = job->next_undismissed;
+        const StoreDone done = {dismissed, job}; // takes the list's hold
+        if (store_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
+            intake->posted++;
+        } else {
+            job->next_undismissed = intake->undismissed;
+            intake->undismissed = job;
+        }
+    }
+}
+
+// Live jobs only: dismissed for all at once, and on its way to the store.
 static Status dismiss(Intake *intake, Job *job, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
@@ -274,14 +346,24 @@ static Status dismiss(Intake *intake, Job *job, Problem *problem) {
         job->row.run = 1e-9 * (double)(clock_monotonic_ns() - job->started_ns);
     job->row.finished_unix_ms = clock_unix_ms();
     job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
+    intake_withdraw(job);
+    job->is_closing = true;
+    job->closing = job->row;
+    job->closing.is_unsaved = !job->is_kept;
+    job->is_kept = false;
     intake_detach(job);
     intake_release(job);
+    const StoreDone done = {dismissed, job_hold(job)};
+    const Status status = store_job_update_post(intake->store, &job->closing, &done);
+    if (status == STATUS_OK) {
+        intake->posted++;
+    } else {
+        job->refusal = status;
+        text_fit(job->refused, sizeof job->refused, "no memory to save the job");
+        wakers_call(&job->keepers);
+        job_drop(job); // the post's hold
+    }
     wakers_call(&job->wakers);
-    pthread_mutex_unlock(&intake->lock);
-    // The row is final. Until the store has it, the job is found here.
-    TRY(store_job_update(intake->store, &job->row, problem));
-    pthread_mutex_lock(&intake->lock);
-    intake_retire(job);
     pthread_mutex_unlock(&intake->lock);
     return STATUS_OK;
 }

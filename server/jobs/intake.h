@@ -43,10 +43,11 @@ typedef struct Submission {
     bool *is_replayed;           // set where the job is an earlier request's; NULL: not told
 } Submission;
 
-// Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
-// (cached), a scene in flight shares that computation, and a key that its client used before for
-// the same body answers with that job (STATUS_REUSED for another body). STATUS_BUSY when the queue
-// is full, STATUS_QUOTA, STATUS_INVALID with the faults. The Job is a hold of the caller's.
+// Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told
+// of it until it is kept (job_kept). Known results finish it at once (cached), a scene in flight
+// shares that computation, and a key that its client used before for the same body answers with
+// that job (STATUS_REUSED for another body). STATUS_BUSY when the queue is full, STATUS_QUOTA,
+// STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
 
 // Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
@@ -69,7 +70,7 @@ void dry_run_clear(DryRun *dry_run);
 // A job by its id, from memory or the store. STATUS_NOT_FOUND.
 Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// Dismisses; STATUS_CONFLICT if it is finished already.
+// Dismisses, for all at once and kept soon (job_kept); STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
 // The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is
@@ -77,6 +78,9 @@ Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *proble
 // is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
+
+// Tries again to store what could not be stored for want of room; to be called now and then.
+void intake_retry(Intake *intake);
 
 // Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
 // STATUS_NOT_FOUND.

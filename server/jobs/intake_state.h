@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 
 #include "server/jobs/cache.h"
+#include "server/jobs/head.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/queue.h"
@@ -34,21 +35,30 @@ typedef struct Computation {
     atomic_uint progress; // in 1/10,000
 } Computation;
 
+// A job goes to the store twice: when it is accepted and when it is final. Both are posted; where
+// the second comes before the first was begun, the first is withdrawn. `row` is what others see.
 struct Job {
     IndexEntry indexed; // live, by id
     atomic_size_t holds;
     Intake *intake; // held, for its lock; NULL: read from the store, never changes
-    JobRow row;     // `state` and all else as seen by others
-    JobRow closing; // as it will be once the store has it; borrows row's texts, owns `problem`
-    bool is_closing;
-    size_t scene_size;                   // in bytes, counted while it is live
-    bool is_counted;                     // takes a place in the queue
-    char *plan, *summary, *work, *notes; // of the result
-    Computation *computation;            // NULL: not yet or no more
-    Client *client;                      // NULL while it was not admitted
+    JobRow row;
+    JobRow opening, closing; // as posted; both borrow row's texts, but for closing.problem
+    StoreTicket *ticket;     // of `opening`, until the store has answered or it was withdrawn
+    bool is_closing;         // its last state is on the way to the store
+    bool is_kept;            // the store has it as `row` shows it
+    Status refusal;          // why not
+    char refused[256];
+    size_t scene_size;        // in bytes, counted while it is live
+    bool is_live;             // in the index, which holds it
+    bool is_counted;          // takes a place in the queue
+    Head *head;               // of the result
+    Computation *computation; // NULL: not yet or no more
+    Client *client;           // NULL while it was not admitted
+    Job *next_keyed;          // in intake->keyed
+    Job *next_undismissed;    // in intake->undismissed
     Job *next_shared;
     int64_t submitted_ns, started_ns;
-    Wakers wakers;
+    Wakers wakers, keepers; // for when it is finished; for when it is kept
 };
 
 typedef struct Failure {
@@ -71,20 +81,26 @@ struct Intake {
     Store *store;
     IntakeSettings settings;
     pthread_mutex_t lock;
-    pthread_cond_t work;
+    pthread_cond_t work;       // for a worker, or room for what it makes
     pthread_cond_t spare_work; // for the spare worker alone
+    pthread_cond_t settled;    // nothing is posted any more
     pthread_cond_t keys_free;  // a KeyHold was given up
     struct KeyHold *keys;
+    Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
     Worker *workers;     // settings.workers of them, and the spare one
     size_t worker_count; // started
     size_t slow_running;
     double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;        // not yet finished
-    Index *in_flight;   // computations
-    Queue *queue;       // of computations
-    size_t live;        // jobs not yet finished
-    size_t scene_bytes; // of them all
+    Index *jobs;                 // not yet finished
+    Index *in_flight;            // computations
+    Queue *queue;                // of computations
+    size_t live;                 // jobs not yet finished
+    size_t scene_bytes;          // of them all
+    size_t posted;               // writes that the store has yet to answer
+    size_t saving, saving_bytes; // computations that have run and are not yet saved
+    struct Saving *delayed;      // of these, what waits for room in the store
+    Job *undismissed;            // held: dismissed, but the store could not be told
     Cache *cache;
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
@@ -101,6 +117,11 @@ void computation_free(Computation *computation);
 
 void intake_drop(Intake *intake); // frees what is left with the last hold
 
+// With the lock held: what intake_retry does for jobs that were dismissed.
+void intake_retry_dismissed(Intake *intake);
+// Nobody else is there any more: what waits for room stays unfinished in the store.
+void intake_abandon_delayed(Intake *intake);
+
 // With the lock held.
 // Gives back its place in the queue; it can still be found.
 void intake_release(Job *job);
@@ -111,10 +132,34 @@ Computation *computation_of(QueueEntry *entry);
 void intake_admit(Intake *intake, Job *job); // it is live, held by the index
 void intake_attach(Job *job, Computation *computation);
 void intake_detach(Job *job); // from its computation, which stops when nobody is left
+// The store has answered one of the posted writes.
+void intake_settle(Intake *intake);
+// It could not be kept: whoever waits is told, and it is live no more.
+void intake_refuse(Job *job, Status status, const char *detail);
+// What was posted first need not be written if it was not begun.
+void intake_withdraw(Job *job);
 
 // An unfinished job of the store, from an earlier life. Takes the row. Only what concerns the whole
 // program is an error.
 Status intake_take_up(Intake *intake, JobRow *row, Problem *problem);
+
+// What a computation came to, as documents.
+typedef struct Findings {
+    Status status;
+    Outcome *outcome;   // NULL unless STATUS_OK
+    StudyAnswer answer; // its study NULL where none was asked for
+    ResultRow result;
+    char *problem; // of failed jobs
+    char detail[256];
+    int64_t began_ns, ended_ns;
+} Findings;
+void findings_clear(Findings *findings);
+
+// Without the lock. Takes the computation, which has run, and what is in `findings`: saves them
+// with the jobs that wait for them, and says that these are finished once that is durable.
+void intake_save(Intake *intake, Computation *computation, Findings *findings);
+// With the lock held: whether a worker should wait before it makes more to be saved.
+bool intake_is_behind(const Intake *intake);
 
 void *worker_main(void *worker);
 

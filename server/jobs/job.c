@@ -60,11 +60,9 @@ void job_drop(Job *job) {
     if (job == NULL || atomic_fetch_sub(&job->holds, 1) != 1)
         return;
     job_row_clear(&job->row);
-    free(job->plan);
-    free(job->summary);
-    free(job->work);
-    free(job->notes);
+    head_drop(job->head);
     free(job->wakers.at);
+    free(job->keepers.at);
     intake_drop(job->intake);
     free(job);
 }
@@ -117,25 +115,27 @@ Status job_show(Job *job, JobShow *show) {
         show->queued = job->started_ns > 0 ? row->queued : show->total;
         show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
-    const bool is_whole = copy(&show->problem, row->problem) && copy(&show->plan, job->plan) &&
-                          copy(&show->summary, job->summary) && copy(&show->work, job->work) &&
-                          copy(&show->notes, job->notes) && copy(&show->warnings, row->warnings) &&
-                          copy(&show->title, row->title) && copy(&show->labels, row->labels) &&
-                          copy(&show->study, row->study);
+    const bool is_whole = copy(&show->problem, row->problem) &&
+                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title) &&
+                          copy(&show->labels, row->labels) && copy(&show->study, row->study);
+    show->head = head_hold(job->head);
     unlock(job);
+    if (show->head != NULL) {
+        show->plan = show->head->plan;
+        show->summary = show->head->summary;
+        show->work = show->head->work;
+        show->notes = show->head->notes;
+    }
     return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
 void job_show_clear(JobShow *show) {
     free(show->problem);
-    free(show->plan);
-    free(show->summary);
     free(show->warnings);
-    free(show->work);
-    free(show->notes);
     free(show->title);
     free(show->labels);
     free(show->study);
+    head_drop(show->head);
     *show = (JobShow){0};
 }
 
@@ -149,6 +149,16 @@ JobState job_glance(Job *job, double *progress) {
     return state;
 }
 
+Status job_kept(Job *job, bool *is_kept, Problem *problem) {
+    lock(job);
+    *is_kept = job->is_kept;
+    Status status = STATUS_OK;
+    if (!job->is_kept && job->refusal != STATUS_OK)
+        status = problem_set(problem, job->refusal, "%s", job->refused);
+    unlock(job);
+    return status;
+}
+
 bool job_watch(Job *job, const Waker *waker) {
     lock(job);
     bool is_watched = true;
@@ -160,8 +170,20 @@ bool job_watch(Job *job, const Waker *waker) {
     return is_watched;
 }
 
+bool job_watch_kept(Job *job, const Waker *waker) {
+    lock(job);
+    bool is_watched = true;
+    if (job->is_kept || job->refusal != STATUS_OK)
+        waker->wake(waker->context);
+    else
+        is_watched = wakers_add(&job->keepers, waker);
+    unlock(job);
+    return is_watched;
+}
+
 void job_unwatch(Job *job, const Waker *waker) {
     lock(job);
     wakers_remove(&job->wakers, waker);
+    wakers_remove(&job->keepers, waker);
     unlock(job);
 }

@@ -34,15 +34,16 @@ typedef struct JobShow {
     char result[72];                                            // "" while there is none
     int64_t created_unix_ms, started_unix_ms, finished_unix_ms; // 0: not yet
     double queued, run, total;                                  // [s]
-    char *problem;  // problem+json of a failed job; NULL
-    char *plan;     // JSON; NULL while unknown
-    char *summary;  // JSON; NULL while unknown
-    char *work;     // JSON; NULL while unknown
-    char *warnings; // JSON array, of the scene
-    char *notes;    // JSON array, of the run; NULL: none
-    char *title;    // NULL if none
-    char *labels;   // JSON array; NULL: none
-    char *study;    // the kind of its study; NULL: none
+    char *problem;       // problem+json of a failed job; NULL
+    const char *plan;    // JSON; NULL while unknown
+    const char *summary; // JSON; NULL while unknown
+    const char *work;    // JSON; NULL while unknown
+    char *warnings;      // JSON array, of the scene
+    const char *notes;   // JSON array, of the run; NULL: none
+    char *title;         // NULL if none
+    struct Head *head;   // holds plan, summary, work and notes; NULL: they are the maker's
+    char *labels;        // JSON array; NULL: none
+    char *study;         // the kind of its study; NULL: none
     bool is_result_deleted;
 } JobShow;
 
@@ -54,8 +55,15 @@ void job_show_clear(JobShow *show);
 // Its state and, in *progress, percent: what may be looked at often.
 JobState job_glance(Job *job, double *progress);
 
+// Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
+// told of it before. STATUS_OK with *is_kept false while that is under way; otherwise why it could
+// not be kept. A job that could not be accepted never was.
+Status job_kept(Job *job, bool *is_kept, Problem *problem);
+
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.
 bool job_watch(Job *job, const Waker *waker);
+// The same for when the store has it, or could not take it.
+bool job_watch_kept(Job *job, const Waker *waker);
 // Takes it back; after this returns it will not be called.
 void job_unwatch(Job *job, const Waker *waker);
 

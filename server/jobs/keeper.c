@@ -1,4 +1,5 @@
-// It looks every few seconds, and goes on at once while there is something to remove, with a pause
+// Every second it has the intake try again what there was no room for. Every few seconds it looks
+// for what is to go, and goes on at once while there is something to remove, with a pause
 // between the steps in which others write. What cannot be removed now is tried again the next time.
 #include "server/jobs/keeper.h"
 
@@ -8,7 +9,7 @@
 
 #include "server/base/clock.h"
 
-enum { LOOK_MS = 5000, PAUSE_MS = 10 };
+enum { LOOK_MS = 5000, PAUSE_MS = 10, RETRY_MS = 1000 };
 
 struct Keeper {
     Store *store;
@@ -20,9 +21,10 @@ struct Keeper {
     bool is_stopping;
 };
 
-// False where it is to stop.
-static bool pause_for(Keeper *keeper, int64_t ms) {
-    const int64_t until = clock_unix_ms() + ms;
+// Until then, a second at most. False where it is to stop.
+static bool pause_for(Keeper *keeper, int64_t until_ns) {
+    const int64_t left_ms = (until_ns - clock_monotonic_ns()) / 1000000;
+    const int64_t until = clock_unix_ms() + (left_ms < RETRY_MS ? left_ms : RETRY_MS);
     const struct timespec end = {(time_t)(until / 1000), (long)(until % 1000) * 1000000};
     pthread_mutex_lock(&keeper->lock);
     while (!keeper->is_stopping &&
@@ -35,14 +37,18 @@ static bool pause_for(Keeper *keeper, int64_t ms) {
 
 static void *work(void *context) {
     Keeper *keeper = context;
-    bool is_more;
+    int64_t next_ns = 0; // to look for what is to go
     do {
+        intake_retry(keeper->intake);
+        if (clock_monotonic_ns() < next_ns)
+            continue;
         Removed removed;
         const Status status = store_remove(keeper->store, &keeper->rules, &removed, NULL);
-        is_more = status == STATUS_OK && removed.is_more;
         for (size_t i = 0; status == STATUS_OK && i < removed.results; i++)
             intake_forget(keeper->intake, removed.result[i]);
-    } while (pause_for(keeper, is_more ? PAUSE_MS : LOOK_MS));
+        const int64_t pause_ms = status == STATUS_OK && removed.is_more ? PAUSE_MS : LOOK_MS;
+        next_ns = clock_monotonic_ns() + pause_ms * 1000000;
+    } while (pause_for(keeper, next_ns));
     return NULL;
 }
 

@@ -33,6 +33,34 @@ static bool is_taken(const Intake *intake, const KeyHold *hold) {
     return false;
 }
 
+// With the lock held: the job of that key which the store may not have yet, held. Those that it
+// has, or never will have, are let go.
+static Job *find_new(Intake *intake, const KeyHold *hold) {
+    Job *found = NULL;
+    for (Job **at = &intake->keyed; *at != NULL;) {
+        Job *job = *at;
+        if (job->is_kept || job->refusal != STATUS_OK) {
+            *at = job->next_keyed;
+            job_drop(job);
+            continue;
+        }
+        const char *client = job->row.client != NULL ? job->row.client : "";
+        if (strcmp(job->row.idempotency_key, hold->key) == 0 && strcmp(client, hold->client) == 0)
+            found = job;
+        at = &job->next_keyed;
+    }
+    return found == NULL ? NULL : job_hold(found);
+}
+
+static Status check_same(const KeyHold *hold, const JobRow *row, Problem *problem) {
+    if (row->request != NULL && strcmp(row->request, hold->request) == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_REUSED,
+                       "the Idempotency-Key \"%.80s\" was used with another body, for the job "
+                       "%.40s; take a new key for a new request",
+                       hold->key, row->id);
+}
+
 Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
                    Problem *problem) {
     *job = NULL;
@@ -54,7 +82,16 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
     hold->next = intake->keys;
     intake->keys = hold;
     hold->is_held = true;
+    Job *new = find_new(intake, hold);
     pthread_mutex_unlock(&intake->lock);
+    if (new != NULL) {
+        const Status status = check_same(hold, &new->row, problem);
+        if (status == STATUS_OK)
+            *job = new;
+        else
+            job_drop(new);
+        return status;
+    }
 
     JobRow row;
     const Status status =
@@ -64,16 +101,20 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
         return STATUS_OK;
     }
     TRY(status);
-    const bool is_same = row.request != NULL && strcmp(row.request, hold->request) == 0;
+    const Status same = check_same(hold, &row, problem);
     char id[40];
     text_fit(id, sizeof id, row.id);
     job_row_clear(&row);
-    if (!is_same)
-        return problem_set(problem, STATUS_REUSED,
-                           "the Idempotency-Key \"%.80s\" was used with another body, for the job "
-                           "%s; take a new key for a new request",
-                           hold->key, id);
-    return intake_find(intake, id, job, problem);
+    return same == STATUS_OK ? intake_find(intake, id, job, problem) : same;
+}
+
+void keyed_remember(Intake *intake, const KeyHold *hold, Job *job) {
+    if (!hold->is_held)
+        return;
+    pthread_mutex_lock(&intake->lock);
+    job->next_keyed = intake->keyed;
+    intake->keyed = job_hold(job);
+    pthread_mutex_unlock(&intake->lock);
 }
 
 void keyed_end(Intake *intake, KeyHold *hold) {

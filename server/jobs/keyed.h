@@ -21,6 +21,8 @@ typedef struct KeyHold {
 // STATUS_USAGE for a key that is none, STATUS_REUSED.
 Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
                    Problem *problem);
+// The job of a new submission: found from now on, also before the store has it.
+void keyed_remember(Intake *intake, const KeyHold *hold, Job *job);
 void keyed_end(Intake *intake, KeyHold *hold);
 
 #endif

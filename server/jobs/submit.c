@@ -1,6 +1,6 @@
-// How a scene becomes a job that is durable before anyone hears of it: known results finish it at
-// once, equal scenes in flight share one computation, and jobs of an earlier life of the daemon
-// come in by the same way.
+// How a scene becomes a job. Its row is on the way to the store while it is computed already;
+// nobody hears of it before the store has it. Known results finish it at once, equal scenes in
+// flight share one computation, and jobs of an earlier life of the daemon come in by the same way.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,35 +27,49 @@ static Status make_id(char id[40]) {
 
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
 static Status find_known(Intake *intake, Job *job, Problem *problem) {
-    pthread_mutex_lock(&intake->lock);
-    Outcome *outcome = cache_find(intake->cache, job->row.result);
-    pthread_mutex_unlock(&intake->lock);
-    if (outcome != NULL) {
-        Bytes plan = {0}, summary = {0}, work = {0}, notes = {0};
-        document_plan(&plan, &outcome->plan);
-        document_summary(&summary, &outcome->summary);
-        document_work(&work, &outcome->work);
-        document_warnings(&notes, &outcome->warnings);
-        job->plan = bytes_take(&plan, NULL);
-        job->summary = bytes_take(&summary, NULL);
-        job->work = bytes_take(&work, NULL);
-        job->notes = bytes_take(&notes, NULL);
-        outcome_drop(outcome);
-        return STATUS_OK;
-    }
     ResultRow row = {0};
     const Status status = store_result_head(intake->store, job->row.result, &row, NULL);
-    if (status == STATUS_OK) {
-        job->plan = row.plan;
-        job->summary = row.summary;
-        job->work = row.work;
-        job->notes = row.notes;
-        row.plan = row.summary = row.work = row.notes = NULL;
-    }
+    if (status == STATUS_OK)
+        job->head = head_new(&row);
     result_row_clear(&row);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)
         return status;
     return problem_set(problem, status, "the results could not be searched");
+}
+
+// The store has answered that it was accepted.
+static void opened(void *context, Status status, const char *detail) {
+    Job *job = context;
+    Intake *intake = job->intake;
+    pthread_mutex_lock(&intake->lock);
+    job->ticket = NULL;
+    // What closes it saves the whole, and tells.
+    if (!job->is_closing) {
+        free(job->row.scene);
+        job->row.scene = NULL;
+    }
+    if (!job->is_closing && status != STATUS_OK)
+        intake_refuse(job, status, detail);
+    if (status == STATUS_OK && (!job->is_closing || !job_state_is_final(job->row.state))) {
+        job->is_kept = true;
+        wakers_call(&job->keepers);
+    }
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    job_drop(job); // the post's hold
+}
+
+// With the lock held.
+static Status post(Intake *intake, Job *job, Problem *problem) {
+    const StoreDone done = {opened, job_hold(job)};
+    job->opening = job->row;
+    const Status status = store_job_post(intake->store, &job->opening, &done, &job->ticket);
+    if (status == STATUS_OK) {
+        intake->posted++;
+        return STATUS_OK;
+    }
+    job_drop(job); // the post's hold
+    return problem_set(problem, status, "no memory for a job");
 }
 
 static Status finish_known(Intake *intake, Job *job, Problem *problem) {
@@ -64,43 +78,33 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    return store_job_add(intake->store, row, problem);
-}
-
-// Room in the queue, or why there is none; the job counts from here on.
-static Status enter(Intake *intake, Job *job, Problem *problem) {
-    Status status = STATUS_OK;
     pthread_mutex_lock(&intake->lock);
-    if (intake->is_closing)
-        status = problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    else if (intake->live >= intake->settings.queue_most)
-        status = problem_set(problem, STATUS_BUSY,
-                             "the queue is full: %zu jobs are unfinished, %zu are allowed",
-                             intake->live, intake->settings.queue_most);
-    else if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
-        status = problem_set(problem, STATUS_BUSY,
-                             "the queue is full: %zu bytes of scenes wait, %zu are allowed",
-                             intake->scene_bytes, intake->settings.queue_bytes);
-    else if ((status = quota_admit(intake, job->client, problem)) == STATUS_OK)
-        intake_admit(intake, job);
+    const Status status = post(intake, job, problem);
     pthread_mutex_unlock(&intake->lock);
     return status;
 }
 
-static void leave(Intake *intake, Job *job) {
-    pthread_mutex_lock(&intake->lock);
-    intake_retire(job);
-    pthread_mutex_unlock(&intake->lock);
+// With the lock held: whether there is room in the queue.
+static Status find_room(const Intake *intake, const Job *job, Problem *problem) {
+    if (intake->is_closing)
+        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    if (intake->live >= intake->settings.queue_most)
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: %zu jobs are unfinished, %zu are allowed",
+                           intake->live, intake->settings.queue_most);
+    if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: %zu bytes of scenes wait, %zu are allowed",
+                           intake->scene_bytes, intake->settings.queue_bytes);
+    return quota_admit(intake, job->client, problem);
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Computation *begin(const char *result, Inquiry *inquiry, const char *warnings) {
-    Computation *computation = computation_new(result);
-    Bytes scene = {0};
+static Computation *begin(const JobRow *row, Inquiry *inquiry) {
+    Computation *computation = computation_new(row->result);
     if (computation != NULL) {
-        document_scene(&scene, inquiry);
-        computation->scene = bytes_take(&scene, NULL);
-        computation->warnings = strdup(warnings);
+        computation->scene = strdup(row->scene);
+        computation->warnings = strdup(row->warnings);
         computation->inquiry = *inquiry;
         *inquiry = (Inquiry){0};
         if (computation->scene != NULL && computation->warnings != NULL)
@@ -111,26 +115,34 @@ static Computation *begin(const char *result, Inquiry *inquiry, const char *warn
     return NULL;
 }
 
-// Takes the inquiry unless the computation is under way already.
+// With the lock held: one of this scene that is under way, to be shared. One for readers alone
+// saves nothing.
+static Computation *find_shared(const Intake *intake, const char *result) {
+    Computation *computation = index_find(intake->in_flight, result);
+    return computation != NULL && computation->is_again ? NULL : computation;
+}
+
+// Queues it, or lets it share what is under way. Takes the inquiry.
 static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
-    Status status = STATUS_OK;
+    Computation *computation = begin(&job->row, inquiry);
+    if (computation == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
-    Computation *computation = index_find(intake->in_flight, job->row.result);
-    // It may have been dismissed meanwhile, by whoever saw it in the store.
-    if (!job_state_is_final(job->row.state)) {
-        if (computation == NULL &&
-            (computation = begin(job->row.result, inquiry, job->row.warnings)) != NULL)
+    Computation *other = find_shared(intake, job->row.result);
+    Status status = find_room(intake, job, problem);
+    if (status == STATUS_OK)
+        status = post(intake, job, problem);
+    if (status == STATUS_OK) {
+        intake_admit(intake, job);
+        if (other == NULL)
             intake_enqueue(intake, computation, job->client);
-        if (computation != NULL) {
-            queue_share(intake->queue, &computation->queued, job->client);
-            intake_attach(job, computation);
-        } else
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+        else
+            queue_share(intake->queue, &other->queued, job->client);
+        intake_attach(job, other != NULL ? other : computation);
     }
-    // The store has it, and the computation.
-    free(job->row.scene);
-    job->row.scene = NULL;
     pthread_mutex_unlock(&intake->lock);
+    if (status != STATUS_OK || other != NULL)
+        computation_free(computation);
     return status;
 }
 
@@ -219,16 +231,7 @@ static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *proble
         return finish_known(intake, job, problem);
     if (known != STATUS_NOT_FOUND)
         return known;
-    TRY(enter(intake, job, problem));
-    Status status = store_job_add(intake->store, &job->row, problem);
-    if (status == STATUS_OK && (status = start(intake, job, inquiry, problem)) != STATUS_OK) {
-        // The client is told that it was refused: the next start must not run it all the same.
-        fail_row(&job->row, problem);
-        (void)store_job_update(intake->store, &job->row, NULL);
-    }
-    if (status != STATUS_OK)
-        leave(intake, job);
-    return status;
+    return start(intake, job, inquiry, problem);
 }
 
 // Who asks, if it may.
@@ -282,6 +285,8 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
         *submission->is_replayed = *accepted != NULL;
     if (status == STATUS_OK && *accepted == NULL)
         status = submit_new(intake, submission, &hold, accepted, problem);
+    if (status == STATUS_OK && *accepted != NULL)
+        keyed_remember(intake, &hold, *accepted);
     keyed_end(intake, &hold);
     return status;
 }
@@ -294,7 +299,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
     intake_result_id(inquiry, row->result);
     if (job != NULL && client != NULL && row->result[0] != '\0' &&
         (computation = index_find(intake->in_flight, row->result)) == NULL &&
-        (computation = begin(row->result, inquiry, row->warnings)) != NULL)
+        (computation = begin(row, inquiry)) != NULL)
         intake_enqueue(intake, computation, client);
     if (computation == NULL) {
         job_drop(job);
@@ -305,6 +310,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
     job->submitted_ns = clock_monotonic_ns() - (age_ms > 0 ? age_ms : 0) * 1000000;
     job->row = *row;
     *row = (JobRow){0};
+    job->is_kept = true;
     job->row.state = JOB_ACCEPTED;
     job->client = client;
     job->indexed.key = job->row.id;

@@ -1,6 +1,6 @@
-// A worker takes computations from the queue, runs them, saves result and jobs in one transaction,
-// and only then says that they are finished. A computation stopped because nobody wants it leaves
-// no trace; one stopped because the daemon ends leaves its jobs unfinished in the store.
+// A worker takes computations from the queue, runs them, hands what they came to to be saved, and
+// takes the next. A computation stopped because nobody wants it leaves no trace; one stopped
+// because the daemon ends leaves its jobs unfinished in the store.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,22 +27,12 @@ static bool advance(void *context, double fraction) {
     return !atomic_load(&part->computation->is_stopped);
 }
 
-// What a computation came to, as documents.
-typedef struct Findings {
-    Status status;
-    Outcome *outcome;   // NULL unless STATUS_OK
-    StudyAnswer answer; // its study NULL where none was asked for
-    ResultRow result;
-    char *problem; // of failed jobs
-    char detail[256];
-    int64_t began_ns, ended_ns;
-} Findings;
-
-static void findings_clear(Findings *findings) {
+void findings_clear(Findings *findings) {
     outcome_drop(findings->outcome);
     fields_clear(study_answer_fields, &findings->answer);
     result_row_clear(&findings->result);
     free(findings->problem);
+    *findings = (Findings){0};
 }
 
 // Of one document; the database takes a billion.
@@ -144,132 +134,6 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     findings->status = status;
 }
 
-// With the lock held: the rows as they go to the store, of jobs that have none yet. Returns how
-// many.
-static size_t close_jobs(Computation *computation, const Findings *findings, Job **jobs,
-                         const JobRow **rows, size_t most) {
-    size_t count = 0;
-    for (Job *job = computation->jobs; job != NULL && count < most; job = job->next_shared) {
-        if (job->is_closing)
-            continue;
-        job->is_closing = true;
-        job->closing = job->row;
-        JobRow *row = &job->closing;
-        row->state = findings->status == STATUS_OK ? JOB_SUCCESSFUL : JOB_FAILED;
-        row->finished_unix_ms = clock_unix_ms();
-        row->run = 1e-9 * (double)(findings->ended_ns - findings->began_ns);
-        row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-        row->problem = findings->problem == NULL ? NULL : strdup(findings->problem);
-        jobs[count] = job_hold(job);
-        rows[count++] = row;
-    }
-    return count;
-}
-
-// A full disk and the like pass; then the jobs are worth another try.
-static bool is_passing(Status status) {
-    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
-           status == STATUS_NO_MEMORY;
-}
-
-// A result that can never be saved, because it is too large, makes its jobs failed ones.
-static Status save(Intake *intake, const Findings *findings, Job *const *jobs,
-                   const JobRow *const *rows, size_t count, Problem *problem) {
-    const ResultRow *result = findings->status == STATUS_OK ? &findings->result : NULL;
-    const Status status = store_result_save(intake->store, result, rows, count, problem);
-    if (status == STATUS_OK || is_passing(status))
-        return status;
-    for (size_t i = 0; i < count; i++) {
-        Bytes bytes = {.most = 1 << 20};
-        write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
-        free(jobs[i]->closing.problem);
-        jobs[i]->closing.problem = bytes_take(&bytes, NULL);
-        jobs[i]->closing.state = JOB_FAILED;
-    }
-    problem_clear(problem);
-    return store_result_save(intake->store, NULL, rows, count, problem);
-}
-
-// With the lock held: the jobs are what the store says they are. If it could not be told, they are
-// failed here and unfinished there: the next start computes them again.
-static void publish(const Findings *findings, Job **jobs, size_t count, Status saved,
-                    const Problem *problem) {
-    for (size_t i = 0; i < count; i++) {
-        Job *job = jobs[i];
-        job->row = job->closing;
-        if (job->row.state == JOB_SUCCESSFUL && saved == STATUS_OK) {
-            job->plan = findings->result.plan == NULL ? NULL : strdup(findings->result.plan);
-            job->summary =
-                findings->result.summary == NULL ? NULL : strdup(findings->result.summary);
-            job->work = findings->result.work == NULL ? NULL : strdup(findings->result.work);
-            job->notes = findings->result.notes == NULL ? NULL : strdup(findings->result.notes);
-        }
-        if (saved != STATUS_OK) {
-            Bytes bytes = {.most = 1 << 20};
-            write_problem(&bytes, problem, write_problem_code(problem->status), NULL);
-            free(job->row.problem);
-            job->row.problem = bytes_take(&bytes, NULL);
-            job->row.state = JOB_FAILED;
-            intake_release(job);
-        } else {
-            intake_retire(job);
-        }
-        wakers_call(&job->wakers);
-        job_drop(job); // close_jobs's hold
-    }
-}
-
-static void tell_askers(Intake *intake, Computation *computation, const Findings *findings) {
-    if (computation->askers.count > 0 && findings->status != STATUS_OK) {
-        Failure *failure = &intake->failures[intake->next_failure++ % OUTCOME_FAILURES];
-        text_fit(failure->result, sizeof failure->result, computation->result);
-        text_fit(failure->detail, sizeof failure->detail, findings->detail);
-        failure->status = findings->status;
-    }
-    wakers_call(&computation->askers);
-}
-
-static void finish(Intake *intake, Computation *computation, const Findings *findings,
-                   Problem *problem) {
-    enum { BATCH = 256 };
-    Job *jobs[BATCH];
-    const JobRow *rows[BATCH];
-    for (;;) {
-        // Others may join until the store has answered; they get a turn of their own.
-        pthread_mutex_lock(&intake->lock);
-        const size_t count = close_jobs(computation, findings, jobs, rows, BATCH);
-        if (count == 0)
-            break;
-        pthread_mutex_unlock(&intake->lock);
-        problem_clear(problem);
-        const Status saved = save(intake, findings, jobs, rows, count, problem);
-        if (saved != STATUS_OK)
-            fprintf(stderr, "impactd: the result %s could not be saved: %s\n", computation->result,
-                    problem->detail);
-        pthread_mutex_lock(&intake->lock);
-        // What is in the cache is known, so it must be in the store.
-        if (findings->outcome != NULL && saved == STATUS_OK &&
-            jobs[0]->closing.state == JOB_SUCCESSFUL)
-            cache_put(intake->cache, computation->result, findings->outcome);
-        publish(findings, jobs, count, saved, problem);
-        pthread_mutex_unlock(&intake->lock);
-    }
-    // It may have been deleted meanwhile, and what is in the cache counts as known.
-    if (findings->outcome != NULL && computation->is_again &&
-        store_result_exists(intake->store, computation->result))
-        cache_put(intake->cache, computation->result, findings->outcome);
-    index_remove(intake->in_flight, &computation->indexed);
-    tell_askers(intake, computation, findings);
-    while (computation->jobs != NULL) {
-        Job *job = computation->jobs;
-        computation->jobs = job->next_shared;
-        job->computation = NULL;
-        job->next_shared = NULL;
-        job_drop(job); // the computation's hold
-    }
-    pthread_mutex_unlock(&intake->lock);
-}
-
 // With the lock held: nobody waits for it any more, or the daemon ends and its jobs stay unfinished
 // in the store.
 static void abandon(Intake *intake, Computation *computation) {
@@ -301,7 +165,8 @@ static QueueEntry *take_entry(const Worker *worker) {
 static Computation *next_computation(Worker *worker) {
     Intake *intake = worker->intake;
     QueueEntry *entry = NULL;
-    while (!intake->is_closing && (entry = take_entry(worker)) == NULL)
+    while (!intake->is_closing &&
+           (intake_is_behind(intake) || (entry = take_entry(worker)) == NULL))
         pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
     if (entry == NULL)
         return NULL;
@@ -339,8 +204,6 @@ void *worker_main(void *context) {
         pthread_mutex_unlock(&intake->lock);
         Findings findings = {0};
         run(worker, computation, &findings, &problem);
-        if (findings.status != STATUS_CANCELLED)
-            finish(intake, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
         worker->running = NULL;
         intake->slow_running -= is_slow(computation);
@@ -349,7 +212,10 @@ void *worker_main(void *context) {
         if (findings.status == STATUS_CANCELLED)
             abandon(intake, computation);
         pthread_mutex_unlock(&intake->lock);
-        computation_free(computation);
+        if (findings.status == STATUS_CANCELLED)
+            computation_free(computation);
+        else
+            intake_save(intake, computation, &findings);
         findings_clear(&findings);
         pthread_mutex_lock(&intake->lock);
     }

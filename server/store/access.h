@@ -15,6 +15,12 @@ typedef Status StoreApply(Database *database, const void *work, Problem *problem
 // wrong; a failed apply leaves no trace.
 Status store_write(Store *store, StoreApply *apply, const void *work, Problem *problem);
 
+// The same without waiting: `done` is told. `size` bytes of `work` are copied; 0: it is borrowed
+// until then. *ticket (may be NULL) is set before `done` can be told. STATUS_NO_MEMORY: nothing was
+// queued.
+Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
+                  const StoreDone *done, StoreTicket **ticket);
+
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);
 void store_put(Store *store, Database *database);

@@ -26,11 +26,10 @@ struct Database {
     size_t kept_count;
 };
 
-// Room ran out under what SQLite calls an error of writing: a quota, or a limit on a file's size.
+// A quota, or a limit on a file's size, is to SQLite an error of writing; it does not say which.
 static bool is_full(sqlite3 *connection) {
-    const int code = sqlite3_errcode(connection) & 0xFF, cause = sqlite3_system_errno(connection);
-    return code == SQLITE_FULL ||
-           (code == SQLITE_IOERR && (cause == ENOSPC || cause == EDQUOT || cause == EFBIG));
+    return (sqlite3_errcode(connection) & 0xFF) == SQLITE_FULL ||
+           sqlite3_extended_errcode(connection) == SQLITE_IOERR_WRITE;
 }
 
 static Status report_full(const char *path, Problem *problem) {
@@ -39,11 +38,13 @@ static Status report_full(const char *path, Problem *problem) {
     const int size = slash != NULL ? (int)(slash - path) : 0;
     if (slash == NULL || statvfs(path, &disk) != 0)
         return problem_set(problem, STATUS_FULL, "there is no room left for the database");
+    const unsigned long long left =
+        (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize;
     return problem_set(problem, STATUS_FULL,
-                       "there is no room left in %.*s: %llu bytes are free on its disk; what is "
+                       "there is no room left in %.*s: %llu bytes are free on its disk%s; what is "
                        "stored can be read, and writing goes on when there is room",
-                       size, path,
-                       (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize);
+                       size, path, left,
+                       left > (1 << 26) ? ", so a quota or a limit on files is reached" : "");
 }
 
 // What SQLite says, in words and as a status.

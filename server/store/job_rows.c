@@ -48,13 +48,21 @@ static Status not_found(const char *id, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", id);
 }
 
+// The scene of a successful job is its result's.
+#define JOB_INSERT                                                                                 \
+    "INSERT INTO jobs (" JOB_SHORT                                                                 \
+    ", words, idempotency_key, request, scene) VALUES (:id, :state, :result, :is_cached, "         \
+    ":created_unix_ms, :started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, "       \
+    ":problem, :warnings, :labels, :study, :client, :words, :idempotency_key, :request, "          \
+    "CASE :state WHEN 2 THEN '' ELSE coalesce(:scene, '') END)"
+#define JOB_CHANGE                                                                                 \
+    "SET state = :state, result = :result, is_cached = :is_cached, "                               \
+    "started_unix_ms = :started_unix_ms, finished_unix_ms = :finished_unix_ms, "                   \
+    "queued = :queued, run = :run, total = :total, problem = :problem, "                           \
+    "scene = CASE :state WHEN 2 THEN '' ELSE scene END"
+
 static Status add(Database *database, const void *work, Problem *problem) {
-    static const char sql[] =
-        "INSERT INTO jobs (" JOB_SHORT
-        ", words, idempotency_key, request, scene) VALUES (:id, :state, :result, :is_cached, "
-        ":created_unix_ms, :started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, "
-        ":problem, :warnings, :labels, :study, :client, :words, :idempotency_key, :request, "
-        "CASE :state WHEN 2 THEN '' ELSE :scene END)"; // its result has it
+    static const char sql[] = JOB_INSERT;
     return database_change(database, sql, job_columns, work, NULL, problem);
 }
 
@@ -62,25 +70,30 @@ Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
     return store_write(store, add, row, problem);
 }
 
-Status job_row_update(Database *database, const JobRow *row, Problem *problem) {
-    static const char sql[] = "UPDATE jobs SET state = :state, result = :result, is_cached = "
-                              ":is_cached, started_unix_ms = :started_unix_ms, "
-                              "finished_unix_ms = :finished_unix_ms, queued = :queued, run = :run, "
-                              "total = :total, problem = :problem, "
-                              // Its result has it.
-                              "scene = CASE :state WHEN 2 THEN '' ELSE scene END "
-                              "WHERE id = :id";
+Status store_job_post(Store *store, const JobRow *row, const StoreDone *done,
+                      StoreTicket **ticket) {
+    return store_post(store, add, row, 0, done, ticket);
+}
+
+Status job_row_save(Database *database, const JobRow *row, Problem *problem) {
+    static const char change_sql[] = "UPDATE jobs " JOB_CHANGE " WHERE id = :id";
+    static const char put_sql[] = JOB_INSERT " ON CONFLICT (id) DO UPDATE " JOB_CHANGE;
     int changes;
-    TRY(database_change(database, sql, job_columns, row, &changes, problem));
+    TRY(database_change(database, row->is_unsaved ? put_sql : change_sql, job_columns, row,
+                        &changes, problem));
     return changes > 0 ? STATUS_OK : not_found(row->id, problem);
 }
 
-static Status update(Database *database, const void *work, Problem *problem) {
-    return job_row_update(database, work, problem);
+static Status save(Database *database, const void *work, Problem *problem) {
+    return job_row_save(database, work, problem);
 }
 
 Status store_job_update(Store *store, const JobRow *row, Problem *problem) {
-    return store_write(store, update, row, problem);
+    return store_write(store, save, row, problem);
+}
+
+Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done) {
+    return store_post(store, save, row, 0, done, NULL);
 }
 
 typedef struct Key {

@@ -47,13 +47,19 @@ static Status finish(Database *database, const void *work, Problem *problem) {
     if (both->result != NULL)
         TRY(database_change(database, sql, result_columns, both->result, NULL, problem));
     for (size_t i = 0; i < both->job_count; i++)
-        TRY(job_row_update(database, both->jobs[i], problem));
+        TRY(job_row_save(database, both->jobs[i], problem));
     return STATUS_OK;
 }
 
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem) {
     return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
+}
+
+Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, const StoreDone *done) {
+    const Finish work = {result, jobs, job_count};
+    return store_post(store, finish, &work, sizeof work, done, NULL);
 }
 
 typedef struct Key {

@@ -85,6 +85,15 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
     return writer_do(store->writer, apply, work, problem);
 }
 
+Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
+                  const StoreDone *done, StoreTicket **ticket) {
+    return writer_post(store->writer, apply, work, size, done, ticket);
+}
+
+bool store_withdraw(Store *store, StoreTicket *ticket) {
+    return writer_withdraw(store->writer, ticket);
+}
+
 Database *store_take(Store *store) {
     pthread_mutex_lock(&store->lock);
     while (store->free_count == 0)

@@ -19,6 +19,17 @@ typedef struct Store Store;
 Status store_open(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
 
+// Writes are called "posted" where nobody waits for them. They are done in the order in which they
+// were posted, some at a time. `call` comes once, from the writer's thread, when the write is
+// durable or has failed (then with the reason), and must be quick; it may post.
+typedef struct StoreDone {
+    void (*call)(void *context, Status status, const char *detail);
+    void *context;
+} StoreDone;
+typedef struct StoreTicket StoreTicket; // lives until `call` returns
+// True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
+bool store_withdraw(Store *store, StoreTicket *ticket);
+
 typedef struct MaterialRevision {
     char *slug, *name, *status, *source;
     uint64_t revision;
@@ -53,12 +64,16 @@ typedef struct JobRow {
     char *idempotency_key; // NULL: none
     char *request;         // with a key: SHA-256 of the body it came with
     bool has_result;       // loaded rows: its result is there
+    bool is_unsaved;       // no column: the store may not have it yet, so that saving it adds it
 } JobRow;
 void job_row_clear(JobRow *row);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
-// State, is_cached, times, problem, result. STATUS_NOT_FOUND.
+// The same, posted; `row` is borrowed until then.
+Status store_job_post(Store *store, const JobRow *row, const StoreDone *done, StoreTicket **ticket);
+// State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status store_job_update(Store *store, const JobRow *row, Problem *problem);
+Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done);
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
@@ -90,6 +105,9 @@ void result_row_clear(ResultRow *row);
 // stays as it is.
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem);
+// The same, posted; all of it is borrowed until then.
+Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
+                         size_t job_count, const StoreDone *done);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);

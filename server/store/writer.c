@@ -1,26 +1,29 @@
 // Group commit. While one transaction is made durable the next ones queue up, and all of them
 // become the next transaction:
 //
-//     BEGIN IMMEDIATE   (SAVEPOINT  apply  RELEASE | ROLLBACK TO)...   COMMIT
+//     BEGIN IMMEDIATE   apply...   COMMIT
 //
-// One that fails is rolled back to its savepoint alone. Where the whole transaction is lost (a full
-// disk, a failed commit), each is tried once more by itself, so that everyone is told their own
-// fate and no other's.
+// Where one fails, all is rolled back and done again with a savepoint around each, so that this one
+// alone leaves no trace. (Savepoints at once would copy every page that a write touches.) Where
+// that is lost too (a full disk, a failed commit), each is tried once more by itself, so that
+// everyone is told their own fate and no other's.
 #include "server/store/writer.h"
 
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
-// One caller's write; it lies on that caller's stack.
-typedef struct Write {
-    struct Write *next;
+// One write: on the stack of a caller who waits, or on the heap with a copy of its work behind it.
+struct StoreTicket {
+    StoreTicket *next, **link; // `link` points at what points here; NULL: it is queued no more
     StoreApply *apply;
     const void *work;
-    Problem *problem;
+    StoreDone done; // `call` NULL: its caller waits
     Status status;
     bool is_done;
-    pthread_cond_t done;
-} Write;
+    pthread_cond_t settled;
+    char detail[sizeof((Problem){0}.detail)];
+};
 
 struct Writer {
     Database *database;
@@ -28,14 +31,20 @@ struct Writer {
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t some;
-    Write *first, **last;
+    StoreTicket *first, **last;
+    bool is_idle; // the thread sleeps
     bool is_stopping;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
 
-static Status apply_one(Writer *writer, Database *database, Write *write) {
+static void settle(StoreTicket *write, Status status, const Problem *problem) {
+    write->status = status;
+    if (status != STATUS_OK)
+        memcpy(write->detail, problem->detail, sizeof write->detail);
+}
+
+static Status apply_saved(Writer *writer, Database *database, StoreTicket *write) {
     static const char open[] = "SAVEPOINT one", undo[] = "ROLLBACK TO one", end[] = "RELEASE one";
-    problem_clear(&writer->problem);
     Status status = database_change(database, open, NULL, NULL, NULL, &writer->problem);
     if (status == STATUS_OK) {
         status = write->apply(database, write->work, &writer->problem);
@@ -44,20 +53,24 @@ static Status apply_one(Writer *writer, Database *database, Write *write) {
         if (database_is_in_transaction(database))
             (void)database_change(database, end, NULL, NULL, NULL, NULL);
     }
-    write->status = status;
-    if (status != STATUS_OK)
-        problem_set(write->problem, status, "%s", writer->problem.detail);
     return status;
 }
 
 // Does writes from `first` up to `end` in one transaction. False if all of it is lost;
-// writer->problem then says why.
-static bool commit(Writer *writer, Database *database, Write *first, const Write *end) {
+// writer->problem then says why. Without savepoints one failure loses all.
+static bool commit(Writer *writer, Database *database, StoreTicket *first, const StoreTicket *end,
+                   bool has_savepoints) {
     static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
     problem_clear(&writer->problem);
     Status status = database_change(database, begin, NULL, NULL, NULL, &writer->problem);
-    for (Write *write = first; status == STATUS_OK && write != end; write = write->next) {
-        (void)apply_one(writer, database, write);
+    for (StoreTicket *write = first; status == STATUS_OK && write != end; write = write->next) {
+        problem_clear(&writer->problem);
+        if (!has_savepoints) {
+            status = write->apply(database, write->work, &writer->problem);
+            write->status = STATUS_OK;
+            continue;
+        }
+        settle(write, apply_saved(writer, database, write), &writer->problem);
         if (!database_is_in_transaction(database))
             return false;
     }
@@ -70,45 +83,63 @@ static bool commit(Writer *writer, Database *database, Write *first, const Write
     return status == STATUS_OK;
 }
 
-static void commit_alone(Writer *writer, Database *database, Write *write) {
+static void commit_alone(Writer *writer, Database *database, StoreTicket *write) {
     write->status = STATUS_OK;
-    problem_clear(write->problem);
-    if (commit(writer, database, write, write->next) || write->status != STATUS_OK)
+    if (commit(writer, database, write, write->next, true) || write->status != STATUS_OK)
         return;
-    write->status = writer->problem.status != STATUS_OK ? writer->problem.status : STATUS_IO;
-    problem_set(write->problem, write->status, "%s", writer->problem.detail);
+    const Status status = writer->problem.status;
+    settle(write, status != STATUS_OK ? status : STATUS_IO, &writer->problem);
 }
 
-static void commit_all(Writer *writer, Write *first) {
+static void commit_all(Writer *writer, StoreTicket *first) {
     Database *database = writer->shared != NULL ? store_take(writer->shared) : writer->database;
-    if (!commit(writer, database, first, NULL))
-        for (Write *write = first; write != NULL; write = write->next)
+    if (!commit(writer, database, first, NULL, false) &&
+        (first->next == NULL || !commit(writer, database, first, NULL, true)))
+        for (StoreTicket *write = first; write != NULL; write = write->next)
             commit_alone(writer, database, write);
     if (writer->shared != NULL)
         store_put(writer->shared, database);
+}
+
+// With the lock held, which is let go while others are told.
+static void tell(Writer *writer, StoreTicket *write) {
+    while (write != NULL) {
+        // Its owner may be gone as soon as the lock is free, not before.
+        StoreTicket *next = write->next;
+        if (write->done.call == NULL) {
+            write->is_done = true;
+            pthread_cond_signal(&write->settled);
+        } else {
+            pthread_mutex_unlock(&writer->lock);
+            write->done.call(write->done.context, write->status,
+                             write->status != STATUS_OK ? write->detail : "");
+            free(write);
+            pthread_mutex_lock(&writer->lock);
+        }
+        write = next;
+    }
 }
 
 static void *work(void *context) {
     Writer *writer = context;
     pthread_mutex_lock(&writer->lock);
     for (;;) {
-        while (writer->first == NULL && !writer->is_stopping)
+        while (writer->first == NULL && !writer->is_stopping) {
+            writer->is_idle = true;
             pthread_cond_wait(&writer->some, &writer->lock);
-        Write *write = writer->first;
+        }
+        writer->is_idle = false;
+        StoreTicket *write = writer->first;
         if (write == NULL)
             break;
+        for (StoreTicket *at = write; at != NULL; at = at->next)
+            at->link = NULL;
         writer->first = NULL;
         writer->last = &writer->first;
         pthread_mutex_unlock(&writer->lock);
         commit_all(writer, write);
         pthread_mutex_lock(&writer->lock);
-        while (write != NULL) {
-            // Its owner may be gone as soon as the lock is free, not before.
-            Write *next = write->next;
-            write->is_done = true;
-            pthread_cond_signal(&write->done);
-            write = next;
-        }
+        tell(writer, write);
     }
     pthread_mutex_unlock(&writer->lock);
     return NULL;
@@ -148,16 +179,60 @@ void writer_stop(Writer *writer) {
     free(writer);
 }
 
+// With the lock held.
+static void enqueue(Writer *writer, StoreTicket *write) {
+    write->next = NULL;
+    write->link = writer->last;
+    *writer->last = write;
+    writer->last = &write->next;
+    if (writer->is_idle) {
+        writer->is_idle = false; // woken once is enough
+        pthread_cond_signal(&writer->some);
+    }
+}
+
 Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *problem) {
-    Write write = {.apply = apply, .work = work_, .problem = problem};
-    pthread_cond_init(&write.done, NULL);
+    StoreTicket write = {.apply = apply, .work = work_};
+    pthread_cond_init(&write.settled, NULL);
     pthread_mutex_lock(&writer->lock);
-    *writer->last = &write;
-    writer->last = &write.next;
-    pthread_cond_signal(&writer->some);
+    enqueue(writer, &write);
     while (!write.is_done)
-        pthread_cond_wait(&write.done, &writer->lock);
+        pthread_cond_wait(&write.settled, &writer->lock);
     pthread_mutex_unlock(&writer->lock);
-    pthread_cond_destroy(&write.done);
+    pthread_cond_destroy(&write.settled);
+    if (write.status != STATUS_OK)
+        problem_set(problem, write.status, "%s", write.detail);
     return write.status;
+}
+
+Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size,
+                   const StoreDone *done, StoreTicket **ticket) {
+    StoreTicket *write = malloc(sizeof *write + size);
+    if (write == NULL)
+        return STATUS_NO_MEMORY;
+    write->apply = apply;
+    write->work = size > 0 ? memcpy(write + 1, work_, size) : work_;
+    write->done = *done;
+    if (ticket != NULL)
+        *ticket = write;
+    pthread_mutex_lock(&writer->lock);
+    enqueue(writer, write);
+    pthread_mutex_unlock(&writer->lock);
+    return STATUS_OK;
+}
+
+bool writer_withdraw(Writer *writer, StoreTicket *write) {
+    pthread_mutex_lock(&writer->lock);
+    const bool is_queued = write->link != NULL;
+    if (is_queued) {
+        *write->link = write->next;
+        if (write->next != NULL)
+            write->next->link = write->link;
+        else
+            writer->last = write->link;
+    }
+    pthread_mutex_unlock(&writer->lock);
+    if (is_queued)
+        free(write);
+    return is_queued;
 }

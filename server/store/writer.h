@@ -12,10 +12,14 @@ typedef struct Writer Writer;
 // takes one from there for each transaction. Otherwise `database` is the writer's own, borrowed
 // until writer_stop.
 Status writer_start(Database *database, Store *shared, Writer **writer, Problem *problem);
-// Writes what is queued, then ends the thread. NULL is fine. Nobody may call writer_do any more.
+// Writes what is queued, tells those who wait for it, then ends the thread. NULL is fine. Nobody
+// may write any more.
 void writer_stop(Writer *writer);
 
-// As store_write.
+// As store_write, store_post and store_withdraw.
 Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem);
+Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t size,
+                   const StoreDone *done, StoreTicket **ticket);
+bool writer_withdraw(Writer *writer, StoreTicket *ticket);
 
 #endif

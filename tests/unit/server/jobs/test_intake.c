@@ -18,6 +18,7 @@
 #include "core/math/fourier.h"
 #include "server/jobs/intake.h"
 #include "server/store/database.h"
+#include "server/store/job_search.h"
 
 typedef struct Room {
     char directory[64];
@@ -78,7 +79,21 @@ static Status submit_text(Intake *intake, const char *text, Job **job, Problem *
     return intake_submit(intake, &submission, job, told);
 }
 
-static Job *submit(Room *room, double displacement, double duration) {
+static const struct timespec moment = {0, 1000000};
+
+static Status wait_until_kept(Job *job, Problem *told) {
+    bool is_kept = false;
+    Status status = STATUS_OK;
+    for (int i = 0; i < 60000 && status == STATUS_OK && !is_kept; i++) {
+        status = job_kept(job, &is_kept, told);
+        if (!is_kept)
+            nanosleep(&moment, NULL);
+    }
+    assert_true(is_kept || status != STATUS_OK);
+    return status;
+}
+
+static Job *submit_unkept(Room *room, double displacement, double duration) {
     char text[1024];
     Job *job = NULL;
     scene_text(text, displacement, duration, "sponge");
@@ -88,8 +103,14 @@ static Job *submit(Room *room, double displacement, double duration) {
     return job;
 }
 
+static Job *submit(Room *room, double displacement, double duration) {
+    Job *job = submit_unkept(room, displacement, duration);
+    if (wait_until_kept(job, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return job;
+}
+
 static void wait_for(Job *job) {
-    const struct timespec moment = {0, 1000000};
     for (int i = 0; i < 60000 && !job_is_finished(job); i++)
         nanosleep(&moment, NULL);
     assert_true(job_is_finished(job));
@@ -174,7 +195,6 @@ static void a_dismissed_job_stops_and_stays_dismissed(void **state) {
     Job *running = submit(&room, 0.001, 30000), *queued = submit(&room, 0.002, 30000),
         *again = NULL;
     JobShow a = show(running), b = show(queued);
-    const struct timespec moment = {0, 5000000};
     for (int i = 0; i < 2000 && a.state != JOB_RUNNING; i++) {
         nanosleep(&moment, NULL);
         job_show_clear(&a);
@@ -256,7 +276,6 @@ static Outcome *outcome_of(Room *room, const char *result) {
     atomic_int wakes;
     atomic_init(&wakes, 0);
     const Waker waker = {&wakes, note_wake};
-    const struct timespec moment = {0, 1000000};
     Outcome *outcome = NULL;
     for (int i = 0; i < 20000; i++) {
         const int seen = atomic_load(&wakes);
@@ -362,7 +381,6 @@ static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **s
     (void)state;
     Room room = room_make(1);
     Job *job = submit_study(&room, 1000), *gone = NULL;
-    const struct timespec moment = {0, 1000000};
     JobShow now = show(job);
     for (int i = 0; i < 60000 && now.progress <= 5; i++) { // beyond the scene's own run
         nanosleep(&moment, NULL);
@@ -512,37 +530,160 @@ static void limit_files(rlim_t size) {
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
 }
 
-static void a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost(void **state) {
+// Until nothing is computed, so that only what could not be stored is unfinished.
+static void wait_until_idle(Room *room) {
+    IntakeTally tally;
+    do {
+        nanosleep(&moment, NULL);
+        intake_tally(room->intake, &tally);
+    } while (tally.queued + tally.running > 0);
+    for (int i = 0; i < 50; i++)
+        nanosleep(&moment, NULL);
+}
+
+static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    signal(SIGXFSZ, SIG_IGN);
+    Job *job = submit(&room, 0.015, 2000), *dropped = submit(&room, 0.016, 2000);
+    limit_files(1);
+    wait_until_idle(&room);
+    intake_retry(room.intake);
+    wait_until_idle(&room);
+    JobShow waits = show(job), gone = show(dropped);
+    assert_int_equal(waits.state, JOB_RUNNING);
+    Job *dismissed;
+    assert_int_equal(intake_dismiss(room.intake, gone.id, &dismissed, &problem), STATUS_OK);
+    assert_int_equal(wait_until_kept(dismissed, &problem), STATUS_FULL);
+    job_drop(dismissed);
+    limit_files(RLIM_INFINITY);
+    intake_retry(room.intake);
+    wait_for(job);
+    JobShow now = show(job);
+    assert_int_equal(now.state, JOB_SUCCESSFUL);
+    assert_true(store_result_exists(room.store, now.result));
+    assert_int_equal(wait_until_kept(dropped, &problem), STATUS_OK);
+    assert_int_equal(show(dropped).state, JOB_DISMISSED);
+    job_show_clear(&waits);
+    job_show_clear(&gone);
+    job_show_clear(&now);
+    job_drop(job);
+    job_drop(dropped);
+    room_end(&room);
+}
+
+static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart(void **state) {
     (void)state;
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
     Job *job = submit(&room, 0.015, 2000);
     limit_files(1);
-    wait_for(job);
-    limit_files(RLIM_INFINITY);
-    JobShow failed = show(job);
-    assert_int_equal(failed.state, JOB_FAILED);
-    assert_non_null(failed.problem);
-    assert_false(store_result_exists(room.store, failed.result));
+    wait_until_idle(&room);
+    JobShow waits = show(job);
+    assert_int_equal(waits.state, JOB_RUNNING);
     job_drop(job);
-
-    Job *again = submit(&room, 0.015, 2000);
-    assert_false(job_is_finished(again));
-    wait_for(again);
-    JobShow second = show(again);
-    assert_int_equal(second.state, JOB_SUCCESSFUL);
-    assert_true(store_result_exists(room.store, second.result));
-    job_show_clear(&second);
-    job_drop(again);
-
+    intake_close(room.intake);
+    room.intake = NULL;
+    limit_files(RLIM_INFINITY);
     room_close(&room);
     room_open(&room);
-    assert_int_equal(intake_find(room.intake, failed.id, &job, &problem), STATUS_OK);
+    assert_int_equal(intake_find(room.intake, waits.id, &job, &problem), STATUS_OK);
     wait_for(job);
-    second = show(job);
-    assert_int_equal(second.state, JOB_SUCCESSFUL);
-    job_show_clear(&second);
-    job_show_clear(&failed);
+    JobShow now = show(job);
+    assert_int_equal(now.state, JOB_SUCCESSFUL);
+    job_show_clear(&waits);
+    job_show_clear(&now);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void a_job_that_cannot_be_kept_never_was(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    signal(SIGXFSZ, SIG_IGN);
+    limit_files(1);
+    Job *job = submit_unkept(&room, 0.015, 20000), *found = NULL;
+    problem_clear(&problem);
+    assert_int_equal(wait_until_kept(job, &problem), STATUS_FULL);
+    assert_non_null(strstr(problem.detail, room.directory));
+    Job *quick = submit_unkept(&room, 0.016, 0.1);
+    problem_clear(&problem);
+    assert_int_equal(wait_until_kept(quick, &problem), STATUS_FULL);
+    limit_files(RLIM_INFINITY);
+    Job *const both[] = {job, quick};
+    for (size_t i = 0; i < 2; i++) {
+        JobShow now = show(both[i]);
+        assert_true(job_is_finished(both[i]));
+        assert_int_equal(intake_find(room.intake, now.id, &found, &problem), STATUS_NOT_FOUND);
+        assert_false(store_result_exists(room.store, now.result));
+        job_show_clear(&now);
+        job_drop(both[i]);
+    }
+    // Its place is free, and nobody computes for it: 20,000 s would take long.
+    Job *next = submit(&room, 0.017, 1);
+    wait_for(next);
+    job_drop(next);
+    IntakeTally tally;
+    intake_tally(room.intake, &tally);
+    assert_int_equal(tally.queued + tally.running, 0);
+    room_end(&room);
+}
+
+static void a_job_that_is_done_before_it_was_written_is_written_once(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    char path[128];
+    Database *other;
+    snprintf(path, sizeof path, "%s/impactd.db", room.directory);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(database_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    // The first one's row holds the writer up; the others' are still queued when they are done.
+    Job *jobs[4];
+    for (size_t i = 0; i < 4; i++)
+        jobs[i] = submit_unkept(&room, 0.001 * (double)(i + 1), 0.5);
+    for (int i = 0; i < 300; i++)
+        nanosleep(&moment, NULL);
+    bool is_kept;
+    for (size_t i = 0; i < 4; i++) {
+        assert_false(job_is_finished(jobs[i]));
+        assert_int_equal(job_kept(jobs[i], &is_kept, &problem), STATUS_OK);
+        assert_false(is_kept);
+    }
+    assert_int_equal(database_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    database_close(other);
+    for (size_t i = 0; i < 4; i++) {
+        wait_for(jobs[i]);
+        assert_int_equal(wait_until_kept(jobs[i], &problem), STATUS_OK);
+        JobShow now = show(jobs[i]);
+        JobRow row;
+        assert_int_equal(now.state, JOB_SUCCESSFUL);
+        assert_int_equal(store_job_load(room.store, now.id, &row, &problem), STATUS_OK);
+        assert_int_equal(row.state, JOB_SUCCESSFUL);
+        assert_string_equal(row.result, now.result);
+        job_row_clear(&row);
+        job_show_clear(&now);
+        job_drop(jobs[i]);
+    }
+    JobRows rows;
+    const JobSearch all = job_search_all(100);
+    assert_int_equal(store_job_search(room.store, &all, &rows, &problem), STATUS_OK);
+    assert_int_equal(rows.count, 4);
+    job_rows_clear(&rows);
+    room_end(&room);
+}
+
+static void whoever_waits_for_a_job_to_be_kept_is_woken(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    static atomic_int wakes;
+    const Waker waker = {&wakes, note_wake};
+    Job *job = submit_unkept(&room, 0.015, 20000);
+    assert_true(job_watch_kept(job, &waker));
+    assert_int_equal(wait_until_kept(job, &problem), STATUS_OK);
+    assert_int_equal(atomic_load(&wakes), 1);
+    assert_false(job_is_finished(job));
+    assert_true(job_watch_kept(job, &waker)); // at once
+    assert_int_equal(atomic_load(&wakes), 2);
     job_drop(job);
     room_end(&room);
 }
@@ -654,7 +795,11 @@ int main(void) {
         cmocka_unit_test(a_study_is_stopped_with_its_job_and_goes_on_after_a_restart),
         cmocka_unit_test(names_are_resolved_and_all_faults_told),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
-        cmocka_unit_test(a_result_that_cannot_be_saved_is_not_known_and_its_job_is_not_lost),
+        cmocka_unit_test(a_result_that_there_is_no_room_for_waits_for_it),
+        cmocka_unit_test(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart),
+        cmocka_unit_test(a_job_that_cannot_be_kept_never_was),
+        cmocka_unit_test(a_job_that_is_done_before_it_was_written_is_written_once),
+        cmocka_unit_test(whoever_waits_for_a_job_to_be_kept_is_woken),
         cmocka_unit_test(a_job_may_outlive_the_intake),
         cmocka_unit_test(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it),
         cmocka_unit_test(waiting_scenes_have_a_limit_in_bytes),
