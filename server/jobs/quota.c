@@ -2,7 +2,7 @@
 // shares theirs with everybody, so only the queue's own bounds hold for them.
 //
 // When to come back: a place is free when the first of the running computations ends, which is told
-// by its progress, else by what was foretold and how far that is off of late.
+// by its progress, and by what was foretold and how far that is off of late.
 #include "server/jobs/quota.h"
 
 #include <math.h>
@@ -51,9 +51,10 @@ static bool is_of(const Computation *computation, const Client *client) {
 static double left_of(const Intake *intake, Computation *computation) {
     const double passed = 1e-9 * (double)(clock_monotonic_ns() - computation->began_ns);
     const double done = atomic_load(&computation->progress) / 10000.0;
-    const double left = done > 0.02 ? passed * (1 - done) / done
-                                    : computation->queued.seconds * intake->pace - passed;
-    return fmax(left, 0);
+    // The first part of a run may go faster than the rest.
+    const double foretold = computation->queued.seconds * intake->pace - passed;
+    const double seen = done > 0.02 ? passed * (1 - done) / done : 0;
+    return fmax(fmax(foretold, seen), 0);
 }
 
 int intake_retry_after(Intake *intake, const char *name, Status status) {

@@ -283,10 +283,11 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
     Status status = keyed_begin(intake, submission, &hold, accepted, problem);
     if (submission->is_replayed != NULL)
         *submission->is_replayed = *accepted != NULL;
-    if (status == STATUS_OK && *accepted == NULL)
+    if (status == STATUS_OK && *accepted == NULL) {
         status = submit_new(intake, submission, &hold, accepted, problem);
-    if (status == STATUS_OK && *accepted != NULL)
-        keyed_remember(intake, &hold, *accepted);
+        if (status == STATUS_OK)
+            keyed_remember(intake, &hold, *accepted);
+    }
     keyed_end(intake, &hold);
     return status;
 }
