@@ -43,17 +43,21 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
 typedef struct Pause {
     Job *job;
     const Waker *waker;
+    bool is_replayed; // what the reply had said so far
 } Pause;
 
-static Job *pause_end(Pause *pause) {
+// `reply` NULL: there will be none.
+static Job *pause_end(Pause *pause, Reply *reply) {
     Job *job = pause->job;
+    if (reply != NULL)
+        reply->is_replayed = pause->is_replayed;
     job_unwatch(job, pause->waker);
     free(pause);
     return job;
 }
 
 static void pause_forget(void *kept) {
-    job_drop(pause_end(kept));
+    job_drop(pause_end(kept, NULL));
 }
 
 // Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
@@ -63,7 +67,7 @@ static bool sleep_until(const Request *request, Reply *reply, Job *job,
     Pause *pause = malloc(sizeof *pause);
     if (pause == NULL)
         return false;
-    *pause = (Pause){job, request->waker};
+    *pause = (Pause){job, request->waker, reply->is_replayed};
     if (!watch(job, request->waker)) {
         free(pause);
         return false;
@@ -125,7 +129,7 @@ static Status read_flag(const Request *request, const char *name, bool *flag, Pr
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     } else {
         bool is_dry = false;
         TRY(read_flag(request, "dry_run", &is_dry, problem));
@@ -167,7 +171,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     double wait;
     TRY(request_number(request, "wait", 0, wait_most, 0, &wait, problem));
     if (request->kept != NULL)
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     else
         TRY(intake_find(app->intake, request->parameters[0], &job, problem));
     if (pause_begin(request, reply, job, wait))
@@ -179,7 +183,7 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     Job *job = NULL;
     bool is_paused;
     if (request->kept != NULL)
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     else
         TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
