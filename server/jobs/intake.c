@@ -334,12 +334,12 @@ void intake_retry_dismissed(Intake *intake) {
 }
 
 // Live jobs only: dismissed for all at once, and on its way to the store.
-static Status dismiss(Intake *intake, Job *job, Problem *problem) {
+static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
         const int state = job->is_closing ? job->closing.state : job->row.state;
         pthread_mutex_unlock(&intake->lock);
-        return refuse_finished(job->row.id, state, problem);
+        return refuse_finished(id, state, problem);
     }
     job->row.state = JOB_DISMISSED;
     if (job->started_ns > 0)
@@ -373,7 +373,7 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
     Job *job = find_live(intake, id);
     Status status;
     if (job != NULL) {
-        status = dismiss(intake, job, problem);
+        status = dismiss(intake, job, id, problem);
     } else {
         TRY(intake_find(intake, id, &job, problem));
         status = refuse_finished(id, job->row.state, problem);
