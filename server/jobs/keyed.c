@@ -33,10 +33,19 @@ static bool is_taken(const Intake *intake, const KeyHold *hold) {
     return false;
 }
 
-// With the lock held: the job of that key which the store may not have yet, held. Those that it
-// has, or never will have, are let go.
-static Job *find_new(Intake *intake, const KeyHold *hold) {
-    Job *found = NULL;
+static Status check_same(const KeyHold *hold, const JobRow *row, Problem *problem) {
+    if (row->request != NULL && strcmp(row->request, hold->request) == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_REUSED,
+                       "the Idempotency-Key \"%.80s\" was used with another body, for the job "
+                       "%.40s; take a new key for a new request",
+                       hold->key, row->id);
+}
+
+// With the lock held: *found is the job of that key which the store may not have yet, held, or
+// NULL. Those that it has, or never will have, are let go.
+static Status find_new(Intake *intake, const KeyHold *hold, Job **found, Problem *problem) {
+    Job *same = NULL;
     for (Job **at = &intake->keyed; *at != NULL;) {
         Job *job = *at;
         if (job->is_kept || job->refusal != STATUS_OK) {
@@ -46,19 +55,15 @@ static Job *find_new(Intake *intake, const KeyHold *hold) {
         }
         const char *client = job->row.client != NULL ? job->row.client : "";
         if (strcmp(job->row.idempotency_key, hold->key) == 0 && strcmp(client, hold->client) == 0)
-            found = job;
+            same = job;
         at = &job->next_keyed;
     }
-    return found == NULL ? NULL : job_hold(found);
-}
-
-static Status check_same(const KeyHold *hold, const JobRow *row, Problem *problem) {
-    if (row->request != NULL && strcmp(row->request, hold->request) == 0)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_REUSED,
-                       "the Idempotency-Key \"%.80s\" was used with another body, for the job "
-                       "%.40s; take a new key for a new request",
-                       hold->key, row->id);
+    *found = NULL;
+    if (same != NULL) {
+        TRY(check_same(hold, &same->row, problem));
+        *found = job_hold(same);
+    }
+    return STATUS_OK;
 }
 
 Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, Job **job,
@@ -82,25 +87,19 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
     hold->next = intake->keys;
     intake->keys = hold;
     hold->is_held = true;
-    Job *new = find_new(intake, hold);
+    const Status status = find_new(intake, hold, job, problem);
     pthread_mutex_unlock(&intake->lock);
-    if (new != NULL) {
-        const Status status = check_same(hold, &new->row, problem);
-        if (status == STATUS_OK)
-            *job = new;
-        else
-            job_drop(new);
+    if (status != STATUS_OK || *job != NULL)
         return status;
-    }
 
     JobRow row;
-    const Status status =
+    const Status known =
         store_job_keyed(intake->store, submission->client, hold->key, &row, problem);
-    if (status == STATUS_NOT_FOUND) {
+    if (known == STATUS_NOT_FOUND) {
         problem_clear(problem);
         return STATUS_OK;
     }
-    TRY(status);
+    TRY(known);
     const Status same = check_same(hold, &row, problem);
     char id[40];
     text_fit(id, sizeof id, row.id);
