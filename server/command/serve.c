@@ -107,16 +107,24 @@ static void greet(const Listener *listener, const ServeSettings *settings) {
     fflush(stdout);
 }
 
+static void forget_answers(void *hot) {
+    if (hot != NULL)
+        hot_clear(hot);
+}
+
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    Dispatcher dispatcher = {&app, routes};
-    ListenerSettings door = {
-        .body_most = settings->max_body, .answer = dispatch, .context = &dispatcher};
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20)};
+    ListenerSettings door = {.body_most = settings->max_body,
+                             .answer_at_once = dispatch_at_once,
+                             .answer = dispatch,
+                             .context = &dispatcher};
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
                                  .quota = settings->quota,
                                  .rate = settings->rate,
+                                 .deleted = {dispatcher.hot, forget_answers},
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
@@ -145,6 +153,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(listener);
+    hot_free(dispatcher.hot);
     store_close(app.store);
     return status;
 }

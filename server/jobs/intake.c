@@ -390,6 +390,8 @@ void intake_forget(Intake *intake, const char *result) {
     pthread_mutex_lock(&intake->lock);
     cache_remove(intake->cache, result);
     pthread_mutex_unlock(&intake->lock);
+    if (intake->settings.deleted.wake != NULL)
+        intake->settings.deleted.wake(intake->settings.deleted.context);
 }
 
 Status intake_delete(Intake *intake, const char *result, Problem *problem) {

@@ -17,6 +17,7 @@ typedef struct IntakeSettings {
     size_t cache_bytes; // of finished outcomes in memory
     size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
     double rate;        // jobs a minute of one client by name; 0: any number
+    Waker deleted;      // called after results were deleted; `wake` may be NULL
     SimulationLimits limits;
 } IntakeSettings;
 
