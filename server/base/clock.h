@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 int64_t clock_unix_ms(void);
+int64_t clock_unix_us(void);
 int64_t clock_monotonic_ns(void);
 int64_t clock_thread_cpu_ns(void);
 // RFC 3339 UTC with milliseconds, "2026-11-21T09:00:00.000Z".

@@ -28,14 +28,26 @@ void digest_take(void *digest, const void *bytes, size_t size) {
     (void)gnutls_hash(((Digest *)digest)->hash, bytes, size);
 }
 
-void digest_end(Digest *digest, char target[65]) {
-    static const char hexadecimal[] = "0123456789abcdef";
+static void write_hexadecimal(const unsigned char sum[SHA256_BYTES], char target[DIGEST_SIZE]) {
+    static const char digits[] = "0123456789abcdef";
+    for (size_t i = 0; i < SHA256_BYTES; i++) {
+        target[2 * i] = digits[sum[i] >> 4];
+        target[2 * i + 1] = digits[sum[i] & 15];
+    }
+    target[2 * SHA256_BYTES] = '\0';
+}
+
+void digest_end(Digest *digest, char target[DIGEST_SIZE]) {
     unsigned char sum[SHA256_BYTES];
     gnutls_hash_deinit(digest->hash, sum);
     free(digest);
-    for (size_t i = 0; i < SHA256_BYTES; i++) {
-        target[2 * i] = hexadecimal[sum[i] >> 4];
-        target[2 * i + 1] = hexadecimal[sum[i] & 15];
-    }
-    target[2 * SHA256_BYTES] = '\0';
+    write_hexadecimal(sum, target);
+}
+
+bool digest_of(const void *bytes, size_t size, char target[DIGEST_SIZE]) {
+    unsigned char sum[SHA256_BYTES];
+    if (gnutls_hash_fast(GNUTLS_DIG_SHA256, bytes, size, sum) < 0)
+        return false;
+    write_hexadecimal(sum, target);
+    return true;
 }

@@ -91,7 +91,7 @@ Outcome *cache_find(Cache *cache, const char *id) {
     return outcome_hold(entry->outcome);
 }
 
-void cache_remove(Cache *cache, const char *id) {
+void cache_forget(Cache *cache, const char *id) {
     Entry *entry = index_find(cache->index, id);
     if (entry != NULL)
         evict(cache, entry);

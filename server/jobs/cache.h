@@ -14,7 +14,7 @@ void cache_free(Cache *cache);
 // budget, so that whoever asked for it finds it. Without memory nothing is kept.
 void cache_put(Cache *cache, const char *id, Outcome *outcome);
 Outcome *cache_find(Cache *cache, const char *id); // a hold for the caller, or NULL
-void cache_remove(Cache *cache, const char *id);   // fine if it is not there
+void cache_forget(Cache *cache, const char *id);
 size_t cache_count(const Cache *cache);
 size_t cache_bytes(const Cache *cache);
 

@@ -10,6 +10,7 @@
 #include "server/jobs/head.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
+#include "server/jobs/known.h"
 #include "server/jobs/queue.h"
 
 enum { OUTCOME_FAILURES = 64 };
@@ -102,6 +103,8 @@ struct Intake {
     struct Saving *delayed;      // of these, what waits for room in the store
     Job *undismissed;            // held: dismissed, but the store could not be told
     Cache *cache;
+    Known *known;
+    atomic_uint_fast64_t deletions;     // of results
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
 };

@@ -21,6 +21,8 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
 Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
                   const StoreDone *done, StoreTicket **ticket);
 
+struct Late *store_late(Store *store); // NULL: its database is in memory
+
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);
 void store_put(Store *store, Database *database);

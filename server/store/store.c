@@ -5,6 +5,7 @@
 
 #include <limits.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +14,8 @@
 #include "server/store/access.h"
 #include "server/store/database.h"
 #include "server/store/folder.h"
+#include "server/store/job_rows.h"
+#include "server/store/late.h"
 #include "server/store/writer.h"
 
 enum { READERS = 4 };
@@ -21,6 +24,8 @@ struct Store {
     int lock_file;
     Database *own; // the writer's; NULL where it shares the pool's
     Writer *writer;
+    Late *late;
+    atomic_uint_fast64_t generation; // of the catalogue
     pthread_mutex_t lock;
     pthread_cond_t some;
     Database *readers[READERS]; // of which the first `free_count` are not taken
@@ -59,6 +64,12 @@ Status store_open(const char *directory, Store **store, Problem *problem) {
         directory != NULL ? open_files(made, directory, problem) : open_memory(made, problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
+    if (status == STATUS_OK && directory != NULL) {
+        char path[PATH_MAX];
+        snprintf(path, sizeof path, "%s/impactd.late", directory);
+        status =
+            late_open(path, made, job_columns, sizeof(JobRow), job_rows_add, &made->late, problem);
+    }
     if (status != STATUS_OK) {
         store_close(made);
         return status;
@@ -70,6 +81,7 @@ Status store_open(const char *directory, Store **store, Problem *problem) {
 void store_close(Store *store) {
     if (store == NULL)
         return;
+    late_close(store->late); // which writes
     writer_stop(store->writer);
     for (size_t i = 0; i < store->free_count; i++)
         database_close(store->readers[i]);
@@ -92,6 +104,18 @@ Status store_post(Store *store, StoreApply *apply, const void *work, size_t size
 
 bool store_withdraw(Store *store, StoreTicket *ticket) {
     return writer_withdraw(store->writer, ticket);
+}
+
+Late *store_late(Store *store) {
+    return store->late;
+}
+
+uint64_t store_generation(Store *store) {
+    return atomic_load(&store->generation);
+}
+
+void store_catalogue_changed(Store *store) {
+    atomic_fetch_add(&store->generation, 1);
 }
 
 Database *store_take(Store *store) {

@@ -65,7 +65,7 @@ def listed(daemon):
     return found
 
 
-def one_round(number, duration, tries=4):
+def one_round(number, duration, tries=2):
     folder = tempfile.mkdtemp(prefix="impactd-")
     try:
         with program.Daemon(program.build, "--workers", "2", data=folder) as daemon:

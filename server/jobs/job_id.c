@@ -1,0 +1,33 @@
+#include "server/jobs/job_id.h"
+
+#include <stdatomic.h>
+#include <stdint.h>
+#include <sys/random.h>
+
+#include "server/base/clock.h"
+
+static int64_t next_us(void) {
+    static atomic_int_fast64_t last;
+    const int64_t now = clock_unix_us();
+    int64_t before = atomic_load(&last), next;
+    do {
+        next = now > before ? now : before + 1;
+    } while (!atomic_compare_exchange_weak(&last, &before, next));
+    return next;
+}
+
+bool job_id_make(char id[40]) {
+    static const char digits[] = "0123456789abcdef";
+    uint64_t secret;
+    if (getrandom(&secret, sizeof secret, 0) != (ssize_t)sizeof secret)
+        return false;
+    uint64_t time = (uint64_t)next_us();
+    id[0] = 'j';
+    id[1] = '-';
+    for (int i = 15; i >= 2; i--, time >>= 4)
+        id[i] = digits[time & 15];
+    for (int i = 31; i >= 16; i--, secret >>= 4)
+        id[i] = digits[secret & 15];
+    id[JOB_ID_LENGTH] = '\0';
+    return true;
+}

@@ -1,0 +1,346 @@
+// What a job costs beside its computation, without HTTP: the core alone in a loop, new jobs through
+// the intake until they are durable, known scenes, and what making rows durable costs by the
+// commit's size and the ids' order. One table; the disk's own figures stand in it.
+//
+//     bench_intake [DIRECTORY] [SECONDS]
+#include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "core/math/fourier.h"
+#include "server/base/clock.h"
+#include "server/jobs/intake.h"
+
+enum { CLIENTS = 64 };
+
+static double seconds = 2;
+static char folder[4000];
+static Problem problem;
+
+static double now(void) {
+    return 1e-9 * (double)clock_monotonic_ns();
+}
+
+static double cpu(void) {
+    return (double)clock() / CLOCKS_PER_SEC; // of all threads
+}
+
+static int scene_text(char target[2400], unsigned number) {
+    char filler[1500];
+    memset(filler, 'x', sizeof filler - 1);
+    filler[sizeof filler - 1] = '\0';
+    return snprintf(target, 2400,
+                    "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},"
+                    " \"dampers\": [{\"mass\": 0.1107, \"clearance\": %.17g, \"buffer\": "
+                    "\"sponge\"}], \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},"
+                    " \"duration\": 10, \"sample_rate\": 1000,"
+                    " \"output\": {\"channels\": [], \"psd\": null, \"impacts\": false},"
+                    " \"labels\": [\"%.*s\"]}",
+                    0.015 + 1e-9 * number, number == 0 ? 1450 : 60, filler);
+}
+
+static void stop(const char *what) {
+    fprintf(stderr, "bench_intake: %s: %s\n", what, problem.detail);
+    exit(1);
+}
+
+static void measure_core(Store *store) {
+    char text[2400];
+    Inquiry inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    const int size = scene_text(text, 1);
+    if (intake_prepare(store, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
+        stop("the scene");
+    Workspace workspace = {0};
+    size_t count = 0;
+    const double began = now();
+    double took;
+    do {
+        Outcome *outcome = NULL;
+        if (simulation_run(&inquiry.simulation, NULL, NULL, &workspace, &outcome, &problem) !=
+            STATUS_OK)
+            stop("the core");
+        outcome_drop(outcome);
+        count++;
+        took = now() - began;
+    } while (took < seconds);
+    printf("%-44s %10.0f /s %8.2f us\n", "core alone, one thread", (double)count / took,
+           1e6 * took / (double)count);
+    workspace_clear(&workspace);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+}
+
+typedef struct Client {
+    Intake *intake;
+    pthread_mutex_t lock;
+    pthread_cond_t woken;
+    bool is_woken;
+    size_t count;
+    double end;
+} Client;
+
+static atomic_uint next_number = 1;
+
+static void wake(void *context) {
+    Client *client = context;
+    pthread_mutex_lock(&client->lock);
+    client->is_woken = true;
+    pthread_cond_signal(&client->woken);
+    pthread_mutex_unlock(&client->lock);
+}
+
+// New jobs, each until it is finished and durable.
+static void *submit_new(void *context) {
+    Client *client = context;
+    Problem *fault = calloc(1, sizeof *fault);
+    char text[2400];
+    while (fault != NULL && now() < client->end) {
+        const int size = scene_text(text, atomic_fetch_add(&next_number, 1));
+        const Submission submission = {.text = text, .size = (size_t)size};
+        const Waker waker = {client, wake};
+        Job *job = NULL;
+        client->is_woken = false;
+        problem_clear(fault);
+        if (intake_submit(client->intake, &submission, &job, fault) != STATUS_OK)
+            continue;
+        (void)job_watch(job, &waker);
+        pthread_mutex_lock(&client->lock);
+        while (!client->is_woken)
+            pthread_cond_wait(&client->woken, &client->lock);
+        pthread_mutex_unlock(&client->lock);
+        bool is_kept = false;
+        client->count += job_kept(job, &is_kept, fault) == STATUS_OK && is_kept;
+        job_drop(job);
+    }
+    free(fault);
+    return NULL;
+}
+
+static void measure_jobs(Store *store, size_t workers, size_t clients) {
+    static Client all[CLIENTS];
+    pthread_t threads[CLIENTS];
+    const IntakeSettings settings = {.workers = workers,
+                                     .queue_most = 10000,
+                                     .cache_bytes = (size_t)64 << 20,
+                                     .limits = {.samples = 1 << 25, .impacts = 500000}};
+    Intake *intake;
+    if (intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+        stop("the intake");
+    const double began = now(), cpu_began = cpu();
+    for (size_t i = 0; i < clients; i++) {
+        all[i] = (Client){.intake = intake, .end = began + seconds};
+        pthread_mutex_init(&all[i].lock, NULL);
+        pthread_cond_init(&all[i].woken, NULL);
+        if (pthread_create(&threads[i], NULL, submit_new, &all[i]) != 0)
+            stop("a thread");
+    }
+    size_t count = 0;
+    for (size_t i = 0; i < clients; i++) {
+        pthread_join(threads[i], NULL);
+        count += all[i].count;
+    }
+    const double took = now() - began;
+    char name[64];
+    snprintf(name, sizeof name, "new jobs, durable, %zu clients, %zu workers", clients, workers);
+    printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
+           1e6 * (cpu() - cpu_began) / (double)count);
+    intake_close(intake);
+}
+
+static void measure_known(Store *store) {
+    char text[2400];
+    const int size = scene_text(text, 0);
+    const Submission submission = {.text = text, .size = (size_t)size};
+    const IntakeSettings settings = {.workers = 1,
+                                     .queue_most = 10000,
+                                     .cache_bytes = (size_t)64 << 20,
+                                     .limits = {.samples = 1 << 25, .impacts = 500000}};
+    Intake *intake;
+    if (intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+        stop("the intake");
+    // An answer like the API's: 2.6 KB with its slots in it.
+    char answer[2600];
+    memset(answer, ' ', sizeof answer);
+    const JobSlots slots = {
+        .id = 8, .created = 200, .started = 240, .finished = 280, .total = 2000, .self = 2100};
+    Job *job = NULL;
+    for (int tries = 0; tries < 1000; tries++) {
+        const uint64_t mark = intake_mark(intake);
+        if (intake_submit(intake, &submission, &job, &problem) != STATUS_OK)
+            stop("a scene");
+        JobShow show;
+        const bool is_known = job_is_finished(job) && job_show(job, &show) == STATUS_OK;
+        if (is_known) {
+            intake_learn(intake, &submission, mark, job, answer, sizeof answer, &slots);
+            job_show_clear(&show);
+        }
+        job_drop(job);
+        if (is_known)
+            break;
+        nanosleep(&(struct timespec){0, 1000000}, NULL);
+    }
+    size_t count = 0, refused = 0;
+    const double began = now(), cpu_began = cpu();
+    double took;
+    do {
+        KnownAnswer known;
+        if (intake_known(intake, &submission, &known)) {
+            free(known.body);
+            count++;
+        } else {
+            refused++;
+            nanosleep(&(struct timespec){0, 1000000}, NULL); // the rows are behind
+        }
+        took = now() - began;
+    } while (took < seconds);
+    store_job_settle(store);
+    printf("%-44s %10.0f /s %8.2f us of CPU with its row; held up %zu times\n",
+           "known scenes of 2 KB, one thread", (double)count / took,
+           1e6 * (cpu() - cpu_began) / (double)count, refused);
+    intake_close(intake);
+}
+
+static void measure_disk(void) {
+    char path[4100], page[4096] = {1};
+    snprintf(path, sizeof path, "%s/sync", folder);
+    const int file = open(path, O_RDWR | O_CREAT | O_TRUNC, 0600);
+    double took[200];
+    size_t count = 0;
+    for (; file >= 0 && count < COUNT(took); count++) {
+        const double began = now();
+        if (pwrite(file, page, sizeof page, (off_t)(count * sizeof page)) < 0 ||
+            fdatasync(file) != 0)
+            break;
+        took[count] = now() - began;
+    }
+    for (size_t i = 1; i < count; i++) // insertion
+        for (size_t j = i; j > 0 && took[j] < took[j - 1]; j--) {
+            const double other = took[j];
+            took[j] = took[j - 1];
+            took[j - 1] = other;
+        }
+    if (count > 0)
+        printf("%-44s %10.0f /s %8.2f us median, %.2f us at 95 %%\n",
+               "the disk's fdatasync of 4 KB", 1 / took[count / 2], 1e6 * took[count / 2],
+               1e6 * took[count * 95 / 100]);
+    close(file);
+}
+
+static void name_row(JobRow *row, bool is_rising, size_t number) {
+    uint64_t mix = (uint64_t)number * 0x9E3779B97F4A7C15u + 1;
+    mix = (mix ^ (mix >> 29)) * 0xBF58476D1CE4E5B9u;
+    if (is_rising)
+        snprintf(row->id, sizeof row->id, "j-%014zx%016llx", number, (unsigned long long)mix);
+    else
+        snprintf(row->id, sizeof row->id, "j-%016llx%014zx", (unsigned long long)mix, number);
+}
+
+static atomic_size_t answered;
+
+static void note(void *context, Status status, const char *detail) {
+    (void)context;
+    (void)detail;
+    atomic_fetch_add(&answered, status == STATUS_OK);
+}
+
+// Rows of jobs: one commit each, or as many as come while the last commit is made durable.
+static void measure_rows(bool is_grouped, bool is_rising) {
+    char directory[4100], command[4200];
+    snprintf(directory, sizeof directory, "%s/rows", folder);
+    Store *store;
+    if (store_open(directory, &store, &problem) != STATUS_OK)
+        stop("the store");
+    enum { ON_THE_WAY = 64 };
+    static JobRow rows[ON_THE_WAY];
+    size_t count = 0;
+    atomic_store(&answered, 0);
+    const double began = now(), cpu_began = cpu();
+    while (now() - began < seconds) {
+        while (is_grouped && count - atomic_load(&answered) >= ON_THE_WAY)
+            sched_yield();
+        JobRow *row = &rows[count % ON_THE_WAY];
+        *row = (JobRow){.scene = "", .warnings = "[]"};
+        name_row(row, is_rising, count);
+        const StoreDone done = {note, NULL};
+        const Status status = is_grouped ? store_job_post(store, row, &done, NULL)
+                                         : store_job_add(store, row, &problem);
+        if (status != STATUS_OK)
+            stop("a row");
+        count++;
+    }
+    while (is_grouped && atomic_load(&answered) < count)
+        sched_yield();
+    const double took = now() - began;
+    char name[64];
+    snprintf(name, sizeof name, "durable rows, %s, %s ids",
+             is_grouped ? "64 on the way" : "one commit each", is_rising ? "rising" : "random");
+    printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)count / took,
+           1e6 * (cpu() - cpu_began) / (double)count);
+    store_close(store);
+    snprintf(command, sizeof command, "rm -rf '%s'", directory);
+    if (system(command) != 0)
+        stop("the folder");
+}
+
+// What the index costs once it is large: rows by the thousand, without the disk.
+static void measure_index(bool is_rising, size_t most) {
+    char directory[4100], command[4200];
+    snprintf(directory, sizeof directory, "%s/rows", folder);
+    Store *store;
+    if (store_open(directory, &store, &problem) != STATUS_OK)
+        stop("the store");
+    const double cpu_began = cpu(), began = now();
+    for (size_t i = 0; i < most;) {
+        JobRow row = {.scene = "", .warnings = "[]"};
+        name_row(&row, is_rising, i);
+        if (store_job_late(store, &row))
+            i++;
+        else
+            store_job_settle(store);
+    }
+    store_job_settle(store);
+    char name[64];
+    snprintf(name, sizeof name, "%zu rows in batches, %s ids", most,
+             is_rising ? "rising" : "random");
+    printf("%-44s %10.0f /s %8.2f us of CPU\n", name, (double)most / (now() - began),
+           1e6 * (cpu() - cpu_began) / (double)most);
+    store_close(store);
+    snprintf(command, sizeof command, "rm -rf '%s'", directory);
+    if (system(command) != 0)
+        stop("the folder");
+}
+
+int main(int argc, char **argv) {
+    snprintf(folder, sizeof folder, "%s", argc > 1 ? argv[1] : "/tmp");
+    if (argc > 2)
+        seconds = strtod(argv[2], NULL);
+    const size_t used = strlen(folder);
+    snprintf(folder + used, sizeof folder - used, "/bench_intake_XXXXXX");
+    if (mkdtemp(folder) == NULL)
+        stop(folder);
+    fourier_start();
+    Store *store;
+    char directory[4100], command[4200];
+    snprintf(directory, sizeof directory, "%s/jobs", folder);
+    if (store_open(directory, &store, &problem) != STATUS_OK)
+        stop("the store");
+    measure_core(store);
+    measure_jobs(store, 2, CLIENTS);
+    measure_jobs(store, 1, 1);
+    measure_known(store);
+    store_close(store);
+    measure_disk();
+    measure_rows(false, true);
+    measure_rows(true, true);
+    measure_index(false, 300000);
+    measure_index(true, 300000);
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command) == 0 ? 0 : 1;
+}
