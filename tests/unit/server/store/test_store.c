@@ -321,7 +321,7 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
             row.scene = scene;
             status = store_job_add(store, &row, NULL);
         }
-        if (status != STATUS_IO)
+        if (status != STATUS_FULL)
             _exit(2);
         row = job_row("j-after", 0);
         if (store_job_load(store, "j-0", &row, NULL) != STATUS_OK)
