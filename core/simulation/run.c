@@ -301,15 +301,14 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
     *outcome = NULL;
     if (aim_is_asked(simulation))
         return aim_run(simulation, limits, watch, workspace, outcome, problem);
-    Held *held = calloc(1, sizeof *held);
-    if (held == NULL)
+    Outcome *made = outcome_new();
+    if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
-    atomic_init(&held->holds, 1);
     Journey journey = {.simulation = simulation,
                        .limits = limits,
                        .watch = watch,
                        .workspace = workspace,
-                       .outcome = &held->outcome};
+                       .outcome = made};
     const Status status = travel(&journey, problem);
     free(journey.transformed.at); // its values are the other columns'
     free(journey.units);
@@ -318,11 +317,19 @@ Status simulation_run(const Simulation *simulation, const SimulationLimits *limi
     base_clear(&journey.base);
     plan_free(journey.plan);
     if (status != STATUS_OK) {
-        outcome_drop(&held->outcome);
+        outcome_drop(made);
         return status;
     }
-    *outcome = &held->outcome;
+    *outcome = made;
     return STATUS_OK;
+}
+
+Outcome *outcome_new(void) {
+    Held *held = calloc(1, sizeof *held);
+    if (held == NULL)
+        return NULL;
+    atomic_init(&held->holds, 1);
+    return &held->outcome;
 }
 
 Outcome *outcome_hold(Outcome *outcome) {

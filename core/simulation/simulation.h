@@ -100,6 +100,8 @@ struct Outcome {
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Watch *watch, Workspace *workspace, Outcome **outcome,
                       Problem *problem);
+Outcome *
+outcome_new(void); // empty, one hold, for whoever has kept the numbers; NULL without memory
 Outcome *outcome_hold(Outcome *outcome);
 void outcome_drop(Outcome *outcome);
 size_t outcome_bytes(const Outcome *outcome); // of memory, for caches

@@ -30,6 +30,8 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/tradeoff",             "read",   NULL,         "The study's table or chart, format by Accept", results_tradeoff},
     {"GET",    "/v1/results/{id}/ensemble.{format}",    "read",   NULL,         "The study's statistics as json, its runs as csv, or its chart as svg", results_ensemble},
     {"GET",    "/v1/results/{id}/ensemble",             "read",   NULL,         "The study's statistics, runs or chart, format by Accept", results_ensemble},
+    {"GET",    "/v1/cache",                             "read",   NULL,         "How often what is known already helped, by layer", cache_show},
+    {"POST",   "/v1/cache/explain",                     "read",   NULL,         "Whether a scene is known, and in what it differs from the nearest that is", cache_explain},
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},

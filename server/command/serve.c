@@ -20,7 +20,7 @@
 typedef struct ServeSettings {
     char *listen, *data, *config;
     uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, cache_bytes;
-    uint64_t quota, keep_jobs, keep_bytes;
+    uint64_t store_bytes, quota, keep_jobs, keep_bytes;
     double max_cpu_seconds, rate, keep_days;
     bool print_config;
 } ServeSettings;
@@ -43,6 +43,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
@@ -122,6 +123,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
+                                 .store_bytes = settings->store_bytes,
                                  .quota = settings->quota,
                                  .rate = settings->rate,
                                  .deleted = {dispatcher.hot, forget_answers},

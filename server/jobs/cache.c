@@ -9,7 +9,8 @@
 typedef struct Entry {
     IndexEntry indexed; // by id
     struct Entry *newer, *older;
-    Outcome *outcome;
+    Outcome *outcome; // or NULL
+    Head *head;       // or NULL
     size_t bytes;
     char id[72];
 } Entry;
@@ -17,7 +18,8 @@ typedef struct Entry {
 struct Cache {
     Index *index;
     Entry *newest, *oldest;
-    size_t most_bytes, bytes, count;
+    size_t most_bytes;
+    LayerTally series, heads; // `bytes` of both stand in the series'
 };
 
 Cache *cache_new(size_t most_bytes) {
@@ -48,9 +50,11 @@ static void link_newest(Cache *cache, Entry *entry) {
 static void evict(Cache *cache, Entry *entry) {
     unlink_entry(cache, entry);
     index_remove(cache->index, &entry->indexed);
-    cache->bytes -= entry->bytes;
-    cache->count--;
+    cache->series.bytes -= entry->bytes;
+    cache->series.count -= entry->outcome != NULL;
+    cache->heads.count -= entry->head != NULL;
     outcome_drop(entry->outcome);
+    head_drop(entry->head);
     free(entry);
 }
 
@@ -63,32 +67,60 @@ void cache_free(Cache *cache) {
     free(cache);
 }
 
-void cache_put(Cache *cache, const char *id, Outcome *outcome) {
-    Entry *entry = index_find(cache->index, id);
-    if (entry != NULL)
-        evict(cache, entry);
-    entry = calloc(1, sizeof *entry);
+void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head) {
+    Entry *old = index_find(cache->index, id), *entry = calloc(1, sizeof *entry);
     if (entry == NULL)
         return;
     text_fit(entry->id, sizeof entry->id, id);
-    entry->outcome = outcome_hold(outcome);
-    entry->bytes = sizeof *entry + outcome_bytes(outcome);
+    Outcome *kept = outcome != NULL ? outcome : old != NULL ? old->outcome : NULL;
+    if (kept != NULL)
+        entry->outcome = outcome_hold(kept);
+    entry->head = head_hold(head != NULL ? head : old != NULL ? old->head : NULL);
+    if (old != NULL)
+        evict(cache, old);
+    entry->bytes = sizeof *entry + (kept != NULL ? outcome_bytes(kept) : 0) +
+                   (entry->head != NULL ? entry->head->bytes : 0);
     entry->indexed.key = entry->id;
     index_add(cache->index, &entry->indexed);
     link_newest(cache, entry);
-    cache->bytes += entry->bytes;
-    cache->count++;
-    while (cache->bytes > cache->most_bytes && cache->oldest != entry)
+    cache->series.bytes += entry->bytes;
+    cache->series.count += entry->outcome != NULL;
+    cache->heads.count += entry->head != NULL;
+    while (cache->series.bytes > cache->most_bytes && cache->oldest != entry) {
+        cache->series.evictions += cache->oldest->outcome != NULL;
+        cache->heads.evictions += cache->oldest->head != NULL;
         evict(cache, cache->oldest);
+    }
+}
+
+static Entry *use(Cache *cache, const char *id) {
+    Entry *entry = index_find(cache->index, id);
+    if (entry != NULL) {
+        unlink_entry(cache, entry);
+        link_newest(cache, entry);
+    }
+    return entry;
 }
 
 Outcome *cache_find(Cache *cache, const char *id) {
-    Entry *entry = index_find(cache->index, id);
-    if (entry == NULL)
-        return NULL;
-    unlink_entry(cache, entry);
-    link_newest(cache, entry);
-    return outcome_hold(entry->outcome);
+    Entry *entry = use(cache, id);
+    const bool is_hit = entry != NULL && entry->outcome != NULL;
+    cache->series.hits += is_hit;
+    cache->series.misses += !is_hit;
+    return is_hit ? outcome_hold(entry->outcome) : NULL;
+}
+
+Head *cache_head(Cache *cache, const char *id) {
+    Entry *entry = use(cache, id);
+    const bool is_hit = entry != NULL && entry->head != NULL;
+    cache->heads.hits += is_hit;
+    cache->heads.misses += !is_hit;
+    return is_hit ? head_hold(entry->head) : NULL;
+}
+
+bool cache_has(const Cache *cache, const char *id, bool with_series) {
+    const Entry *entry = index_find(cache->index, id);
+    return entry != NULL && (with_series ? entry->outcome != NULL : entry->head != NULL);
 }
 
 void cache_forget(Cache *cache, const char *id) {
@@ -97,10 +129,9 @@ void cache_forget(Cache *cache, const char *id) {
         evict(cache, entry);
 }
 
-size_t cache_count(const Cache *cache) {
-    return cache->count;
-}
-
-size_t cache_bytes(const Cache *cache) {
-    return cache->bytes;
+void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads) {
+    *series = cache->series;
+    *heads = cache->heads;
+    series->most_bytes = heads->most_bytes = cache->most_bytes;
+    heads->bytes = series->bytes;
 }

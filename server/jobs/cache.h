@@ -1,21 +1,26 @@
-// Finished outcomes in memory, by their result's id, up to a budget of bytes; the longest unused
-// one goes first. Not locked: the intake's lock guards it. Used by intake.c.
+// What is known of results in memory, by their id, up to a budget of bytes: the documents that a
+// job tells of them and, where they are kept, the series; the longest unused one goes first. Not
+// locked: the intake's lock guards it. Used by the jobs room.
 #ifndef SERVER_JOBS_CACHE_H
 #define SERVER_JOBS_CACHE_H
 
-#include "core/simulation/simulation.h"
+#include "server/jobs/head.h"
+#include "server/jobs/intake.h"
 
 typedef struct Cache Cache;
 
 Cache *cache_new(size_t most_bytes); // NULL without memory
 void cache_free(Cache *cache);
 
-// Keeps a hold of its own on `outcome`. The newest one is kept even if it is larger than the
-// budget, so that whoever asked for it finds it. Without memory nothing is kept.
-void cache_put(Cache *cache, const char *id, Outcome *outcome);
+// Keeps holds of its own; of `outcome` and `head` what is not NULL takes the place of what was
+// there. The newest one is kept even if it is larger than the budget, so that whoever asked for it
+// finds it. Without memory nothing is kept.
+void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head);
 Outcome *cache_find(Cache *cache, const char *id); // a hold for the caller, or NULL
+Head *cache_head(Cache *cache, const char *id);    // a hold for the caller, or NULL
+bool cache_has(const Cache *cache, const char *id, bool with_series); // is not a use of it
 void cache_forget(Cache *cache, const char *id);
-size_t cache_count(const Cache *cache);
-size_t cache_bytes(const Cache *cache);
+// Of the series, and of the documents: how often asked for, and kept. Bytes are of both together.
+void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads);
 
 #endif

@@ -438,16 +438,29 @@ Status intake_delete(Intake *intake, const char *result, Problem *problem) {
     return STATUS_OK;
 }
 
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
+    pthread_mutex_lock(&intake->lock);
+    *layers = (IntakeLayers){.in_memory = cache_has(intake->cache, result, false),
+                             .series_in_memory = cache_has(intake->cache, result, true)};
+    pthread_mutex_unlock(&intake->lock);
+    layers->in_database = store_result_exists(intake->store, result);
+    layers->series_in_database = store_series_exists(intake->store, result);
+}
+
 void intake_tally(Intake *intake, IntakeTally *tally) {
     pthread_mutex_lock(&intake->lock);
     *tally = (IntakeTally){.queued = queue_count(intake->queue),
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
-                           .cached_outcomes = cache_count(intake->cache),
-                           .cached_bytes = cache_bytes(intake->cache),
-                           .saving = intake->saving};
+                           .saving = intake->saving,
+                           .rows = intake->rows,
+                           .stored = intake->stored};
+    cache_tally(intake->cache, &tally->series, &tally->heads);
+    tally->cached_outcomes = tally->series.count;
+    tally->cached_bytes = tally->series.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL;
     pthread_mutex_unlock(&intake->lock);
+    tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -19,6 +19,7 @@ typedef struct IntakeSettings {
     double rate;        // jobs a minute of one client by name; 0: any number
     Waker deleted;      // called after results were deleted; `wake` may be NULL
     size_t known_bytes; // of ready answers in memory; 0: an eighth of cache_bytes
+    size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     SimulationLimits limits;
 } IntakeSettings;
 
@@ -102,9 +103,10 @@ Status intake_find(Intake *intake, const char *id, Job **job, Problem *problem);
 // Dismisses, for all at once and kept soon (job_kept); STATUS_CONFLICT if it is finished already.
 Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *problem);
 
-// The series-bearing Outcome of a result: from memory, or computed anew by a worker. *outcome is
-// NULL and the return is STATUS_OK while it is being computed: `waker` is then called once when it
-// is worth asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
+// The series-bearing Outcome of a result: from memory, from the database where it is kept (its
+// plan, summary and warnings are empty then), or computed anew by a worker. *outcome is NULL and
+// the return is STATUS_OK while it is being computed: `waker` is then called once when it is worth
+// asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
 
@@ -123,10 +125,20 @@ typedef struct LayerTally {
     size_t count, bytes, most_bytes;
 } LayerTally;
 
+// Where a result is known.
+typedef struct IntakeLayers {
+    bool in_memory, in_database, series_in_memory, series_in_database;
+} IntakeLayers;
+void intake_layers(Intake *intake, const char *result, IntakeLayers *layers);
+
 typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
-    size_t saving;    // computations that have run and are not yet in the store
-    LayerTally known; // whole answers, by body
+    size_t saving;     // computations that have run and are not yet in the store
+    LayerTally known;  // whole answers, by body
+    LayerTally heads;  // in memory, by result: plan, summary, work and notes
+    LayerTally series; // in memory, by result; its bytes are those of both
+    LayerTally rows;   // results in the database: those found there and not
+    LayerTally stored; // series in the database
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
 

@@ -104,6 +104,8 @@ struct Intake {
     Job *undismissed;            // held: dismissed, but the store could not be told
     Cache *cache;
     Known *known;
+    LayerTally rows, stored;            // results and series found in the database
+    size_t keeping_bytes;               // of series on the way there
     atomic_uint_fast64_t deletions;     // of results
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
@@ -155,6 +157,7 @@ typedef struct Findings {
     char *problem; // of failed jobs
     char detail[256];
     int64_t began_ns, ended_ns;
+    double seconds; // of CPU, of the scene's own run
 } Findings;
 void findings_clear(Findings *findings);
 
@@ -163,6 +166,9 @@ void findings_clear(Findings *findings);
 void intake_save(Intake *intake, Computation *computation, Findings *findings);
 // With the lock held: whether a worker should wait before it makes more to be saved.
 bool intake_is_behind(const Intake *intake);
+
+// Without the lock: has the series kept by the store if it is dearer to compute than to read.
+void intake_keep_series(Intake *intake, const char *result, const Outcome *outcome, double seconds);
 
 void *worker_main(void *worker);
 

@@ -1,9 +1,80 @@
-// Outcomes for readers of series: from memory, else computed again, ahead of ordinary jobs and once
-// for all who ask.
+// Outcomes for readers of series: from memory, from the database where computing it was dear, else
+// computed again, ahead of ordinary jobs and once for all who ask.
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/jobs/intake_state.h"
+#include "server/jobs/numbers.h"
+
+// What reading a series is taken to cost, and the writing of it that comes before.
+static const double read_rate = 2e8, read_once = 5e-4; // [B/s], [s]
+
+enum { KEEPING_BYTES = 64 << 20 }; // on the way to the database; more are not kept
+
+// A series on its way, of so many bytes.
+typedef struct Keeping {
+    Intake *intake;
+    size_t size;
+} Keeping;
+
+static void kept(void *context, Status status, const char *detail) {
+    Keeping *keeping = context;
+    Intake *intake = keeping->intake;
+    (void)status; // it is computed again then
+    (void)detail;
+    pthread_mutex_lock(&intake->lock);
+    intake->keeping_bytes -= keeping->size;
+    intake_settle(intake);
+    pthread_mutex_unlock(&intake->lock);
+    free(keeping);
+}
+
+void intake_keep_series(Intake *intake, const char *result, const Outcome *outcome,
+                        double seconds) {
+    const size_t size = outcome_bytes(outcome);
+    if (outcome->response.series.count == 0 || size > intake->settings.store_bytes ||
+        seconds <= read_once + (double)size / read_rate)
+        return;
+    Keeping *keeping = malloc(sizeof *keeping);
+    Bytes bytes = {.most = KEEPING_BYTES};
+    pthread_mutex_lock(&intake->lock);
+    const bool has_room =
+        keeping != NULL && !intake->is_closing && intake->keeping_bytes + size <= KEEPING_BYTES;
+    if (has_room) {
+        intake->keeping_bytes += size;
+        intake->posted++;
+    }
+    pthread_mutex_unlock(&intake->lock);
+    if (!has_room) {
+        free(keeping);
+        return;
+    }
+    *keeping = (Keeping){intake, size};
+    numbers_write(&bytes, outcome);
+    const StoreDone done = {kept, keeping};
+    size_t count = 0;
+    char *body = bytes_take(&bytes, &count);
+    if (body == NULL || store_series_post(intake->store, result, body, count,
+                                          intake->settings.store_bytes, &done) != STATUS_OK)
+        kept(keeping, STATUS_NO_MEMORY, "");
+}
+
+// From the database, and then in memory; NULL where it is not there.
+static Outcome *load_series(Intake *intake, const char *result) {
+    char *body = NULL;
+    size_t size = 0;
+    Outcome *outcome = NULL;
+    if (store_series_load(intake->store, result, &body, &size, NULL) == STATUS_OK)
+        outcome = numbers_read(body, size);
+    free(body);
+    pthread_mutex_lock(&intake->lock);
+    intake->stored.hits += outcome != NULL;
+    intake->stored.misses += outcome == NULL;
+    if (outcome != NULL)
+        cache_put(intake->cache, result, outcome, NULL);
+    pthread_mutex_unlock(&intake->lock);
+    return outcome;
+}
 
 // With the lock held: a failure of an earlier computation for readers is told once.
 static Status tell_failure(Intake *intake, const char *result, Problem *problem) {
@@ -28,8 +99,9 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
         status = problem_set(
             problem, STATUS_GONE,
-            "the series was made by %s, this is %s: submit the scene anew to have it again",
-            row.engine, engine_version);
+            "the series was made by %s, this is %s: to have it again, POST the member \"scene\" of "
+            "/v1/results/%.72s/manifest to /v1/jobs",
+            row.engine, engine_version, result);
     // The scene was judged when it came; today's limits are no reason to refuse it now.
     if (status == STATUS_OK)
         status = intake_prepare(intake->store, row.scene, strlen(row.scene), NULL, &inquiry,
@@ -79,5 +151,8 @@ Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Ou
     pthread_mutex_unlock(&intake->lock);
     if (status != STATUS_OK || *outcome != NULL || computation != NULL)
         return status;
+    *outcome = load_series(intake, result);
+    if (*outcome != NULL)
+        return STATUS_OK;
     return compute_again(intake, result, waker, problem);
 }

@@ -255,7 +255,8 @@ static void saved(void *context, Status status, const char *detail) {
         // What is in the cache is known, so it must be in the store.
         if (status == STATUS_OK && saving->findings.status == STATUS_OK) {
             saving->is_saved = true;
-            cache_put(intake->cache, saving->computation->result, saving->findings.outcome);
+            cache_put(intake->cache, saving->computation->result, saving->findings.outcome,
+                      saving->head);
         }
         publish(saving, status, detail, false);
         goes_on = go_on(saving);
@@ -358,7 +359,7 @@ void intake_save(Intake *intake, Computation *computation, Findings *findings) {
     // meanwhile, and what is in the cache counts as known.
     if (saving->findings.outcome != NULL && computation->is_again &&
         store_result_exists(intake->store, computation->result))
-        cache_put(intake->cache, computation->result, saving->findings.outcome);
+        cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
     const bool goes_on = go_on(saving);
     if (!goes_on)
         end(saving);

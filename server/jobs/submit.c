@@ -15,13 +15,35 @@
 #include "server/jobs/quota.h"
 #include "server/store/job_search.h"
 
+// With the lock held: one of this scene that is under way, to be shared. One for readers alone
+// saves nothing.
+static Computation *find_shared(const Intake *intake, const char *result) {
+    Computation *computation = index_find(intake->in_flight, result);
+    return computation != NULL && computation->is_again ? NULL : computation;
+}
+
 // Plan, summary, work and notes of a result that is there already. STATUS_NOT_FOUND if it is not.
 static Status find_known(Intake *intake, Job *job, Problem *problem) {
+    pthread_mutex_lock(&intake->lock);
+    job->head = cache_head(intake->cache, job->row.result);
+    // What is in flight is not there either.
+    const bool is_new = job->head == NULL && find_shared(intake, job->row.result) != NULL;
+    pthread_mutex_unlock(&intake->lock);
+    if (job->head != NULL)
+        return STATUS_OK;
+    if (is_new)
+        return STATUS_NOT_FOUND;
     ResultRow row = {0};
     const Status status = store_result_head(intake->store, job->row.result, &row, NULL);
     if (status == STATUS_OK)
         job->head = head_new(&row);
     result_row_clear(&row);
+    pthread_mutex_lock(&intake->lock);
+    intake->rows.hits += status == STATUS_OK;
+    intake->rows.misses += status == STATUS_NOT_FOUND;
+    if (job->head != NULL)
+        cache_put(intake->cache, job->row.result, NULL, job->head);
+    pthread_mutex_unlock(&intake->lock);
     if (status == STATUS_OK || status == STATUS_NOT_FOUND)
         return status;
     return problem_set(problem, status, "the results could not be searched");
@@ -112,13 +134,6 @@ static Computation *begin(const JobRow *row, Inquiry *inquiry) {
     return NULL;
 }
 
-// With the lock held: one of this scene that is under way, to be shared. One for readers alone
-// saves nothing.
-static Computation *find_shared(const Intake *intake, const char *result) {
-    Computation *computation = index_find(intake->in_flight, result);
-    return computation != NULL && computation->is_again ? NULL : computation;
-}
-
 // Queues it, or lets it share what is under way. Takes the inquiry.
 static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
     Computation *computation = begin(&job->row, inquiry);
@@ -126,6 +141,12 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
+    // It may have become known meanwhile.
+    if (other == NULL && (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
+        pthread_mutex_unlock(&intake->lock);
+        computation_free(computation);
+        return finish_known(intake, job, problem);
+    }
     Status status = find_room(intake, job, problem);
     if (status == STATUS_OK)
         status = post(intake, job, problem);
@@ -356,10 +377,6 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
     intake_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
     TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    pthread_mutex_lock(&intake->lock);
-    Outcome *outcome = cache_find(intake->cache, dry_run->result);
-    pthread_mutex_unlock(&intake->lock);
-    dry_run->is_cached = outcome != NULL || store_result_exists(intake->store, dry_run->result);
-    outcome_drop(outcome);
+    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
     return STATUS_OK;
 }

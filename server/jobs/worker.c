@@ -119,8 +119,10 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
+    const int64_t cpu_began_ns = clock_thread_cpu_ns();
     Status status = simulation_run(&computation->inquiry.simulation, limits, &watch,
                                    &worker->workspace, &findings->outcome, problem);
+    findings->seconds = 1e-9 * (double)(clock_thread_cpu_ns() - cpu_began_ns);
     if (status == STATUS_OK && has_study)
         status = run_study(worker, computation, findings, problem);
     findings->ended_ns = clock_monotonic_ns();
@@ -212,10 +214,18 @@ void *worker_main(void *context) {
         if (findings.status == STATUS_CANCELLED)
             abandon(intake, computation);
         pthread_mutex_unlock(&intake->lock);
-        if (findings.status == STATUS_CANCELLED)
+        if (findings.status == STATUS_CANCELLED) {
             computation_free(computation);
-        else
+        } else {
+            char result[sizeof computation->result];
+            const double seconds = findings.seconds;
+            Outcome *outcome = findings.outcome != NULL ? outcome_hold(findings.outcome) : NULL;
+            memcpy(result, computation->result, sizeof result);
             intake_save(intake, computation, &findings);
+            if (outcome != NULL)
+                intake_keep_series(intake, result, outcome, seconds);
+            outcome_drop(outcome);
+        }
         findings_clear(&findings);
         pthread_mutex_lock(&intake->lock);
     }

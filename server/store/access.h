@@ -3,6 +3,8 @@
 #ifndef SERVER_STORE_ACCESS_H
 #define SERVER_STORE_ACCESS_H
 
+#include <stdatomic.h>
+
 #include "server/store/database.h"
 #include "server/store/row.h"
 #include "server/store/store.h"
@@ -21,7 +23,11 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
 Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
                   const StoreDone *done, StoreTicket **ticket);
 
-struct Late *store_late(Store *store); // NULL: its database is in memory
+// The same when nothing else is queued; `work` is borrowed until then.
+Status store_post_low(Store *store, StoreApply *apply, const void *work, const StoreDone *done);
+
+atomic_uint_fast64_t *store_evictions(Store *store); // of series
+struct Late *store_late(Store *store);               // NULL: its database is in memory
 
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);

@@ -115,3 +115,30 @@ static Status delete (Database *database, const void *work, Problem *problem) {
 Status store_result_delete(Store *store, const char *id, Problem *problem) {
     return store_write(store, delete, &(Key){(char *)id}, problem);
 }
+
+typedef struct Recent {
+    uint64_t most, scene_most;
+} Recent;
+static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
+                                           ROW_COLUMN(Recent, scene_most, COLUMN_COUNT), ROW_END};
+
+Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+                           Problem *problem) {
+    static const char sql[] =
+        "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
+        "WHERE length(scene) <= :scene_most";
+    void *at;
+    const Status status = store_all(store, sql, recent_columns, &(Recent){most, scene_most},
+                                    result_columns, sizeof *rows->at, &at, &rows->count, problem);
+    rows->at = at;
+    if (status != STATUS_OK)
+        result_rows_clear(rows);
+    return status;
+}
+
+void result_rows_clear(ResultRows *rows) {
+    for (size_t i = 0; i < rows->count; i++)
+        result_row_clear(&rows->at[i]);
+    free(rows->at);
+    *rows = (ResultRows){0};
+}

@@ -41,6 +41,10 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
         return sqlite3_bind_int(statement, index, *(const int *)(const void *)member);
     case COLUMN_FLAG:
         return sqlite3_bind_int(statement, index, *(const bool *)(const void *)member);
+    case COLUMN_BYTES: {
+        const RowBytes *bytes = (const void *)member;
+        return sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
+    }
     case COLUMN_END:
         break;
     }
@@ -116,6 +120,15 @@ static bool read_column(Statement *statement, int index, const RowColumn *column
     case COLUMN_FLAG:
         *(bool *)(void *)member = sqlite3_column_int(statement, index) != 0;
         return true;
+    case COLUMN_BYTES: {
+        RowBytes *bytes = (void *)member;
+        const void *at = sqlite3_column_blob(statement, index);
+        bytes->size = (size_t)sqlite3_column_bytes(statement, index);
+        bytes->at = malloc(bytes->size + 1);
+        if (bytes->at != NULL && bytes->size > 0)
+            memcpy(bytes->at, at, bytes->size);
+        return bytes->at != NULL;
+    }
     case COLUMN_END:
         break;
     }

@@ -26,6 +26,7 @@ struct Store {
     Writer *writer;
     Late *late;
     atomic_uint_fast64_t generation; // of the catalogue
+    atomic_uint_fast64_t evictions;  // of series
     pthread_mutex_t lock;
     pthread_cond_t some;
     Database *readers[READERS]; // of which the first `free_count` are not taken
@@ -99,7 +100,15 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
 
 Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
                   const StoreDone *done, StoreTicket **ticket) {
-    return writer_post(store->writer, apply, work, size, done, ticket);
+    return writer_post(store->writer, apply, work, size, false, done, ticket);
+}
+
+Status store_post_low(Store *store, StoreApply *apply, const void *work, const StoreDone *done) {
+    return writer_post(store->writer, apply, work, 0, true, done, NULL);
+}
+
+atomic_uint_fast64_t *store_evictions(Store *store) {
+    return &store->evictions;
 }
 
 bool store_withdraw(Store *store, StoreTicket *ticket) {

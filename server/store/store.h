@@ -129,5 +129,23 @@ Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
 Status store_result_delete(Store *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
+// Id, engine and scene of the newest ones, newest first, without scenes longer than that.
+typedef struct ResultRows {
+    ResultRow *at;
+    size_t count;
+} ResultRows;
+Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+                           Problem *problem);
+void result_rows_clear(ResultRows *rows);
+
+// Series of results as bytes, at most `most` of them in all: the longest unused make room. Posted
+// behind all else that is to be written. Takes `body`, which is to be freed, also when it fails.
+Status store_series_post(Store *store, const char *result, char *body, size_t size, uint64_t most,
+                         const StoreDone *done);
+// *body is to be freed. STATUS_NOT_FOUND.
+Status store_series_load(Store *store, const char *result, char **body, size_t *size,
+                         Problem *problem);
+bool store_series_exists(Store *store, const char *result);
+void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
 #endif

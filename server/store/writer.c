@@ -32,7 +32,8 @@ struct Writer {
     pthread_mutex_t lock;
     pthread_cond_t some;
     StoreTicket *first, **last;
-    bool is_idle; // the thread sleeps
+    StoreTicket *low, **last_low; // wait until `first` is empty
+    bool is_idle;                 // the thread sleeps
     bool is_stopping;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
@@ -120,22 +121,35 @@ static void tell(Writer *writer, StoreTicket *write) {
     }
 }
 
+// With the lock held: all that is queued, else one of what is low.
+static StoreTicket *take(Writer *writer) {
+    StoreTicket *write = writer->first;
+    if (write == NULL && (write = writer->low) != NULL) {
+        writer->low = write->next;
+        if (writer->low == NULL)
+            writer->last_low = &writer->low;
+        write->next = NULL;
+        return write;
+    }
+    for (StoreTicket *at = write; at != NULL; at = at->next)
+        at->link = NULL;
+    writer->first = NULL;
+    writer->last = &writer->first;
+    return write;
+}
+
 static void *work(void *context) {
     Writer *writer = context;
     pthread_mutex_lock(&writer->lock);
     for (;;) {
-        while (writer->first == NULL && !writer->is_stopping) {
+        while (writer->first == NULL && writer->low == NULL && !writer->is_stopping) {
             writer->is_idle = true;
             pthread_cond_wait(&writer->some, &writer->lock);
         }
         writer->is_idle = false;
-        StoreTicket *write = writer->first;
+        StoreTicket *write = take(writer);
         if (write == NULL)
             break;
-        for (StoreTicket *at = write; at != NULL; at = at->next)
-            at->link = NULL;
-        writer->first = NULL;
-        writer->last = &writer->first;
         pthread_mutex_unlock(&writer->lock);
         commit_all(writer, write);
         pthread_mutex_lock(&writer->lock);
@@ -153,6 +167,7 @@ Status writer_start(Database *database, Store *shared, Writer **writer, Problem 
     made->database = database;
     made->shared = shared;
     made->last = &made->first;
+    made->last_low = &made->low;
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
     if (pthread_create(&made->thread, NULL, work, made) != 0) {
@@ -180,11 +195,12 @@ void writer_stop(Writer *writer) {
 }
 
 // With the lock held.
-static void enqueue(Writer *writer, StoreTicket *write) {
+static void enqueue(Writer *writer, StoreTicket *write, bool is_low) {
+    StoreTicket ***last = is_low ? &writer->last_low : &writer->last;
     write->next = NULL;
-    write->link = writer->last;
-    *writer->last = write;
-    writer->last = &write->next;
+    write->link = is_low ? NULL : *last;
+    **last = write;
+    *last = &write->next;
     if (writer->is_idle) {
         writer->is_idle = false; // woken once is enough
         pthread_cond_signal(&writer->some);
@@ -195,7 +211,7 @@ Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *
     StoreTicket write = {.apply = apply, .work = work_};
     pthread_cond_init(&write.settled, NULL);
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, &write);
+    enqueue(writer, &write, false);
     while (!write.is_done)
         pthread_cond_wait(&write.settled, &writer->lock);
     pthread_mutex_unlock(&writer->lock);
@@ -205,7 +221,7 @@ Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *
     return write.status;
 }
 
-Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size,
+Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size, bool is_low,
                    const StoreDone *done, StoreTicket **ticket) {
     StoreTicket *write = malloc(sizeof *write + size);
     if (write == NULL)
@@ -216,7 +232,7 @@ Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t 
     if (ticket != NULL)
         *ticket = write;
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, write);
+    enqueue(writer, write, is_low);
     pthread_mutex_unlock(&writer->lock);
     return STATUS_OK;
 }

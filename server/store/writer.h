@@ -16,9 +16,10 @@ Status writer_start(Database *database, Store *shared, Writer **writer, Problem 
 // may write any more.
 void writer_stop(Writer *writer);
 
-// As store_write, store_post and store_withdraw.
+// As store_write, store_post and store_withdraw. What is low waits until nothing else is queued,
+// and is committed by itself.
 Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem);
-Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t size,
+Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t size, bool is_low,
                    const StoreDone *done, StoreTicket **ticket);
 bool writer_withdraw(Writer *writer, StoreTicket *ticket);
 

@@ -1,0 +1,144 @@
+// What is known already: how often that helped, and why a scene is known or not.
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/api/app.h"
+#include "server/codec/differ.h"
+#include "server/http/body.h"
+#include "server/http/reply.h"
+#include "server/jobs/documents.h"
+
+// The scenes that are compared, and how long they may be.
+enum { RECENT_MOST = 256, SCENE_MOST = 16384 };
+
+static void put_layer(Bytes *bytes, const char *name, const LayerTally *layer, bool has_budget) {
+    bytes_format(bytes, "\"%s\": {\"hits\": %llu, \"misses\": %llu", name,
+                 (unsigned long long)layer->hits, (unsigned long long)layer->misses);
+    if (has_budget)
+        bytes_format(
+            bytes, ", \"evictions\": %llu, \"count\": %zu, \"bytes\": %zu, \"most_bytes\": %zu",
+            (unsigned long long)layer->evictions, layer->count, layer->bytes, layer->most_bytes);
+    bytes_text(bytes, "}");
+}
+
+Status cache_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)request;
+    IntakeTally tally;
+    Bytes bytes = {.most = app->reply_most};
+    intake_tally(app->intake, &tally);
+    bytes_text(&bytes, "{");
+    put_layer(&bytes, "bodies", &tally.known, true);
+    bytes_text(&bytes, ", ");
+    put_layer(&bytes, "documents", &tally.heads, true);
+    bytes_text(&bytes, ", ");
+    put_layer(&bytes, "series", &tally.series, true);
+    bytes_text(&bytes, ", ");
+    put_layer(&bytes, "results", &tally.rows, false);
+    uint64_t count, size;
+    store_series_tally(app->store, &count, &size, &tally.stored.evictions);
+    tally.stored.count = count;
+    tally.stored.bytes = size;
+    bytes_text(&bytes, ", ");
+    put_layer(&bytes, "stored_series", &tally.stored, true);
+    bytes_text(&bytes, "}\n");
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+static const char *flag(bool is_so) {
+    return is_so ? "true" : "false";
+}
+
+static void put_value(Bytes *bytes, const char *name, const char *json) {
+    if (json[0] != '\0')
+        bytes_format(bytes, ", \"%s\": %s", name, json);
+}
+
+static void put_nearest(Bytes *bytes, const ResultRow *row, const Differences *differences) {
+    const bool is_other = strcmp(row->engine, engine_version) != 0;
+    bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", row->id);
+    bytes_json_string(bytes, row->engine);
+    bytes_format(bytes, ", \"engine_differs\": %s, \"count\": %zu, \"differences\": [",
+                 flag(is_other), differences->count);
+    for (size_t i = 0; i < differences->count && i < DIFFER_MOST; i++) {
+        const Difference *one = &differences->at[i];
+        bytes_text(bytes, i > 0 ? ", {\"pointer\": " : "{\"pointer\": ");
+        bytes_json_string(bytes, one->pointer);
+        put_value(bytes, "here", one->here);
+        put_value(bytes, "there", one->there);
+        bytes_text(bytes, "}");
+    }
+    bytes_text(bytes, "]}");
+}
+
+// The known scene that differs least, or none.
+static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *problem) {
+    ResultRows rows = {NULL, 0};
+    Differences *own = malloc(2 * sizeof *own);
+    Differences *least = own, *other = own + 1;
+    const ResultRow *nearest = NULL;
+    Status status = own == NULL
+                        ? STATUS_NO_MEMORY
+                        : store_result_recent(app->store, RECENT_MOST, SCENE_MOST, &rows, problem);
+    for (size_t i = 0; i < rows.count && status == STATUS_OK; i++) {
+        if (differ_json(scene, rows.at[i].scene, other) != STATUS_OK)
+            continue;
+        if (nearest == NULL || other->count < least->count) {
+            Differences *more = least;
+            least = other;
+            other = more;
+            nearest = &rows.at[i];
+        }
+    }
+    if (status == STATUS_OK && nearest != NULL)
+        put_nearest(bytes, nearest, least);
+    else
+        bytes_text(bytes, "null");
+    result_rows_clear(&rows);
+    free(own);
+    return status;
+}
+
+static Status explain(App *app, const Inquiry *inquiry, Bytes *bytes, Problem *problem) {
+    char result[72];
+    IntakeLayers layers;
+    Bytes scene = {.most = app->reply_most};
+    intake_result_id(inquiry, result);
+    intake_layers(app->intake, result, &layers);
+    const bool is_known = layers.in_memory || layers.in_database;
+    bytes_format(bytes, "{\"result\": \"%s\", \"engine\": ", result);
+    bytes_json_string(bytes, engine_version);
+    bytes_format(bytes,
+                 ", \"cached\": %s, \"layers\": {\"memory\": %s, \"database\": %s, "
+                 "\"series_memory\": %s, \"series_database\": %s}, \"nearest\": ",
+                 flag(is_known), flag(layers.in_memory), flag(layers.in_database),
+                 flag(layers.series_in_memory), flag(layers.series_in_database));
+    Status status = STATUS_OK;
+    if (is_known) {
+        bytes_text(bytes, "null");
+    } else {
+        document_scene(&scene, inquiry);
+        char *text = bytes_take(&scene, NULL);
+        status = text == NULL ? STATUS_NO_MEMORY : find_nearest(app, text, bytes, problem);
+        free(text);
+    }
+    bytes_text(bytes, "}\n");
+    return status;
+}
+
+Status cache_explain(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Inquiry inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    Bytes bytes = {.most = app->reply_most};
+    TRY(body_require_json(request, problem));
+    Status status = intake_prepare(app->store, request->body, request->body_size, NULL, &inquiry,
+                                   &warnings, problem);
+    if (status == STATUS_OK)
+        status = explain(app, &inquiry, &bytes, problem);
+    if (status == STATUS_OK)
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    else
+        bytes_clear(&bytes);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+    return status;
+}
