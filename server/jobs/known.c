@@ -179,9 +179,10 @@ bool known_answer(Known *known, Store *store, const Submission *submission, uint
         row.created_unix_ms = row.started_unix_ms = row.finished_unix_ms = clock_unix_ms();
         clock_rfc3339(row.created_unix_ms, time);
         // In whole microseconds, so that it is as wide as the place for it.
-        const int64_t took_us = (clock_monotonic_ns() - began_ns) / 1000;
-        snprintf(took, sizeof took, "0.%06d", (int)(took_us < 999999 ? took_us : 999999));
-        row.total = 1e-6 * (double)took_us;
+        int64_t took_us = (clock_monotonic_ns() - began_ns) / 1000;
+        took_us = took_us < 999999 ? took_us : 999999;
+        snprintf(took, sizeof took, "0.%06d", (int)took_us);
+        row.total = (double)took_us / 1e6; // to the bit what its text reads back to
         if (job_id_make(row.id)) {
             memcpy(text + slots->id, row.id, JOB_ID_LENGTH);
             memcpy(text + slots->self, row.id, JOB_ID_LENGTH);
