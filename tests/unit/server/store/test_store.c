@@ -494,6 +494,7 @@ static void late_rows_of_a_killed_process_are_written_at_the_next_start(void **s
     }
     Store *store = open_store(folder);
     JobRows rows;
+    const JobSearch all = job_search_all(10000);
     assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1500);
     job_rows_clear(&rows);
