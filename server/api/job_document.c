@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
+#include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 
@@ -22,13 +23,14 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
 
 static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
                         JobSlots *slots) {
-    bytes_text(bytes, ", \"links\": {\"self\": \"/v1/jobs/");
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/", link_base());
     slots->self = bytes->count;
     bytes_format(bytes, "%s\"", id);
     if (has_result)
-        bytes_format(bytes,
-                     ", \"result\": \"/v1/results/%s\", \"series\": \"/v1/results/%s/series.json\"",
-                     result, result);
+        bytes_format(
+            bytes,
+            ", \"result\": \"%s/v1/results/%s\", \"series\": \"%s/v1/results/%s/series.json\"",
+            link_base(), result, link_base(), result);
     bytes_text(bytes, "}");
 }
 

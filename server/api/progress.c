@@ -169,7 +169,7 @@ Status jobs_events(App *app, const Request *request, Reply *reply, Problem *prob
     bytes_format(&events->text, "retry: %d\n\n", RETRY_MS);
     reply->code = 200;
     reply->content_type = "text/event-stream";
-    reply->stream = (Stream){events_next, UINT64_MAX, LOOK_MS};
+    reply->stream = (Stream){.next = events_next, .size = UINT64_MAX, .wait_ms = LOOK_MS};
     reply->release = events_release;
     reply->context = events;
     return STATUS_OK;

@@ -5,7 +5,8 @@
 static const char *const of_submit[] = {"dry_run", NULL};
 static const char *const of_jobs[] = {"limit", "before", "status", "q", "label", "result", "kind", "since", "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
-static const char *const of_series[] = {"channels", "from", "to", NULL};
+static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
+static const char *const of_force[] = {"points", NULL};
 static const char *const of_materials[] = {"q", NULL};
 
 // clang-format off
@@ -18,14 +19,17 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
     {"DELETE", "/v1/results/{id}",                      "submit", NULL,         "Delete a result; its jobs stay", results_delete},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
-    {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv or npy", results_series},
+    {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", results_series},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
-    {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv or npy", results_psd},
+    {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv, npy, npz or mat", results_psd},
     {"GET",    "/v1/results/{id}/psd",                  "read",   NULL,         "Power spectral densities, format by Accept", results_psd},
-    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json or csv", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json, csv, npy, npz or mat", results_impacts},
     {"GET",    "/v1/results/{id}/impacts",              "read",   NULL,         "The ledger of impacts, format by Accept", results_impacts},
-    {"GET",    "/v1/results/{id}/energy.json",          "read",   NULL,         "The energy ledger", results_energy},
-    {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger", results_energy},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force.{format}", "read", of_force, "One impact in detail, as json, csv, npy, npz or mat", results_force},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force", "read", of_force,     "One impact in detail, format by Accept", results_force},
+    {"GET",    "/v1/results/{id}/bundle.zip",           "read",   NULL,         "All of a result in one archive", results_bundle},
+    {"GET",    "/v1/results/{id}/energy.{format}",      "read",   NULL,         "The energy ledger as json, csv, npy, npz or mat", results_energy},
+    {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger, format by Accept", results_energy},
     {"GET",    "/v1/results/{id}/tradeoff.{format}",    "read",   NULL,         "The study's table as json, or its chart as svg", results_tradeoff},
     {"GET",    "/v1/results/{id}/tradeoff",             "read",   NULL,         "The study's table or chart, format by Accept", results_tradeoff},
     {"GET",    "/v1/results/{id}/ensemble.{format}",    "read",   NULL,         "The study's statistics as json, its runs as csv, or its chart as svg", results_ensemble},
@@ -37,13 +41,14 @@ const Route routes[] = {
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
     {"GET",    "/v1/examples/{name}",                   "read",   NULL,         "One of them, ready to submit", examples_show},
-    {"GET",    "/schemas",                              "read",   NULL,         "JSON Schemas, by name", schemas_list},
-    {"GET",    "/schemas/{name}",                       "read",   NULL,         "A JSON Schema", schemas_show},
-    {"GET",    "/openapi.json",                         "read",   NULL,         "This API as OpenAPI 3.1", openapi_show},
-    {"GET",    "/health/live",                          "read",   NULL,         "The daemon answers", health_live},
-    {"GET",    "/health/ready",                         "read",   NULL,         "The daemon takes jobs; 503 otherwise", health_ready},
-    {"GET",    "/version",                              "read",   NULL,         "Program, engine and build", version_show},
-    {"GET",    "/",                                     "read",   NULL,         "How to begin: curl lines", landing_show},
+    {"GET",    "/schemas",                              "open",   NULL,         "JSON Schemas, by name", schemas_list},
+    {"GET",    "/schemas/{name}",                       "open",   NULL,         "A JSON Schema", schemas_show},
+    {"GET",    "/openapi.json",                         "open",   NULL,         "This API as OpenAPI 3.1", openapi_show},
+    {"GET",    "/health/live",                          "open",   NULL,         "The daemon answers", health_live},
+    {"GET",    "/health/ready",                         "open",   NULL,         "The daemon takes jobs; 503 otherwise", health_ready},
+    {"GET",    "/metrics",                              "read",   NULL,         "Counters in the Prometheus text format", metrics_show},
+    {"GET",    "/version",                              "open",   NULL,         "Program, engine and build", version_show},
+    {"GET",    "/",                                     "open",   NULL,         "How to begin: curl lines", landing_show},
     {NULL, NULL, NULL, NULL, NULL, NULL},
 };
 // clang-format on

@@ -6,8 +6,6 @@
 #include <gnutls/crypto.h>
 #include <gnutls/gnutls.h>
 
-enum { SHA256_BYTES = 32 };
-
 struct Digest {
     gnutls_hash_hd_t hash;
 };
@@ -28,26 +26,22 @@ void digest_take(void *digest, const void *bytes, size_t size) {
     (void)gnutls_hash(((Digest *)digest)->hash, bytes, size);
 }
 
-static void write_hexadecimal(const unsigned char sum[SHA256_BYTES], char target[DIGEST_SIZE]) {
-    static const char digits[] = "0123456789abcdef";
-    for (size_t i = 0; i < SHA256_BYTES; i++) {
-        target[2 * i] = digits[sum[i] >> 4];
-        target[2 * i + 1] = digits[sum[i] & 15];
+void digest_spell(const unsigned char sum[DIGEST_BYTES], char target[65]) {
+    static const char hexadecimal[] = "0123456789abcdef";
+    for (size_t i = 0; i < DIGEST_BYTES; i++) {
+        target[2 * i] = hexadecimal[sum[i] >> 4];
+        target[2 * i + 1] = hexadecimal[sum[i] & 15];
     }
-    target[2 * SHA256_BYTES] = '\0';
+    target[2 * (size_t)DIGEST_BYTES] = '\0';
 }
 
-void digest_end(Digest *digest, char target[DIGEST_SIZE]) {
-    unsigned char sum[SHA256_BYTES];
+void digest_end(Digest *digest, char target[65]) {
+    unsigned char sum[DIGEST_BYTES];
     gnutls_hash_deinit(digest->hash, sum);
     free(digest);
-    write_hexadecimal(sum, target);
+    digest_spell(sum, target);
 }
 
-bool digest_of(const void *bytes, size_t size, char target[DIGEST_SIZE]) {
-    unsigned char sum[SHA256_BYTES];
-    if (gnutls_hash_fast(GNUTLS_DIG_SHA256, bytes, size, sum) < 0)
-        return false;
-    write_hexadecimal(sum, target);
-    return true;
+void digest_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]) {
+    (void)gnutls_hash_fast(GNUTLS_DIG_SHA256, bytes, size, target);
 }

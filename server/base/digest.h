@@ -2,17 +2,19 @@
 #ifndef SERVER_BASE_DIGEST_H
 #define SERVER_BASE_DIGEST_H
 
-#include <stdbool.h>
 #include <stddef.h>
-
-enum { DIGEST_SIZE = 65 }; // 64 lower-case hexadecimal digits and a NUL
 
 typedef struct Digest Digest;
 
 Digest *digest_new(void);                                       // NULL without memory
 void digest_take(void *digest, const void *bytes, size_t size); // fits canonical_write's callback
-void digest_end(Digest *digest, char target[DIGEST_SIZE]);      // ends and frees
-// Of one piece, quickly. False where it cannot be made.
-bool digest_of(const void *bytes, size_t size, char target[DIGEST_SIZE]);
+// Ends and frees; 64 lower-case hexadecimal digits and a NUL.
+void digest_end(Digest *digest, char target[65]);
+
+enum { DIGEST_BYTES = 32 };
+// The digest of all of `bytes` at once, as it is.
+void digest_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]);
+// The same as 64 digits and a NUL.
+void digest_spell(const unsigned char sum[DIGEST_BYTES], char target[65]);
 
 #endif

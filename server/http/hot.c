@@ -18,8 +18,8 @@ typedef struct Entry {
     uint64_t hash;
     size_t bytes;
     bool is_packed;
-    const char *scope; // of the route, which lives as long as the program
-    Reply reply;       // owns the body
+    const struct Route *route; // lives as long as the program
+    Reply reply;               // owns the body
     char target[];
 } Entry;
 
@@ -116,7 +116,7 @@ static void lend(Entry *entry, Reply *reply) {
     reply->shared = entry;
 }
 
-void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const char *scope,
+void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
              Reply *reply) {
     const size_t bytes = sizeof(Entry) + strlen(target) + 1 + reply->body_size;
     if (bytes > hot->most_bytes / SHARE)
@@ -127,7 +127,7 @@ void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const c
     memcpy(entry->target, target, strlen(target) + 1);
     entry->is_packed = is_packed;
     entry->hash = hash_of(target, is_packed);
-    entry->scope = scope;
+    entry->route = route;
     entry->bytes = bytes;
     entry->reply = *reply;
     atomic_init(&entry->holds, 1);
@@ -154,7 +154,8 @@ void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const c
     pthread_mutex_unlock(&hot->lock);
 }
 
-bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply, const char **scope) {
+bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
+              const struct Route **route) {
     const uint64_t hash = hash_of(target, is_packed);
     pthread_mutex_lock(&hot->lock);
     Entry *entry = *place(hot, hash, target, is_packed);
@@ -162,7 +163,7 @@ bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply, const 
         unlink_entry(hot, entry);
         link_newest(hot, entry);
         lend(entry, reply);
-        *scope = entry->scope;
+        *route = entry->route;
         hot->tally.hits++;
     } else {
         hot->tally.misses++;

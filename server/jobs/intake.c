@@ -369,6 +369,7 @@ static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem
         job_drop(job); // the post's hold
     }
     wakers_call(&job->wakers);
+    totals_ended(&intake->totals, JOB_DISMISSED, false);
     pthread_mutex_unlock(&intake->lock);
     return STATUS_OK;
 }
@@ -395,7 +396,10 @@ bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *ans
     // Whoever's jobs are counted has them counted at the door.
     if (submission->client != NULL && intake->settings.rate > 0)
         return false;
-    return known_answer(intake->known, intake->store, submission, intake_mark(intake), answer);
+    if (!known_answer(intake->known, intake->store, submission, intake_mark(intake), answer))
+        return false;
+    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+    return true;
 }
 
 // Both only rise: their sum is the same only while both are.
@@ -445,6 +449,10 @@ void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
     pthread_mutex_unlock(&intake->lock);
     layers->in_database = store_result_exists(intake->store, result);
     layers->series_in_database = store_series_exists(intake->store, result);
+}
+
+const Totals *intake_totals(const Intake *intake) {
+    return &intake->totals;
 }
 
 void intake_tally(Intake *intake, IntakeTally *tally) {

@@ -141,5 +141,8 @@ typedef struct IntakeTally {
     LayerTally stored; // series in the database
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
+// What was done since the start; counted on.
+struct Totals;
+const struct Totals *intake_totals(const Intake *intake);
 
 #endif

@@ -12,6 +12,7 @@
 #include "server/jobs/intake.h"
 #include "server/jobs/known.h"
 #include "server/jobs/queue.h"
+#include "server/jobs/totals.h"
 
 enum { OUTCOME_FAILURES = 64 };
 
@@ -109,6 +110,7 @@ struct Intake {
     atomic_uint_fast64_t deletions;     // of results
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
+    Totals totals;
 };
 
 bool wakers_add(Wakers *wakers, const Waker *waker); // false without memory

@@ -14,13 +14,13 @@
 #include "server/jobs/job_id.h"
 
 // A larger body is read: hashing it would hold up whoever asks.
-enum { BODY_MOST = 65536 };
+enum { BODY_MOST = 65536, KEY_SIZE = 2 * DIGEST_BYTES + 1 };
 
 typedef struct Entry {
     IndexEntry indexed; // by key
     struct Entry *newer, *older;
     atomic_size_t holds; // the table's and of those who copy it just now
-    char key[DIGEST_SIZE];
+    char key[KEY_SIZE];
     uint64_t mark;
     JobRow row; // as it is stored, but for id and times
     char *text;
@@ -88,6 +88,15 @@ void known_free(Known *known) {
     free(known);
 }
 
+static bool make_key(const Submission *submission, char key[KEY_SIZE]) {
+    unsigned char sum[DIGEST_BYTES];
+    if (submission->size > BODY_MOST)
+        return false;
+    digest_sum(submission->text, submission->size, sum);
+    digest_spell(sum, key);
+    return true;
+}
+
 static size_t text_bytes(const char *text) {
     return text != NULL ? strlen(text) + 1 : 0;
 }
@@ -114,8 +123,8 @@ static Entry *entry_new(const char *key, const JobRow *row, const char *text, si
 
 void known_put(Known *known, const Submission *submission, uint64_t mark, const JobRow *row,
                const char *text, size_t size, const JobSlots *slots) {
-    char key[DIGEST_SIZE];
-    if (submission->size > BODY_MOST || !digest_of(submission->text, submission->size, key))
+    char key[KEY_SIZE];
+    if (!make_key(submission, key))
         return;
     Entry *entry = entry_new(key, row, text, size);
     if (entry == NULL)
@@ -163,8 +172,8 @@ static Entry *find(Known *known, const char *key, uint64_t mark) {
 bool known_answer(Known *known, Store *store, const Submission *submission, uint64_t mark,
                   KnownAnswer *answer) {
     const int64_t began_ns = clock_monotonic_ns();
-    char key[DIGEST_SIZE];
-    if (submission->size > BODY_MOST || !digest_of(submission->text, submission->size, key))
+    char key[KEY_SIZE];
+    if (!make_key(submission, key))
         return false;
     Entry *entry = find(known, key, mark);
     char *text = entry != NULL ? malloc(entry->size + 1) : NULL;

@@ -173,6 +173,7 @@ static void publish(Saving *saving, Status status, const char *detail, bool may_
                 job->is_kept = true;
                 intake_retire(job);
             }
+            totals_ended(&saving->intake->totals, job->row.state, false);
             wakers_call(&job->wakers);
             wakers_call(&job->keepers);
         }

@@ -95,11 +95,14 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->has_result = true;
     if (row->idempotency_key == NULL && store_job_late(intake->store, row)) {
         job->is_kept = true;
+        totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
         return STATUS_OK;
     }
     pthread_mutex_lock(&intake->lock);
     const Status status = post(intake, job, problem);
     pthread_mutex_unlock(&intake->lock);
+    if (status == STATUS_OK)
+        totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
     return status;
 }
 

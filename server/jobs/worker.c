@@ -110,7 +110,7 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
 }
 
 static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
-    const Intake *intake = worker->intake;
+    Intake *intake = worker->intake;
     // Only the scene's own series is ever wanted again.
     const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
     Part part = {computation, 0, has_study ? own_share : 1};
@@ -119,12 +119,17 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
-    const int64_t cpu_began_ns = clock_thread_cpu_ns();
+    const int64_t run_ns = clock_thread_cpu_ns();
     Status status = simulation_run(&computation->inquiry.simulation, limits, &watch,
                                    &worker->workspace, &findings->outcome, problem);
-    findings->seconds = 1e-9 * (double)(clock_thread_cpu_ns() - cpu_began_ns);
-    if (status == STATUS_OK && has_study)
+    const int64_t study_ns = clock_thread_cpu_ns();
+    findings->seconds = 1e-9 * (double)(study_ns - run_ns);
+    if (status == STATUS_OK)
+        totals_run(&intake->totals, findings->outcome, study_ns - run_ns);
+    if (status == STATUS_OK && has_study) {
         status = run_study(worker, computation, findings, problem);
+        totals_study(&intake->totals, clock_thread_cpu_ns() - study_ns);
+    }
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);
@@ -184,6 +189,7 @@ static Computation *next_computation(Worker *worker) {
         job->row.started_unix_ms = now_ms;
         job->started_ns = now_ns;
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
+        histogram_add(&intake->totals.waited, now_ns - job->submitted_ns);
     }
     return computation;
 }

@@ -13,6 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/base/clock.h"
+
 // One write: on the stack of a caller who waits, or on the heap with a copy of its work behind it.
 struct StoreTicket {
     StoreTicket *next, **link; // `link` points at what points here; NULL: it is queued no more
@@ -35,6 +37,7 @@ struct Writer {
     StoreTicket *low, **last_low; // wait until `first` is empty
     bool is_idle;                 // the thread sleeps
     bool is_stopping;
+    StoreTotals totals;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
 
@@ -62,6 +65,9 @@ static Status apply_saved(Writer *writer, Database *database, StoreTicket *write
 static bool commit(Writer *writer, Database *database, StoreTicket *first, const StoreTicket *end,
                    bool has_savepoints) {
     static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
+    const int64_t began_ns = clock_monotonic_ns();
+    const uint64_t rows = database_rows_changed(database);
+    uint64_t writes = 0;
     problem_clear(&writer->problem);
     Status status = database_change(database, begin, NULL, NULL, NULL, &writer->problem);
     for (StoreTicket *write = first; status == STATUS_OK && write != end; write = write->next) {
@@ -69,11 +75,15 @@ static bool commit(Writer *writer, Database *database, StoreTicket *first, const
         if (!has_savepoints) {
             status = write->apply(database, write->work, &writer->problem);
             write->status = STATUS_OK;
+            writes++;
             continue;
         }
         settle(write, apply_saved(writer, database, write), &writer->problem);
-        if (!database_is_in_transaction(database))
+        writes += write->status == STATUS_OK;
+        if (!database_is_in_transaction(database)) {
+            counter_add(&writer->totals.errors, 1);
             return false;
+        }
     }
     if (status == STATUS_OK) {
         problem_clear(&writer->problem);
@@ -81,6 +91,13 @@ static bool commit(Writer *writer, Database *database, StoreTicket *first, const
     }
     if (status != STATUS_OK && database_is_in_transaction(database))
         (void)database_change(database, undo, NULL, NULL, NULL, NULL);
+    if (status == STATUS_OK) {
+        histogram_add(&writer->totals.commits, clock_monotonic_ns() - began_ns);
+        counter_add(&writer->totals.writes, writes);
+        counter_add(&writer->totals.rows, database_rows_changed(database) - rows);
+    } else {
+        counter_add(&writer->totals.errors, 1);
+    }
     return status == STATUS_OK;
 }
 
@@ -192,6 +209,10 @@ void writer_stop(Writer *writer) {
     pthread_cond_destroy(&writer->some);
     pthread_mutex_destroy(&writer->lock);
     free(writer);
+}
+
+const StoreTotals *writer_totals(const Writer *writer) {
+    return &writer->totals;
 }
 
 // With the lock held.

@@ -23,4 +23,6 @@ Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t s
                    const StoreDone *done, StoreTicket **ticket);
 bool writer_withdraw(Writer *writer, StoreTicket *ticket);
 
+const StoreTotals *writer_totals(const Writer *writer);
+
 #endif

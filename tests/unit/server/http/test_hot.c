@@ -13,6 +13,9 @@
 
 #include "server/http/hot.h"
 #include "server/http/reply.h"
+#include "server/http/route.h"
+
+static const Route route = {.scope = "read"};
 
 static atomic_int released;
 
@@ -34,18 +37,18 @@ static Reply fresh(const char *text, size_t size) {
 
 static void put(Hot *hot, const char *target, bool is_packed, const char *text, size_t size) {
     Reply reply = fresh(text, size);
-    hot_put(hot, hot_age(hot), target, is_packed, "read", &reply);
+    hot_put(hot, hot_age(hot), target, is_packed, &route, &reply);
     assert_string_equal(reply.body, text);
     reply_clear(&reply);
 }
 
 static bool finds(Hot *hot, const char *target, bool is_packed, const char *text) {
     Reply reply;
-    const char *scope;
-    if (!hot_find(hot, target, is_packed, &reply, &scope))
+    const Route *found;
+    if (!hot_find(hot, target, is_packed, &reply, &found))
         return false;
     assert_string_equal(reply.body, text);
-    assert_string_equal(scope, "read");
+    assert_ptr_equal(found, &route);
     assert_non_null(reply.shared);
     reply_clear(&reply);
     return true;
@@ -90,7 +93,7 @@ static void what_is_held_outlives_the_cache(void **state) {
     atomic_store(&released, 0);
     Hot *hot = hot_new(1 << 20);
     Reply reply = fresh("held", 100);
-    hot_put(hot, hot_age(hot), "/held", false, "read", &reply);
+    hot_put(hot, hot_age(hot), "/held", false, &route, &reply);
     hot_clear(hot);
     assert_false(finds(hot, "/held", false, ""));
     hot_free(hot);
