@@ -25,6 +25,9 @@
     X(TIMEOUT, "timeout", "Timed out")                                                             \
     X(UNREACHABLE, "unreachable", "The server cannot be reached")                                  \
     X(BUSY, "busy", "Too busy")                                                                    \
+    X(QUOTA, "quota", "Over the quota")                                                            \
+    X(REUSED, "key-reused", "The key was used for another request")                                \
+    X(FULL, "no-room", "No room left on the disk")                                                 \
     X(CANCELLED, "cancelled", "Cancelled")                                                         \
     X(LIMIT, "limit", "A limit was reached")                                                       \
     X(UNSTABLE, "unstable", "The numbers could not be trusted")                                    \

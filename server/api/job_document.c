@@ -49,10 +49,16 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
         bytes_text(bytes, ", \"title\": ");
         bytes_json_string(bytes, show->title);
     }
+    if (show->labels != NULL)
+        write_raw(bytes, "labels", show->labels);
+    if (show->study != NULL)
+        bytes_format(bytes, ", \"study\": \"%s\"", show->study);
     bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
     bytes_real(bytes, show->progress);
     bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
     bytes_json_string(bytes, has_result ? show->result : NULL);
+    if (has_result && show->is_result_deleted)
+        bytes_text(bytes, ", \"result_deleted\": true");
     slots->created = time_slot(bytes, "created");
     write_time(bytes, "created", show->created_unix_ms);
     slots->started = time_slot(bytes, "started");
@@ -79,7 +85,7 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
         bytes_real(bytes, show->total);
     bytes_text(bytes, "}");
     if (parts & JOB_PUT_LINKS)
-        write_links(bytes, show->id, show->result, has_result, slots);
+        write_links(bytes, show->id, show->result, has_result && !show->is_result_deleted, slots);
     else
         bytes_text(bytes, ", \"links\": {}");
     bytes_text(bytes, "}");

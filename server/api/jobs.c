@@ -1,4 +1,4 @@
-// Jobs: submit, look, list, dismiss. Waiting works the same for POST and GET: the job is watched,
+// Jobs: submit, look, dismiss. Waiting works the same for POST and GET: the job is watched,
 // the request put to sleep, and when it is woken or its time is up the same handler goes on where
 // it stood.
 #include <stdio.h>
@@ -13,8 +13,6 @@
 #include "server/http/reply.h"
 
 static const double wait_initial = 2, wait_most = 30; // [s]
-
-enum { LIST_INITIAL = 20, LIST_MOST = 100 };
 
 enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
 
@@ -45,17 +43,21 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
 typedef struct Pause {
     Job *job;
     const Waker *waker;
+    bool is_replayed; // what the reply had said so far
 } Pause;
 
-static Job *pause_end(Pause *pause) {
+// `reply` NULL: there will be none.
+static Job *pause_end(Pause *pause, Reply *reply) {
     Job *job = pause->job;
+    if (reply != NULL)
+        reply->is_replayed = pause->is_replayed;
     job_unwatch(job, pause->waker);
     free(pause);
     return job;
 }
 
 static void pause_forget(void *kept) {
-    job_drop(pause_end(kept));
+    job_drop(pause_end(kept, NULL));
 }
 
 // Puts the request to sleep until the waker that `watch` leaves with the job is called. False where
@@ -65,7 +67,7 @@ static bool sleep_until(const Request *request, Reply *reply, Job *job,
     Pause *pause = malloc(sizeof *pause);
     if (pause == NULL)
         return false;
-    *pause = (Pause){job, request->waker};
+    *pause = (Pause){job, request->waker, reply->is_replayed};
     if (!watch(job, request->waker)) {
         free(pause);
         return false;
@@ -142,7 +144,7 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     } else {
         bool is_dry = false;
         TRY(read_flag(request, "dry_run", &is_dry, problem));
@@ -153,8 +155,11 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
             return problem_set(problem, STATUS_BUSY,
                                "the daemon is stopping and takes no new jobs; try again when it "
                                "is back");
-        const Submission submission = {
-            .text = request->body, .size = request->body_size, .client = request->client};
+        const Submission submission = {.text = request->body,
+                                       .size = request->body_size,
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
         KnownAnswer known;
         if (request->idempotency_key == NULL && intake_known(app->intake, &submission, &known)) {
             reply_borrow(reply, 200, type_json, known.body, known.size);
@@ -163,8 +168,12 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
             return STATUS_OK;
         }
         const uint64_t mark = intake_mark(app->intake);
-        TRY(intake_submit(app->intake, &submission, &job, problem));
-        learn(app, &submission, mark, job);
+        const Status status = intake_submit(app->intake, &submission, &job, problem);
+        if (status == STATUS_BUSY || status == STATUS_QUOTA)
+            reply->retry_after = intake_retry_after(app->intake, request->client, status);
+        TRY(status);
+        if (!reply->is_replayed)
+            learn(app, &submission, mark, job);
     }
 
     const Prefer prefer = header_prefer(request->prefer);
@@ -191,7 +200,7 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     double wait;
     TRY(request_number(request, "wait", 0, wait_most, 0, &wait, problem));
     if (request->kept != NULL)
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     else
         TRY(intake_find(app->intake, request->parameters[0], &job, problem));
     if (pause_begin(request, reply, job, wait))
@@ -203,69 +212,11 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     Job *job = NULL;
     bool is_paused;
     if (request->kept != NULL)
-        job = pause_end(request->kept);
+        job = pause_end(request->kept, reply);
     else
         TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
-}
-
-// A row knows no progress: of an unfinished job the queue is asked.
-static void list_row(App *app, Bytes *bytes, const JobRow *row) {
-    JobShow show = {0};
-    Job *job = NULL;
-    const bool is_unfinished = !job_state_is_final(row->state);
-    if (is_unfinished && intake_find(app->intake, row->id, &job, NULL) == STATUS_OK) {
-        const Status status = job_show(job, &show);
-        job_drop(job);
-        if (status == STATUS_OK)
-            job_put(bytes, &show, JOB_PUT_LINKS);
-        job_show_clear(&show);
-        if (status == STATUS_OK)
-            return;
-    }
-    show = (JobShow){.state = (JobState)row->state,
-                     .progress = row->state == JOB_SUCCESSFUL ? 100 : 0,
-                     .is_cached = row->is_cached,
-                     .created_unix_ms = row->created_unix_ms,
-                     .started_unix_ms = row->started_unix_ms,
-                     .finished_unix_ms = row->finished_unix_ms,
-                     .queued = row->queued,
-                     .run = row->run,
-                     .total = row->total,
-                     .problem = row->problem,
-                     .title = row->title};
-    text_fit(show.id, sizeof show.id, row->id);
-    text_fit(show.result, sizeof show.result, row->result);
-    job_put(bytes, &show, JOB_PUT_LINKS); // borrows the row's texts
-}
-
-Status jobs_list(App *app, const Request *request, Reply *reply, Problem *problem) {
-    double limit;
-    TRY(request_number(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
-    const size_t most = (size_t)limit;
-    store_job_settle(app->store); // whoever was answered finds the job here
-    JobRows rows = {0};
-    // One more than asked for tells whether there is a next page.
-    const Status status =
-        store_job_list(app->store, request_query(request, "before"), most + 1, &rows, problem);
-    if (status != STATUS_OK) {
-        job_rows_clear(&rows);
-        return status;
-    }
-    const size_t count = rows.count < most ? rows.count : most;
-    if (rows.count > most)
-        snprintf(reply->link, sizeof reply->link, "</v1/jobs?limit=%zu&before=%s>; rel=\"next\"",
-                 most, rows.at[count - 1].id);
-    Bytes bytes = {.most = app->reply_most};
-    bytes_text(&bytes, "{\"jobs\": [");
-    for (size_t i = 0; i < count; i++) {
-        bytes_text(&bytes, i > 0 ? ",\n " : "");
-        list_row(app, &bytes, &rows.at[i]);
-    }
-    bytes_text(&bytes, "]}\n");
-    job_rows_clear(&rows);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

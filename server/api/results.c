@@ -276,3 +276,9 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     result_row_clear(&row);
     return answered;
 }
+
+Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
+    TRY(intake_delete(app->intake, request->parameters[0], problem));
+    reply_borrow(reply, 204, NULL, NULL, 0);
+    return STATUS_OK;
+}

@@ -3,7 +3,7 @@
 #include "server/api/app.h"
 
 static const char *const of_submit[] = {"dry_run", NULL};
-static const char *const of_jobs[] = {"limit", "before", NULL};
+static const char *const of_jobs[] = {"limit", "before", "status", "q", "label", "result", "kind", "since", "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_force[] = {"points", NULL};
@@ -13,10 +13,12 @@ static const char *const of_materials[] = {"q", NULL};
 // clang-format off
 const Route routes[] = {
     {"POST",   "/v1/jobs",                              "submit", of_submit,    "Submit a scene; ?dry_run=1 only checks and plans it", jobs_create},
-    {"GET",    "/v1/jobs",                              "read",   of_jobs,      "Jobs, newest first", jobs_list},
+    {"GET",    "/v1/jobs",                              "read",   of_jobs,      "Jobs, newest first; ?q= searches titles and labels", jobs_list},
     {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show},
+    {"GET",    "/v1/jobs/{id}/events",                  "read",   NULL,         "A job's progress as server-sent events", jobs_events},
     {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss},
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
+    {"DELETE", "/v1/results/{id}",                      "submit", NULL,         "Delete a result; its jobs stay", results_delete},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
     {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", results_series},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},

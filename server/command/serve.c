@@ -19,6 +19,7 @@
 #include "server/command/serve.h"
 #include "server/http/dispatch.h"
 #include "server/http/listener.h"
+#include "server/jobs/keeper.h"
 #include "server/options.h"
 
 typedef struct ServeSettings {
@@ -26,7 +27,8 @@ typedef struct ServeSettings {
     Texts host;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
         cache_bytes, store_bytes;
-    double max_cpu_seconds;
+    uint64_t quota, keep_jobs, keep_bytes;
+    double max_cpu_seconds, rate, keep_days;
     int journal;
     bool require_tokens, print_config;
 } ServeSettings;
@@ -42,6 +44,8 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "simulations at once; 0 takes the number of processors"),
     FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "unfinished jobs at most; more are answered 503"),
     FIELD_COUNT(ServeSettings, queue_bytes, "B", WITHIN(1024, 1099511627776.0), 256 * MIB, "of unfinished jobs' scenes at most; more are answered 503"),
+    FIELD_COUNT(ServeSettings, quota, NULL, WITHIN(0, 1e6), 0, "unfinished jobs of one token at most, more are answered 429; 0: as many as the queue takes"),
+    FIELD_REAL(ServeSettings, rate, "1/min", WITHIN(0, 1e9), 0, "jobs one token may send, more are answered 429; 0: any number"),
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
@@ -49,6 +53,9 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
+    FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
+    FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
+    FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs go; 0: any"),
     FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another name that requests may call this machine by; may be repeated, or a list with commas"),
     FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "how clients reach it behind a proxy, as https://sim.example.org/impactd; every link begins with it"),
     FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
@@ -98,6 +105,16 @@ static Status check(const ServeSettings *settings, Problem *problem) {
     if (settings->queue < settings->workers)
         status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
                         "a worker without a job is of no use");
+    if (settings->quota > settings->queue)
+        status = problem_add(problem, STATUS_USAGE, "--quota",
+                          "is %llu, more than the %llu jobs of --queue: no token could ever have "
+                          "so many; lower --quota or raise --queue",
+                          (unsigned long long)settings->quota, (unsigned long long)settings->queue);
+    if (settings->keep_bytes > 0 && settings->keep_bytes < MIB)
+        status = problem_add(problem, STATUS_USAGE, "--keep-bytes",
+                          "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
+                          "for no limit",
+                          (unsigned long long)settings->keep_bytes, MIB);
     return status;
 }
 
@@ -108,6 +125,11 @@ static void greet(const Listener *listener, const ServeSettings *settings, const
            (unsigned long long)settings->workers);
     printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
     fflush(stdout);
+}
+
+static void forget_answers(void *hot) {
+    if (hot != NULL)
+        hot_clear(hot);
 }
 
 // Waits for a signal to end, and tells systemd meanwhile that we live.
@@ -159,15 +181,20 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  .queue_bytes = settings->queue_bytes,
                                  .cache_bytes = settings->cache_bytes,
                                  .store_bytes = settings->store_bytes,
+                                 .quota = settings->quota,
+                                 .rate = settings->rate,
+                                 .deleted = {dispatcher.hot, forget_answers},
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
                                             .bytes = (double)settings->max_run_bytes}};
+    const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
     const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,
                                  settings->tls_key, settings->require_tokens};
     Reach ready = {0};
     Meter *meter = NULL;
     Listener *listener = NULL;
+    Keeper *keeper = NULL;
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
@@ -186,6 +213,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (status == STATUS_OK)
         status = intake_open(app.store, &work, &app.intake, problem);
     if (status == STATUS_OK)
+        status = keeper_start(app.store, app.intake, &keep, &keeper, problem);
+    if (status == STATUS_OK)
         status = asides_open(ASIDES, &app.asides, problem);
     if (status == STATUS_OK) {
         link_base_set(ready.url.path);
@@ -201,6 +230,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (status == STATUS_OK)
         run_until_stopped(&app, listener, settings, stops);
     listener_stop(listener, GRACE_MS);
+    keeper_stop(keeper);
     asides_close(app.asides);
     if (app.intake != NULL)
         intake_close(app.intake);
@@ -228,6 +258,7 @@ static int run(int argc, char *const *argv) {
     sigaddset(&stops, SIGINT);
     pthread_sigmask(SIG_BLOCK, &stops, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 
     int code;
     Status status = fields_default(serve_fields, &settings);

@@ -59,13 +59,13 @@ static Status set_parameters(Request *request, const RouteSpan *spans, size_t co
 }
 
 // A finished answer as this client takes it; what never changes is kept for the next one.
-static Status finish(const Dispatcher *dispatcher, const Route *route, const Request *request,
-                     Reply *reply, Problem *problem) {
+static Status finish(const Dispatcher *dispatcher, const Route *route, uint64_t age,
+                     const Request *request, Reply *reply, Problem *problem) {
     const bool is_packed = reply_pack(reply, request);
     const bool is_kept = dispatcher->hot != NULL && reply->is_immutable && reply->code == 200 &&
                          reply->stream.next == NULL && !reply->varies_by_accept;
     if (is_kept)
-        hot_put(dispatcher->hot, request->target, is_packed, route, reply);
+        hot_put(dispatcher->hot, age, request->target, is_packed, route, reply);
     return reply_range(reply, request, problem);
 }
 
@@ -76,12 +76,13 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
     TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
+    const uint64_t age = dispatcher->hot != NULL ? hot_age(dispatcher->hot) : 0;
     TRY(handle(dispatcher->app, request, reply, problem));
     if (reply->wait_ms > 0 || reply->code == 0)
         return STATUS_OK;
     link_apply(reply->location, sizeof reply->location);
     link_apply(reply->link, sizeof reply->link);
-    return finish(dispatcher, route, request, reply, problem);
+    return finish(dispatcher, route, age, request, reply, problem);
 }
 
 static Status refuse(const Dispatcher *dispatcher, const Request *request, const char *allow,

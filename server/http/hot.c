@@ -29,6 +29,7 @@ struct Hot {
     Entry *newest, *oldest;
     size_t most_bytes;
     HotTally tally;
+    uint64_t age;
 };
 
 Hot *hot_new(size_t most_bytes) {
@@ -86,9 +87,17 @@ static void evict(Hot *hot, Entry *entry) {
 
 void hot_clear(Hot *hot) {
     pthread_mutex_lock(&hot->lock);
+    hot->age++;
     while (hot->oldest != NULL)
         evict(hot, hot->oldest);
     pthread_mutex_unlock(&hot->lock);
+}
+
+uint64_t hot_age(Hot *hot) {
+    pthread_mutex_lock(&hot->lock);
+    const uint64_t age = hot->age;
+    pthread_mutex_unlock(&hot->lock);
+    return age;
 }
 
 void hot_free(Hot *hot) {
@@ -107,7 +116,7 @@ static void lend(Entry *entry, Reply *reply) {
     reply->shared = entry;
 }
 
-void hot_put(Hot *hot, const char *target, bool is_packed, const struct Route *route,
+void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed, const struct Route *route,
              Reply *reply) {
     const size_t bytes = sizeof(Entry) + strlen(target) + 1 + reply->body_size;
     if (bytes > hot->most_bytes / SHARE)
@@ -124,6 +133,11 @@ void hot_put(Hot *hot, const char *target, bool is_packed, const struct Route *r
     atomic_init(&entry->holds, 1);
     lend(entry, reply);
     pthread_mutex_lock(&hot->lock);
+    if (age != hot->age) {
+        pthread_mutex_unlock(&hot->lock);
+        entry_drop(entry); // the reply has it alone
+        return;
+    }
     Entry **at = place(hot, entry->hash, target, is_packed);
     if (*at != NULL)
         evict(hot, *at);

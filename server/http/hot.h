@@ -11,10 +11,15 @@ typedef struct Hot Hot;
 Hot *hot_new(size_t most_bytes); // NULL without memory
 void hot_free(Hot *hot);         // NULL is fine; answers still held live on
 
+// Grows with each hot_clear.
+uint64_t hot_age(Hot *hot);
+
 // Keeps a finished 200 of a body that is whole in memory: what `reply` owns moves into the cache,
 // and `reply` becomes a borrower of it. One that is too large for the budget stays as it is.
 // `target` is as sent, `is_packed` says that the body is gzip, `route` whose it is.
-void hot_put(Hot *hot, const char *target, bool is_packed, const struct Route *route, Reply *reply);
+// Nothing is kept that was begun at another `age`: it may have been deleted since.
+void hot_put(Hot *hot, uint64_t age, const char *target, bool is_packed,
+             const struct Route *route, Reply *reply);
 
 // Fills `reply`, a borrower, and *route. False if it is not there.
 bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,

@@ -100,11 +100,12 @@ typedef struct Reply {
     char location[192]; // "" for none; of our own pages without the base path, dispatch puts it
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[320];           // likewise
+    char link[1024];          // likewise
     const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];
     char allow[64];
     char content_range[80];
+    bool is_replayed;             // an earlier request's answer, under the same Idempotency-Key
     int retry_after;              // seconds, -1 for none
     const char *content_encoding; // "gzip", or NULL
     const void *shared; // not NULL: a whole answer out of the cache, the same for all who get it

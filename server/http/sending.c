@@ -78,6 +78,7 @@ static void add_headers(struct MHD_Response *response, const Reply *reply, bool 
     add_header(response, MHD_HTTP_HEADER_CACHE_CONTROL,
                reply->cache_control[0] != '\0' ? reply->cache_control : "no-store");
     add_header(response, MHD_HTTP_HEADER_LINK, reply->link);
+    add_header(response, "Idempotency-Replayed", reply->is_replayed ? "true" : NULL);
     add_header(response, "Preference-Applied", reply->preference_applied);
     add_header(response, MHD_HTTP_HEADER_ALLOW, reply->allow);
     add_header(response, MHD_HTTP_HEADER_CONTENT_RANGE, reply->content_range);

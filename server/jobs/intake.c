@@ -2,6 +2,7 @@
 // dismissing.
 #include "server/jobs/intake.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,19 +35,27 @@ void computation_free(Computation *computation) {
     free(computation);
 }
 
-void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent) {
+Computation *computation_of(QueueEntry *entry) {
+    return (Computation *)(void *)((char *)entry - offsetof(Computation, queued));
+}
+
+void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
+    Cost cost = {0};
     index_add(intake->in_flight, &computation->indexed);
-    if (is_urgent) {
-        computation->next = intake->first;
-        intake->first = computation;
-        if (intake->last == NULL)
-            intake->last = computation;
-    } else {
-        *(intake->last != NULL ? &intake->last->next : &intake->first) = computation;
-        intake->last = computation;
-    }
-    intake->queued++;
+    // A series that is computed again needs no study.
+    if (computation->is_again)
+        cost = simulation_cost(&computation->inquiry.simulation);
+    else if (inquiry_cost(&computation->inquiry, &intake->settings.limits, &cost, NULL) !=
+             STATUS_OK)
+        cost.cpu_seconds = queue_quick; // the run will tell
+    computation->queued.seconds = cost.cpu_seconds;
+    if (client == NULL)
+        queue_urge(intake->queue, &computation->queued);
+    else
+        queue_put(intake->queue, &computation->queued, client, 1e-9 * (double)clock_monotonic_ns());
     pthread_cond_signal(&intake->work);
+    if (intake->slow_running >= intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
 }
 
 void intake_release(Job *job) {
@@ -54,6 +63,7 @@ void intake_release(Job *job) {
         return;
     job->is_counted = false;
     job->intake->live--;
+    job->client->live--;
     job->intake->scene_bytes -= job->scene_size;
 }
 
@@ -93,21 +103,11 @@ void intake_drop(Intake *intake) {
     if (intake == NULL || atomic_fetch_sub(&intake->holds, 1) != 1)
         return;
     pthread_cond_destroy(&intake->work);
+    pthread_cond_destroy(&intake->spare_work);
+    pthread_cond_destroy(&intake->keys_free);
     pthread_cond_destroy(&intake->settled);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
-}
-
-static void dequeue(Intake *intake, Computation *computation) {
-    Computation *before = NULL;
-    for (Computation *at = intake->first; at != NULL; before = at, at = at->next)
-        if (at == computation) {
-            *(before != NULL ? &before->next : &intake->first) = at->next;
-            if (intake->last == at)
-                intake->last = before;
-            intake->queued--;
-            return;
-        }
 }
 
 void intake_detach(Job *job) {
@@ -129,7 +129,7 @@ void intake_detach(Job *job) {
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
     } else {
-        dequeue(job->intake, computation);
+        queue_remove(job->intake->queue, &computation->queued);
         computation_free(computation);
     }
 }
@@ -151,6 +151,7 @@ void intake_admit(Intake *intake, Job *job) {
     job->is_live = true;
     job->is_counted = true;
     intake->live++;
+    job->client->live++;
     intake->scene_bytes += job->scene_size;
 }
 
@@ -176,25 +177,30 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
     pthread_cond_init(&intake->work, NULL);
+    pthread_cond_init(&intake->spare_work, NULL);
+    pthread_cond_init(&intake->keys_free, NULL);
+    intake->pace = 1;
+    intake->queue = queue_new();
     pthread_cond_init(&intake->settled, NULL);
     intake->jobs = index_new();
     intake->in_flight = index_new();
     intake->cache = cache_new(settings->cache_bytes);
     intake->known = known_new(settings->known_bytes > 0 ? settings->known_bytes
                                                         : settings->cache_bytes / KNOWN_SHARE);
-    intake->workers = calloc(settings->workers, sizeof *intake->workers);
+    intake->workers = calloc(settings->workers + 1, sizeof *intake->workers);
     Status status = STATUS_OK;
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
-        intake->known == NULL || intake->workers == NULL)
+        intake->known == NULL || intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
-    while (status == STATUS_OK && intake->worker_count < settings->workers) {
+    while (status == STATUS_OK && intake->worker_count < settings->workers + 1) {
         Worker *worker = &intake->workers[intake->worker_count];
         worker->intake = intake;
+        worker->is_spare = intake->worker_count == settings->workers;
         if (pthread_create(&worker->thread, NULL, worker_main, worker) != 0)
             status = problem_set(problem, STATUS_INTERNAL, "worker %zu of %zu could not be started",
-                                 intake->worker_count + 1, settings->workers);
+                                 intake->worker_count + 1, settings->workers + 1);
         else
             intake->worker_count++;
     }
@@ -228,6 +234,7 @@ void intake_close(Intake *intake) {
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
+    pthread_cond_broadcast(&intake->spare_work);
     pthread_mutex_unlock(&intake->lock);
     for (size_t i = 0; i < intake->worker_count; i++)
         pthread_join(intake->workers[i].thread, NULL);
@@ -236,15 +243,22 @@ void intake_close(Intake *intake) {
         pthread_cond_wait(&intake->settled, &intake->lock);
     pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
-    while (intake->first != NULL) {
-        Computation *computation = intake->first;
-        dequeue(intake, computation);
-        let_go(computation);
+    for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
+        let_go(computation_of(entry));
+    intake_abandon_delayed(intake);
+    for (Job *job; (job = intake->undismissed) != NULL;) {
+        intake->undismissed = job->next_undismissed;
+        job_drop(job);
+    }
+    for (Job *job; (job = intake->keyed) != NULL;) {
+        intake->keyed = job->next_keyed;
+        job_drop(job);
     }
     // Those whose end could not be stored are still here.
     for (Job *job; (job = index_any(intake->jobs)) != NULL;)
         intake_retire(job);
     cache_free(intake->cache);
+    queue_free(intake->queue);
     known_free(intake->known);
     index_free(intake->jobs);
     index_free(intake->in_flight);
@@ -297,21 +311,40 @@ static void dismissed(void *context, Status status, const char *detail) {
     job->refusal = status;
     text_fit(job->refused, sizeof job->refused, detail);
     // Until the store has it, the job is found here.
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
         intake_retire(job);
+    } else if (!intake->is_closing) {
+        job->next_undismissed = intake->undismissed;
+        intake->undismissed = job_hold(job);
+    }
     wakers_call(&job->keepers);
     intake_settle(intake);
     pthread_mutex_unlock(&intake->lock);
     job_drop(job); // the post's hold
 }
 
+void intake_retry_dismissed(Intake *intake) {
+    Job *job = intake->undismissed, *next;
+    intake->undismissed = NULL;
+    for (; job != NULL; job = next) {
+        next = job->next_undismissed;
+        const StoreDone done = {dismissed, job}; // takes the list's hold
+        if (store_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
+            intake->posted++;
+        } else {
+            job->next_undismissed = intake->undismissed;
+            intake->undismissed = job;
+        }
+    }
+}
+
 // Live jobs only: dismissed for all at once, and on its way to the store.
-static Status dismiss(Intake *intake, Job *job, Problem *problem) {
+static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem) {
     pthread_mutex_lock(&intake->lock);
     if (job->is_closing || job_state_is_final(job->row.state)) {
         const int state = job->is_closing ? job->closing.state : job->row.state;
         pthread_mutex_unlock(&intake->lock);
-        return refuse_finished(job->row.id, state, problem);
+        return refuse_finished(id, state, problem);
     }
     job->row.state = JOB_DISMISSED;
     if (job->started_ns > 0)
@@ -346,7 +379,7 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
     Job *job = find_live(intake, id);
     Status status;
     if (job != NULL) {
-        status = dismiss(intake, job, problem);
+        status = dismiss(intake, job, id, problem);
     } else {
         TRY(intake_find(intake, id, &job, problem));
         status = refuse_finished(id, job->row.state, problem);
@@ -360,6 +393,9 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
 }
 
 bool intake_known(Intake *intake, const Submission *submission, KnownAnswer *answer) {
+    // Whoever's jobs are counted has them counted at the door.
+    if (submission->client != NULL && intake->settings.rate > 0)
+        return false;
     if (!known_answer(intake->known, intake->store, submission, intake_mark(intake), answer))
         return false;
     totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
@@ -375,7 +411,9 @@ void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, J
                   const char *text, size_t size, const JobSlots *slots) {
     pthread_mutex_lock(&intake->lock);
     JobRow row = job->row;
-    row.scene = NULL; // its result has it
+    row.scene = NULL;                                      // its result has it
+    row.client = row.idempotency_key = row.request = NULL; // are another request's
+    row.has_result = true;
     // What it was made under may be no more: it would be dropped when it is found.
     if (mark == intake_mark(intake))
         known_put(intake->known, submission, mark, &row, text, size, slots);
@@ -388,6 +426,20 @@ void intake_forget(Intake *intake, const char *result) {
     pthread_mutex_lock(&intake->lock);
     cache_forget(intake->cache, result);
     pthread_mutex_unlock(&intake->lock);
+    if (intake->settings.deleted.wake != NULL)
+        intake->settings.deleted.wake(intake->settings.deleted.context);
+}
+
+Status intake_delete(Intake *intake, const char *result, Problem *problem) {
+    pthread_mutex_lock(&intake->lock);
+    const bool is_wanted = index_find(intake->in_flight, result) != NULL;
+    pthread_mutex_unlock(&intake->lock);
+    if (is_wanted)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the result is being computed; dismiss its job first, or wait");
+    TRY(store_result_delete(intake->store, result, problem));
+    intake_forget(intake, result);
+    return STATUS_OK;
 }
 
 void intake_layers(Intake *intake, const char *result, IntakeLayers *layers) {
@@ -405,7 +457,7 @@ const Totals *intake_totals(const Intake *intake) {
 
 void intake_tally(Intake *intake, IntakeTally *tally) {
     pthread_mutex_lock(&intake->lock);
-    *tally = (IntakeTally){.queued = intake->queued,
+    *tally = (IntakeTally){.queued = queue_count(intake->queue),
                            .workers = intake->settings.workers,
                            .queue_most = intake->settings.queue_most,
                            .saving = intake->saving,
@@ -415,7 +467,7 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     tally->cached_outcomes = tally->series.count;
     tally->cached_bytes = tally->series.bytes;
     known_tally(intake->known, &tally->known);
-    for (size_t i = 0; i < intake->settings.workers; i++)
+    for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL;
     pthread_mutex_unlock(&intake->lock);
     tally->stored.most_bytes = intake->settings.store_bytes;

@@ -15,6 +15,9 @@ typedef struct IntakeSettings {
     size_t queue_most;  // unfinished jobs at most
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
     size_t cache_bytes; // of finished outcomes in memory
+    size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
+    double rate;        // jobs a minute of one client by name; 0: any number
+    Waker deleted;      // called after results were deleted; `wake` may be NULL
     size_t known_bytes; // of ready answers in memory; 0: an eighth of cache_bytes
     size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     SimulationLimits limits;
@@ -38,14 +41,21 @@ void intake_close(Intake *intake);
 typedef struct Submission {
     const char *text; // the scene's JSON, perhaps with a study
     size_t size;
-    const char *client; // its token's name; NULL: nobody in particular
+    const char *client;          // its token's name; NULL: nobody in particular
+    const char *idempotency_key; // as it came, perhaps in quotes; NULL: none
+    bool *is_replayed;           // set where the job is an earlier request's; NULL: not told
 } Submission;
 
 // Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told
 // of it until it is kept (job_kept). Known results finish it at once (cached), a scene in flight
-// shares that computation. STATUS_BUSY when the queue is full, STATUS_INVALID with the faults. The
-// Job is a hold of the caller's.
+// shares that computation, and a key that its client used before for the same body answers with
+// that job (STATUS_REUSED for another body). STATUS_BUSY when the queue is full, STATUS_QUOTA,
+// STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
+
+// Seconds from 1 to 3600 after which a submission of `client` that was refused as `status` is worth
+// another try, as far as can be told.
+int intake_retry_after(Intake *intake, const char *client, Status status);
 
 // What differs from job to job in the text of a known answer: offsets, each the place of so many
 // bytes. The job's id stands at `id` and `self` (JOB_ID_LENGTH).
@@ -73,8 +83,6 @@ uint64_t intake_mark(Intake *intake);
 // document as it shall stand there, with anything in its slots.
 void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, Job *job,
                   const char *text, size_t size, const JobSlots *slots);
-// A result was deleted: nothing is answered from it any more.
-void intake_forget(Intake *intake, const char *result);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
@@ -101,6 +109,15 @@ Status intake_dismiss(Intake *intake, const char *id, Job **job, Problem *proble
 // asking again. STATUS_NOT_FOUND, STATUS_GONE for another engine version.
 Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Outcome **outcome,
                       Problem *problem);
+
+// Tries again to store what could not be stored for want of room; to be called now and then.
+void intake_retry(Intake *intake);
+
+// Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
+// STATUS_NOT_FOUND.
+Status intake_delete(Intake *intake, const char *result, Problem *problem);
+// A result was deleted: nothing is answered from it any more.
+void intake_forget(Intake *intake, const char *result);
 
 // One layer of what is known.
 typedef struct LayerTally {

@@ -11,6 +11,7 @@
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/known.h"
+#include "server/jobs/queue.h"
 #include "server/jobs/totals.h"
 
 enum { OUTCOME_FAILURES = 64 };
@@ -25,9 +26,10 @@ typedef struct Computation {
     IndexEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
     Inquiry inquiry;
-    char *scene, *warnings;   // documents
-    struct Computation *next; // in the queue
+    char *scene, *warnings; // documents
+    QueueEntry queued;
     bool is_running;
+    int64_t began_ns;
     bool is_again; // only its series is wanted: the result is saved already
     Job *jobs;     // those who wait for it, by next_shared
     Wakers askers; // readers of the outcome
@@ -53,6 +55,9 @@ struct Job {
     bool is_counted;          // takes a place in the queue
     Head *head;               // of the result
     Computation *computation; // NULL: not yet or no more
+    Client *client;           // NULL while it was not admitted
+    Job *next_keyed;          // in intake->keyed
+    Job *next_undismissed;    // in intake->undismissed
     Job *next_shared;
     int64_t submitted_ns, started_ns;
     Wakers wakers, keepers; // for when it is finished; for when it is kept
@@ -68,6 +73,7 @@ typedef struct Worker {
     Intake *intake;
     pthread_t thread;
     Computation *running; // or NULL
+    bool is_spare;        // beyond the number asked for: takes quick work while all others are slow
     Workspace workspace;  // of its thread alone
 } Worker;
 
@@ -77,18 +83,26 @@ struct Intake {
     Store *store;
     IntakeSettings settings;
     pthread_mutex_t lock;
-    pthread_cond_t work;    // for a worker, or room for what it makes
-    pthread_cond_t settled; // nothing is posted any more
-    Worker *workers;        // settings.workers of them
-    size_t worker_count;    // started
+    pthread_cond_t work;       // for a worker, or room for what it makes
+    pthread_cond_t spare_work; // for the spare worker alone
+    pthread_cond_t settled;    // nothing is posted any more
+    pthread_cond_t keys_free;  // a KeyHold was given up
+    struct KeyHold *keys;
+    Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
+    Worker *workers;     // settings.workers of them, and the spare one
+    size_t worker_count; // started
+    size_t slow_running;
+    double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;      // not yet finished
-    Index *in_flight; // computations
-    Computation *first, *last;
-    size_t queued, live;         // computations in the queue; jobs not yet finished
-    size_t scene_bytes;          // of all live jobs
+    Index *jobs;                 // not yet finished
+    Index *in_flight;            // computations
+    Queue *queue;                // of computations
+    size_t live;                 // jobs not yet finished
+    size_t scene_bytes;          // of them all
     size_t posted;               // writes that the store has yet to answer
     size_t saving, saving_bytes; // computations that have run and are not yet saved
+    struct Saving *delayed;      // of these, what waits for room in the store
+    Job *undismissed;            // held: dismissed, but the store could not be told
     Cache *cache;
     Known *known;
     LayerTally rows, stored;            // results and series found in the database
@@ -110,11 +124,18 @@ void computation_free(Computation *computation);
 
 void intake_drop(Intake *intake); // frees what is left with the last hold
 
+// With the lock held: what intake_retry does for jobs that were dismissed.
+void intake_retry_dismissed(Intake *intake);
+// Nobody else is there any more: what waits for room stays unfinished in the store.
+void intake_abandon_delayed(Intake *intake);
+
 // With the lock held.
 // Gives back its place in the queue; it can still be found.
 void intake_release(Job *job);
 void intake_retire(Job *job); // it is live no more; drops the index's hold
-void intake_enqueue(Intake *intake, Computation *computation, bool is_urgent);
+// `client` NULL: ahead of all.
+void intake_enqueue(Intake *intake, Computation *computation, Client *client);
+Computation *computation_of(QueueEntry *entry);
 void intake_admit(Intake *intake, Job *job); // it is live, held by the index
 void intake_attach(Job *job, Computation *computation);
 void intake_detach(Job *job); // from its computation, which stops when nobody is left

@@ -105,6 +105,7 @@ Status job_show(Job *job, JobShow *show) {
     if (row->state == JOB_SUCCESSFUL) {
         text_fit(show->result, sizeof show->result, row->result);
         show->progress = 100;
+        show->is_result_deleted = job->intake == NULL && !row->has_result;
     } else if (job->computation != NULL) {
         show->progress = atomic_load(&job->computation->progress) / 100.0;
     }
@@ -115,7 +116,8 @@ Status job_show(Job *job, JobShow *show) {
         show->run = job->started_ns > 0 ? 1e-9 * (double)(now - job->started_ns) : 0;
     }
     const bool is_whole = copy(&show->problem, row->problem) &&
-                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title);
+                          copy(&show->warnings, row->warnings) && copy(&show->title, row->title) &&
+                          copy(&show->labels, row->labels) && copy(&show->study, row->study);
     show->head = head_hold(job->head);
     unlock(job);
     if (show->head != NULL) {
@@ -131,8 +133,20 @@ void job_show_clear(JobShow *show) {
     free(show->problem);
     free(show->warnings);
     free(show->title);
+    free(show->labels);
+    free(show->study);
     head_drop(show->head);
     *show = (JobShow){0};
+}
+
+JobState job_glance(Job *job, double *progress) {
+    lock(job);
+    const JobState state = (JobState)job->row.state;
+    *progress = state == JOB_SUCCESSFUL    ? 100
+                : job->computation == NULL ? 0
+                                           : atomic_load(&job->computation->progress) / 100.0;
+    unlock(job);
+    return state;
 }
 
 Status job_kept(Job *job, bool *is_kept, Problem *problem) {

@@ -42,6 +42,9 @@ typedef struct JobShow {
     const char *notes;   // JSON array, of the run; NULL: none
     char *title;         // NULL if none
     struct Head *head;   // holds plan, summary, work and notes; NULL: they are the maker's
+    char *labels;        // JSON array; NULL: none
+    char *study;         // the kind of its study; NULL: none
+    bool is_result_deleted;
 } JobShow;
 
 Job *job_hold(Job *job);
@@ -49,6 +52,8 @@ void job_drop(Job *job);
 bool job_is_finished(Job *job);
 Status job_show(Job *job, JobShow *show);
 void job_show_clear(JobShow *show);
+// Its state and, in *progress, percent: what may be looked at often.
+JobState job_glance(Job *job, double *progress);
 
 // Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
 // told of it before. STATUS_OK with *is_kept false while that is under way; otherwise why it could

@@ -116,7 +116,8 @@ static Entry *entry_new(const char *key, const JobRow *row, const char *text, si
     memcpy(entry->text, text, size);
     entry->size = size;
     entry->bytes = sizeof *entry + size + text_bytes(entry->row.title) +
-                   text_bytes(entry->row.warnings) + text_bytes(entry->row.scene);
+                   text_bytes(entry->row.warnings) + text_bytes(entry->row.scene) +
+                   text_bytes(entry->row.labels) + text_bytes(entry->row.words);
     return entry;
 }
 
@@ -180,6 +181,7 @@ bool known_answer(Known *known, Store *store, const Submission *submission, uint
     if (text != NULL) {
         const JobSlots *slots = &entry->slots;
         JobRow row = entry->row;
+        row.client = (char *)submission->client; // borrowed
         char time[32], took[JOB_SLOT_TOTAL + 1];
         memcpy(text, entry->text, entry->size);
         text[entry->size] = '\0';

@@ -122,7 +122,7 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
         Computation *other = index_find(intake->in_flight, result);
         const bool is_asked = wakers_add(&(other != NULL ? other : computation)->askers, waker);
         if (other == NULL && is_asked && !intake->is_closing) {
-            intake_enqueue(intake, computation, true);
+            intake_enqueue(intake, computation, NULL);
             computation = NULL;
         }
         if (!is_asked || intake->is_closing)

@@ -25,8 +25,10 @@ typedef struct Saving {
     Findings findings;
     Head *head; // of a successful one
     size_t bytes;
-    bool is_saved; // the result is in the store
-    Job **jobs;    // held: those whose rows are on the way
+    bool is_saved;       // the result is in the store
+    bool is_told;        // that it could not be saved
+    struct Saving *next; // of those that wait for room
+    Job **jobs;          // held: those whose rows are on the way
     const JobRow **rows;
     size_t count, room;
 } Saving;
@@ -122,8 +124,10 @@ static void end(Saving *saving) {
     const bool was_behind = intake_is_behind(intake);
     intake->saving--;
     intake->saving_bytes -= saving->bytes;
-    if (was_behind)
+    if (was_behind) {
         pthread_cond_broadcast(&intake->work);
+        pthread_cond_broadcast(&intake->spare_work);
+    }
 }
 
 static void saving_free(Saving *saving) {
@@ -135,16 +139,26 @@ static void saving_free(Saving *saving) {
     free(saving);
 }
 
+// A full disk and the like pass; then the jobs are worth another try.
+static bool is_passing(Status status) {
+    return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
+           status == STATUS_NO_MEMORY;
+}
+
 // With the lock held: the jobs are what the store says they are. If it could not be told of their
-// end, they are failed here and unfinished there: the next start computes them again. If it never
-// had them, they never were.
-static void publish(Saving *saving, Status status, const char *detail) {
+// end, they go on running where `may_wait`; otherwise they are failed here and unfinished there:
+// the next start computes them again. If it never had them, they never were.
+static void publish(Saving *saving, Status status, const char *detail, bool may_wait) {
     for (size_t i = 0; i < saving->count; i++) {
         Job *job = saving->jobs[i];
         if (status != STATUS_OK && !job->is_kept) {
             free(job->closing.problem);
             job->closing.problem = NULL;
             intake_refuse(job, status, detail);
+        } else if (status != STATUS_OK && may_wait) {
+            free(job->closing.problem);
+            job->closing.problem = NULL;
+            job->is_closing = false;
         } else {
             job->row = job->closing;
             job->row.is_unsaved = false;
@@ -166,11 +180,6 @@ static void publish(Saving *saving, Status status, const char *detail) {
         job_drop(job); // close_jobs's hold
     }
     saving->count = 0;
-}
-
-// A full disk and the like pass; then the jobs are worth another try.
-static bool is_passing(Status status) {
-    return status == STATUS_IO || status == STATUS_BUSY || status == STATUS_NO_MEMORY;
 }
 
 // A result that can never be saved, because it is too large, makes its jobs failed ones.
@@ -209,26 +218,40 @@ static bool go_on(Saving *saving) {
         const Status status = post(saving);
         if (status == STATUS_OK)
             return true;
-        publish(saving, status, "no memory to save the job");
+        publish(saving, status, "no memory to save the job", false);
     }
+}
+
+// With the lock held: whether it is tried again when there may be room.
+static bool wait_for_room(Saving *saving) {
+    Intake *intake = saving->intake;
+    if (saving->computation->jobs == NULL || intake->is_closing)
+        return false;
+    saving->next = intake->delayed;
+    intake->delayed = saving;
+    return true;
 }
 
 // The store has answered; its writer's thread.
 static void saved(void *context, Status status, const char *detail) {
     Saving *saving = context;
     Intake *intake = saving->intake;
-    if (status != STATUS_OK)
+    if (status != STATUS_OK && !saving->is_told)
         fprintf(stderr, "impactd: the result %s could not be saved: %s\n",
                 saving->computation->result, detail);
+    saving->is_told = status != STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     bool goes_on;
     if (status != STATUS_OK && !is_passing(status) && saving->findings.status == STATUS_OK) {
         give_up(saving, status, detail);
         goes_on = post(saving) == STATUS_OK;
         if (!goes_on) {
-            publish(saving, STATUS_NO_MEMORY, "no memory to save the job");
+            publish(saving, STATUS_NO_MEMORY, "no memory to save the job", false);
             goes_on = go_on(saving);
         }
+    } else if (is_passing(status)) {
+        publish(saving, status, detail, !intake->is_closing);
+        goes_on = wait_for_room(saving) || go_on(saving);
     } else {
         // What is in the cache is known, so it must be in the store.
         if (status == STATUS_OK && saving->findings.status == STATUS_OK) {
@@ -236,7 +259,7 @@ static void saved(void *context, Status status, const char *detail) {
             cache_put(intake->cache, saving->computation->result, saving->findings.outcome,
                       saving->head);
         }
-        publish(saving, status, detail);
+        publish(saving, status, detail, false);
         goes_on = go_on(saving);
     }
     if (!goes_on)
@@ -245,6 +268,40 @@ static void saved(void *context, Status status, const char *detail) {
     pthread_mutex_unlock(&intake->lock);
     if (!goes_on)
         saving_free(saving);
+}
+
+void intake_retry(Intake *intake) {
+    Saving *ended = NULL, *next;
+    pthread_mutex_lock(&intake->lock);
+    Saving *saving = intake->delayed;
+    intake->delayed = NULL;
+    for (; saving != NULL; saving = next) {
+        next = saving->next;
+        if (go_on(saving))
+            continue;
+        end(saving);
+        saving->next = ended;
+        ended = saving;
+    }
+    intake_retry_dismissed(intake);
+    pthread_mutex_unlock(&intake->lock);
+    for (; ended != NULL; ended = next) {
+        next = ended->next;
+        saving_free(ended);
+    }
+}
+
+void intake_abandon_delayed(Intake *intake) {
+    while (intake->delayed != NULL) {
+        Saving *saving = intake->delayed;
+        intake->delayed = saving->next;
+        for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared) {
+            intake_retire(job);
+            wakers_call(&job->wakers);
+        }
+        end(saving);
+        saving_free(saving);
+    }
 }
 
 static size_t text_bytes(const char *text) {
@@ -275,7 +332,7 @@ static void lose(Intake *intake, Computation *computation, Findings *findings) {
         close_jobs(&saving);
         if (saving.count == 0)
             break;
-        publish(&saving, STATUS_NO_MEMORY, "no memory to save the job");
+        publish(&saving, STATUS_NO_MEMORY, "no memory to save the job", false);
     }
     end(&saving);
 }
@@ -299,8 +356,10 @@ void intake_save(Intake *intake, Computation *computation, Findings *findings) {
     pthread_mutex_lock(&intake->lock);
     intake->saving++;
     intake->saving_bytes += saving->bytes;
-    // Only the series was wanted: the result is saved already.
-    if (saving->findings.outcome != NULL && computation->is_again)
+    // Only the series was wanted: the result is saved already. But it may have been deleted
+    // meanwhile, and what is in the cache counts as known.
+    if (saving->findings.outcome != NULL && computation->is_again &&
+        store_result_exists(intake->store, computation->result))
         cache_put(intake->cache, computation->result, saving->findings.outcome, NULL);
     const bool goes_on = go_on(saving);
     if (!goes_on)

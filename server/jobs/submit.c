@@ -11,6 +11,9 @@
 #include "server/jobs/documents.h"
 #include "server/jobs/intake_state.h"
 #include "server/jobs/job_id.h"
+#include "server/jobs/keyed.h"
+#include "server/jobs/quota.h"
+#include "server/store/job_search.h"
 
 // With the lock held: one of this scene that is under way, to be shared. One for readers alone
 // saves nothing.
@@ -87,8 +90,10 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    // That a known answer was given once more need not wait for the disk.
-    if (store_job_late(intake->store, row)) {
+    // That a known answer was given once more need not wait for the disk; but a key is promised to
+    // be remembered.
+    row->has_result = true;
+    if (row->idempotency_key == NULL && store_job_late(intake->store, row)) {
         job->is_kept = true;
         totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
         return STATUS_OK;
@@ -113,7 +118,7 @@ static Status find_room(const Intake *intake, const Job *job, Problem *problem) 
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: %zu bytes of scenes wait, %zu are allowed",
                            intake->scene_bytes, intake->settings.queue_bytes);
-    return STATUS_OK;
+    return quota_admit(intake, job->client, problem);
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
@@ -151,7 +156,9 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem
     if (status == STATUS_OK) {
         intake_admit(intake, job);
         if (other == NULL)
-            intake_enqueue(intake, computation, false);
+            intake_enqueue(intake, computation, job->client);
+        else
+            queue_share(intake->queue, &other->queued, job->client);
         intake_attach(job, other != NULL ? other : computation);
     }
     pthread_mutex_unlock(&intake->lock);
@@ -160,10 +167,60 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem
     return status;
 }
 
+// All labels of a job, in bytes.
+enum { LABELS_MOST = 8192 };
+
+// Title, labels and study, as they are shown and searched.
+static Status fill_notes(JobRow *row, const Inquiry *inquiry, Problem *problem) {
+    const Simulation *simulation = &inquiry->simulation;
+    const Texts *labels = &simulation->labels;
+    Bytes shown = {0}, words = {0};
+    job_words(&words, simulation->title, (const char *const *)labels->at, labels->count);
+    if (words.count > LABELS_MOST) {
+        const size_t size = words.count;
+        bytes_clear(&words);
+        return problem_add(problem, STATUS_INVALID, "/labels",
+                           "must have at most %d bytes in all, has about %zu", LABELS_MOST, size);
+    }
+    for (size_t i = 0; i < labels->count; i++) {
+        bytes_text(&shown, i > 0 ? ", " : "[");
+        bytes_json_string(&shown, labels->at[i]);
+    }
+    bytes_text(&shown, labels->count > 0 ? "]" : "");
+    const bool is_named = words.count > 0;
+    row->title = simulation->title == NULL ? NULL : strdup(simulation->title);
+    row->labels = bytes_take(&shown, NULL);
+    row->words = bytes_take(&words, NULL);
+    row->study = inquiry->study == NULL ? NULL : strdup(inquiry->study->kind->name);
+    const bool is_whole = (row->title != NULL || simulation->title == NULL) &&
+                          row->labels != NULL && row->words != NULL &&
+                          (row->study != NULL || inquiry->study == NULL);
+    if (labels->count == 0) {
+        free(row->labels);
+        row->labels = NULL;
+    }
+    if (!is_named) {
+        free(row->words);
+        row->words = NULL;
+    }
+    return is_whole ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+static Status fill_sender(Job *job, const Submission *submission, const KeyHold *hold) {
+    JobRow *row = &job->row;
+    const bool has_key = hold->key[0] != '\0';
+    row->client = submission->client == NULL ? NULL : strdup(submission->client);
+    row->idempotency_key = has_key ? strdup(hold->key) : NULL;
+    row->request = has_key ? strdup(hold->request) : NULL;
+    return (row->client == NULL && submission->client != NULL) ||
+                   (has_key && (row->idempotency_key == NULL || row->request == NULL))
+               ? STATUS_NO_MEMORY
+               : STATUS_OK;
+}
+
 static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warnings,
                        Problem *problem) {
     JobRow *row = &job->row;
-    const char *title = inquiry->simulation.title;
     Bytes scene = {0}, told = {0};
     if (!job_id_make(row->id))
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
@@ -174,9 +231,8 @@ static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warning
     document_warnings(&told, warnings);
     row->scene = bytes_take(&scene, NULL);
     row->warnings = bytes_take(&told, NULL);
-    row->title = title == NULL ? NULL : strdup(title);
-    if (row->result[0] == '\0' || row->scene == NULL || row->warnings == NULL ||
-        (row->title == NULL && title != NULL))
+    TRY(fill_notes(row, inquiry, problem));
+    if (row->result[0] == '\0' || row->scene == NULL || row->warnings == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     return STATUS_OK;
 }
@@ -198,19 +254,37 @@ static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *proble
     return start(intake, job, inquiry, problem);
 }
 
-Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
-                     Problem *problem) {
-    *accepted = NULL;
+// Who asks, if it may.
+static Status enter_client(Intake *intake, const Submission *submission, Client **client,
+                           Problem *problem) {
+    Status status = STATUS_OK;
+    pthread_mutex_lock(&intake->lock);
+    *client = queue_client(intake->queue, submission->client != NULL ? submission->client : "");
+    if (*client == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
+    else
+        status = quota_send(intake, *client, problem);
+    pthread_mutex_unlock(&intake->lock);
+    return status;
+}
+
+static Status submit_new(Intake *intake, const Submission *submission, const KeyHold *hold,
+                         Job **accepted, Problem *problem) {
+    Client *client;
+    TRY(enter_client(intake, submission, &client, problem));
     Job *job = job_new(intake);
     if (job == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->submitted_ns = clock_monotonic_ns();
+    job->client = client;
     Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
     Status status = intake_prepare(intake->store, submission->text, submission->size,
                                    &intake->settings.limits, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
+    if (status == STATUS_OK)
+        status = fill_sender(job, submission, hold);
     if (status == STATUS_OK)
         status = submit(intake, job, &inquiry, problem);
     inquiry_clear(&inquiry);
@@ -223,15 +297,31 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
     return STATUS_OK;
 }
 
+Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
+                     Problem *problem) {
+    KeyHold hold;
+    Status status = keyed_begin(intake, submission, &hold, accepted, problem);
+    if (submission->is_replayed != NULL)
+        *submission->is_replayed = *accepted != NULL;
+    if (status == STATUS_OK && *accepted == NULL) {
+        status = submit_new(intake, submission, &hold, accepted, problem);
+        if (status == STATUS_OK)
+            keyed_remember(intake, &hold, *accepted);
+    }
+    keyed_end(intake, &hold);
+    return status;
+}
+
 // Takes the row and the inquiry.
 static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *problem) {
     Job *job = job_new(intake);
+    Client *client = queue_client(intake->queue, row->client != NULL ? row->client : "");
     Computation *computation = NULL;
     intake_result_id(inquiry, row->result);
-    if (job != NULL && row->result[0] != '\0' &&
+    if (job != NULL && client != NULL && row->result[0] != '\0' &&
         (computation = index_find(intake->in_flight, row->result)) == NULL &&
         (computation = begin(row, inquiry)) != NULL)
-        intake_enqueue(intake, computation, false);
+        intake_enqueue(intake, computation, client);
     if (computation == NULL) {
         job_drop(job);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
@@ -243,6 +333,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
     *row = (JobRow){0};
     job->is_kept = true;
     job->row.state = JOB_ACCEPTED;
+    job->client = client;
     job->indexed.key = job->row.id;
     intake_admit(intake, job);
     intake_attach(job, computation);

@@ -157,21 +157,33 @@ static void abandon(Intake *intake, Computation *computation) {
     wakers_call(&computation->askers);
 }
 
+static bool is_slow(const Computation *computation) {
+    return computation->queued.seconds > queue_quick;
+}
+
+// The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
+static QueueEntry *take_entry(const Worker *worker) {
+    Intake *intake = worker->intake;
+    if (worker->is_spare && intake->slow_running < intake->settings.workers)
+        return NULL;
+    return queue_take(intake->queue, worker->is_spare);
+}
+
 static Computation *next_computation(Worker *worker) {
     Intake *intake = worker->intake;
-    while ((intake->first == NULL || intake_is_behind(intake)) && !intake->is_closing)
-        pthread_cond_wait(&intake->work, &intake->lock);
-    if (intake->is_closing)
+    QueueEntry *entry = NULL;
+    while (!intake->is_closing &&
+           (intake_is_behind(intake) || (entry = take_entry(worker)) == NULL))
+        pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
+    if (entry == NULL)
         return NULL;
-    Computation *computation = intake->first;
-    intake->first = computation->next;
-    if (intake->first == NULL)
-        intake->last = NULL;
-    intake->queued--;
-    computation->next = NULL;
+    Computation *computation = computation_of(entry);
     computation->is_running = true;
     worker->running = computation;
+    if (is_slow(computation) && ++intake->slow_running == intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
+    computation->began_ns = now_ns;
     for (Job *job = computation->jobs; job != NULL; job = job->next_shared) {
         job->row.state = JOB_RUNNING;
         job->row.started_unix_ms = now_ms;
@@ -180,6 +192,14 @@ static Computation *next_computation(Worker *worker) {
         histogram_add(&intake->totals.waited, now_ns - job->submitted_ns);
     }
     return computation;
+}
+
+// How long runs take beside what was foretold, for those who ask when to come back.
+static void keep_pace(Intake *intake, const Computation *computation, const Findings *findings) {
+    const double foretold = computation->queued.seconds;
+    const double ratio = 1e-9 * (double)(findings->ended_ns - findings->began_ns) / foretold;
+    if (foretold > 0 && ratio > 1e-3 && ratio < 1e3)
+        intake->pace += 0.1 * (ratio - intake->pace);
 }
 
 void *worker_main(void *context) {
@@ -194,6 +214,9 @@ void *worker_main(void *context) {
         run(worker, computation, &findings, &problem);
         pthread_mutex_lock(&intake->lock);
         worker->running = NULL;
+        intake->slow_running -= is_slow(computation);
+        if (findings.status == STATUS_OK)
+            keep_pace(intake, computation, &findings);
         if (findings.status == STATUS_CANCELLED)
             abandon(intake, computation);
         pthread_mutex_unlock(&intake->lock);

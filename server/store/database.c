@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <sqlite3.h>
@@ -24,6 +25,27 @@ struct Database {
     } kept[STATEMENTS];
     size_t kept_count;
 };
+
+// A quota, or a limit on a file's size, is to SQLite an error of writing; it does not say which.
+static bool is_full(sqlite3 *connection) {
+    return (sqlite3_errcode(connection) & 0xFF) == SQLITE_FULL ||
+           sqlite3_extended_errcode(connection) == SQLITE_IOERR_WRITE;
+}
+
+static Status report_full(const char *path, Problem *problem) {
+    struct statvfs disk;
+    const char *slash = path != NULL ? strrchr(path, '/') : NULL;
+    const int size = slash != NULL ? (int)(slash - path) : 0;
+    if (slash == NULL || statvfs(path, &disk) != 0)
+        return problem_set(problem, STATUS_FULL, "there is no room left for the database");
+    const unsigned long long left =
+        (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize;
+    return problem_set(problem, STATUS_FULL,
+                       "there is no room left in %.*s: %llu bytes are free on its disk%s; what is "
+                       "stored can be read, and writing goes on when there is room",
+                       size, path, left,
+                       left > (1 << 26) ? ", so a quota or a limit on files is reached" : "");
+}
 
 // What SQLite says, in words and as a status.
 static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
@@ -51,6 +73,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
         break;
     }
     const char *path = sqlite3_db_filename(connection, "main");
+    if (is_full(connection))
+        return report_full(path, problem);
     const bool has_path = path != NULL && path[0] != '\0';
     return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
                        has_path ? ", in " : "", has_path ? path : "");

@@ -24,14 +24,16 @@ const RowColumn job_columns[] = {
     ROW_COLUMN(JobRow, problem, COLUMN_TEXT),
     ROW_COLUMN(JobRow, warnings, COLUMN_TEXT),
     ROW_COLUMN(JobRow, scene, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, labels, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, words, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, study, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, client, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, idempotency_key, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, request, COLUMN_TEXT),
+    ROW_COLUMN(JobRow, has_result, COLUMN_FLAG),
     ROW_END
 };
 // clang-format on
-
-#define JOB_SHORT                                                                                  \
-    "id, state, result, is_cached, created_unix_ms, started_unix_ms, finished_unix_ms, queued, "   \
-    "run, total, "                                                                                 \
-    "title, problem, warnings"
 
 void job_row_clear(JobRow *row) {
     row_clear(job_columns, row, sizeof *row);
@@ -51,8 +53,9 @@ static Status not_found(const char *id, Problem *problem) {
 // The scene of a successful job is its result's.
 #define JOB_INSERT                                                                                 \
     "INSERT INTO jobs (" JOB_SHORT                                                                 \
-    ", scene) VALUES (:id, :state, :result, :is_cached, :created_unix_ms, "                        \
-    ":started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, :problem, :warnings, "    \
+    ", words, idempotency_key, request, scene) VALUES (:id, :state, :result, :is_cached, "         \
+    ":created_unix_ms, :started_unix_ms, :finished_unix_ms, :queued, :run, :total, :title, "       \
+    ":problem, :warnings, :labels, :study, :client, :words, :idempotency_key, :request, "          \
     "CASE :state WHEN 2 THEN '' ELSE coalesce(:scene, '') END)"
 #define JOB_CHANGE                                                                                 \
     "SET state = :state, result = :result, is_cached = :is_cached, "                               \
@@ -134,7 +137,7 @@ static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT),
                                         ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
 
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem) {
-    static const char sql[] = "SELECT " JOB_SHORT " FROM jobs WHERE id = :id";
+    static const char sql[] = "SELECT " JOB_SHOWN " FROM jobs WHERE id = :id";
     const Key key = {(char *)id, 0};
     bool is_found;
     memset(row, 0, sizeof *row);
@@ -146,6 +149,24 @@ Status store_job_load(Store *store, const char *id, JobRow *row, Problem *proble
     return is_found ? STATUS_OK : not_found(id, problem);
 }
 
+typedef struct Keyed {
+    char *client, *key;
+} Keyed;
+static const RowColumn keyed_columns[] = {ROW_COLUMN(Keyed, client, COLUMN_TEXT),
+                                          ROW_COLUMN(Keyed, key, COLUMN_TEXT), ROW_END};
+
+Status store_job_keyed(Store *store, const char *client, const char *key, JobRow *row,
+                       Problem *problem) {
+    static const char sql[] = "SELECT " JOB_SHOWN ", request FROM jobs "
+                              "WHERE idempotency_key = :key AND coalesce(client, '') = :client";
+    const Keyed keyed = {(char *)(client != NULL ? client : ""), (char *)key};
+    bool is_found;
+    memset(row, 0, sizeof *row);
+    TRY(store_first(store, sql, keyed_columns, &keyed, job_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK
+                    : problem_set(problem, STATUS_NOT_FOUND, "there is no job of that key");
+}
+
 static Status load(Store *store, const char *sql, const Key *key, JobRows *rows, Problem *problem) {
     void *at;
     const Status status = store_all(store, sql, key_columns, key, job_columns, sizeof *rows->at,
@@ -154,23 +175,6 @@ static Status load(Store *store, const char *sql, const Key *key, JobRows *rows,
     if (status != STATUS_OK)
         job_rows_clear(rows);
     return status;
-}
-
-Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows,
-                      Problem *problem) {
-    static const char first_sql[] =
-        "SELECT " JOB_SHORT " FROM jobs ORDER BY number DESC LIMIT :most";
-    static const char next_sql[] =
-        "SELECT " JOB_SHORT " FROM jobs WHERE number < (SELECT number FROM jobs "
-        "WHERE id = :id) ORDER BY number DESC LIMIT :most";
-    const Key key = {(char *)before, most};
-    *rows = (JobRows){0};
-    if (before != NULL) {
-        JobRow row;
-        TRY(store_job_load(store, before, &row, problem));
-        job_row_clear(&row);
-    }
-    return load(store, before == NULL ? first_sql : next_sql, &key, rows, problem);
 }
 
 Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem) {

@@ -1,5 +1,5 @@
 // What a transaction over several tables needs of the jobs'. Everything else of them is in store.h.
-// Not for the rest of the server. Used by result_rows.c and store.c.
+// Not for the rest of the server. Used by result_rows.c, job_search.c and store.c.
 #ifndef SERVER_STORE_JOB_ROWS_H
 #define SERVER_STORE_JOB_ROWS_H
 
@@ -7,6 +7,12 @@
 
 extern const RowColumn job_columns[];
 
+// All but the scene and what is only searched by.
+#define JOB_SHORT                                                                                  \
+    "id, state, result, is_cached, created_unix_ms, started_unix_ms, finished_unix_ms, queued, "   \
+    "run, total, title, problem, warnings, labels, study, client"
+// Of a row that is read.
+#define JOB_SHOWN JOB_SHORT ", EXISTS (SELECT 1 FROM results WHERE id = jobs.result) AS has_result"
 // Jobs whole, passing over those that are there already.
 Status job_rows_add(Store *store, const void *const *rows, size_t count, Problem *problem);
 

@@ -102,6 +102,20 @@ bool store_result_exists(Store *store, const char *id) {
     return load(store, sql, id, &row, NULL) == STATUS_OK;
 }
 
+static Status delete (Database *database, const void *work, Problem *problem) {
+    static const char sql[] = "DELETE FROM results WHERE id = :id";
+    const Key *key = work;
+    int changes;
+    TRY(database_change(database, sql, key_columns, key, &changes, problem));
+    return changes > 0
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", key->id);
+}
+
+Status store_result_delete(Store *store, const char *id, Problem *problem) {
+    return store_write(store, delete, &(Key){(char *)id}, problem);
+}
+
 typedef struct Recent {
     uint64_t most, scene_most;
 } Recent;

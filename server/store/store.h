@@ -74,7 +74,14 @@ typedef struct JobRow {
     double queued, run, total; // [s]
     char *scene;               // canonical JSON, resolved
     char *problem, *warnings, *title;
-    bool is_unsaved; // no column: the store may not have it yet, so that saving it adds it
+    char *labels;          // JSON array of texts; NULL: none
+    char *words;           // what is searched: job_words; NULL: nothing
+    char *study;           // the kind of its study; NULL: none
+    char *client;          // who sent it; NULL: nobody in particular
+    char *idempotency_key; // NULL: none
+    char *request;         // with a key: SHA-256 of the body it came with
+    bool has_result;       // loaded rows: its result is there
+    bool is_unsaved;       // no column: the store may not have it yet, so that saving it adds it
 } JobRow;
 void job_row_clear(JobRow *row);
 // With texts of its own; false without memory, and then it has none.
@@ -95,13 +102,13 @@ Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *d
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
-// Newest first; `before` is an id to go on after (STATUS_NOT_FOUND), or NULL.
+// The job that `client` (NULL: nobody in particular) sent under that key. STATUS_NOT_FOUND.
+Status store_job_keyed(Store *store, const char *client, const char *key, JobRow *row,
+                       Problem *problem);
 typedef struct JobRows {
     JobRow *at;
     size_t count;
 } JobRows;
-Status store_job_list(Store *store, const char *before, size_t most, JobRows *rows,
-                      Problem *problem);
 Status store_job_unfinished(Store *store, JobRows *rows, Problem *problem); // oldest first
 void job_rows_clear(JobRows *rows);
 
@@ -132,6 +139,7 @@ Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
+Status store_result_delete(Store *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
 // Id, engine and scene of the newest ones, newest first, without scenes longer than that.
 typedef struct ResultRows {
     ResultRow *at;

@@ -353,8 +353,9 @@ def test_what_is_not_there_is_told_apart():
                      "/v1/results/r-1/manifest", "/v1/results/r-1/energy.json", "/v1/jobs/%27%3B--", "/v1/jobs/" + 900 * "a"):
             problem(daemon.get(path), 404)
         problem(daemon.request("DELETE", "/v1/jobs/j-1"), 404)
+        problem(daemon.request("DELETE", "/v1/results/r-1"), 404)
         for method, path, allow in (("PUT", "/v1/jobs", {"GET", "HEAD", "POST"}), ("POST", "/version", {"GET", "HEAD"}),
-                                    ("DELETE", "/v1/results/r-1", {"GET", "HEAD"}), ("OPTIONS", "/", {"GET", "HEAD"}),
+                                    ("DELETE", "/v1/results/r-1/psd.csv", {"GET", "HEAD"}), ("OPTIONS", "/", {"GET", "HEAD"}),
                                     ("PATCH", "/v1/jobs/j-1", {"GET", "HEAD", "DELETE"})):
             reply = daemon.request(method, path)
             problem(reply, 405)

@@ -120,7 +120,8 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
                   "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
-                  "/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
+                  "/v1/jobs/{id}": {"id": job["id"]}, "/v1/jobs/{id}/events": {"id": job["id"]},
+                  "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
 
@@ -191,6 +192,16 @@ def test_real_answers_have_the_promised_shapes():
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")
+        keyed = {"Idempotency-Key": '"one"'}
+        call("POST", "/v1/jobs", "/v1/jobs", json=scene, headers=keyed)
+        assert "Idempotency-Replayed" in call("POST", "/v1/jobs", "/v1/jobs", json=scene, headers=keyed)
+        call("POST", "/v1/jobs", "/v1/jobs", json={**scene, "title": "T"}, headers=keyed)
+        call("POST", "/v1/jobs", "/v1/jobs", json={**scene, "title": "T", "labels": {"a": "b"}})
+        call("GET", "/v1/jobs/{id}/events", f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": "20000"})
+        gone = program.finished(daemon, program.scene("paper_free_aluminium"))
+        for _ in range(2):
+            call("DELETE", "/v1/results/{id}", f"/v1/results/{gone['result']}")
+        call("GET", "/v1/jobs/{id}", f"/v1/jobs/{gone['id']}")
         assert call("GET", "/v1/jobs", "/v1/jobs?limit=1") == {"Link"}
     assert called == set(operations()), set(operations()) - called
     assert statuses >= {200, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses

@@ -37,7 +37,7 @@ static Reply fresh(const char *text, size_t size) {
 
 static void put(Hot *hot, const char *target, bool is_packed, const char *text, size_t size) {
     Reply reply = fresh(text, size);
-    hot_put(hot, target, is_packed, &route, &reply);
+    hot_put(hot, hot_age(hot), target, is_packed, &route, &reply);
     assert_string_equal(reply.body, text);
     reply_clear(&reply);
 }
@@ -93,7 +93,7 @@ static void what_is_held_outlives_the_cache(void **state) {
     atomic_store(&released, 0);
     Hot *hot = hot_new(1 << 20);
     Reply reply = fresh("held", 100);
-    hot_put(hot, "/held", false, &route, &reply);
+    hot_put(hot, hot_age(hot), "/held", false, &route, &reply);
     hot_clear(hot);
     assert_false(finds(hot, "/held", false, ""));
     hot_free(hot);

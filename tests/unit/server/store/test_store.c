@@ -1,5 +1,6 @@
 // The store from outside: durable when a call returns, one daemon a folder, seeds, jobs and
 // results.
+#include "server/store/job_search.h"
 #include "server/store/store.h"
 
 #include <pthread.h>
@@ -109,16 +110,19 @@ static void jobs_survive_closing_and_are_listed_newest_first(void **state) {
     assert_int_equal(store_job_load(store, "j-9", &row, NULL), STATUS_NOT_FOUND);
 
     JobRows rows;
-    assert_int_equal(store_job_list(store, NULL, 2, &rows, NULL), STATUS_OK);
+    JobSearch search = job_search_all(2);
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_string_equal(rows.at[0].id, "j-3");
     assert_string_equal(rows.at[1].id, "j-2");
     job_rows_clear(&rows);
-    assert_int_equal(store_job_list(store, "j-2", 2, &rows, NULL), STATUS_OK);
+    search.before = "j-2";
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1);
     assert_string_equal(rows.at[0].id, "j-1");
     job_rows_clear(&rows);
-    assert_int_equal(store_job_list(store, "j-9", 2, &rows, NULL), STATUS_NOT_FOUND);
+    search.before = "j-9";
+    assert_int_equal(store_job_search(store, &search, &rows, NULL), STATUS_NOT_FOUND);
     assert_int_equal(rows.count, 0);
 
     assert_int_equal(store_job_unfinished(store, &rows, NULL), STATUS_OK);
@@ -317,7 +321,7 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
             row.scene = scene;
             status = store_job_add(store, &row, NULL);
         }
-        if (status != STATUS_IO)
+        if (status != STATUS_FULL)
             _exit(2);
         row = job_row("j-after", 0);
         if (store_job_load(store, "j-0", &row, NULL) != STATUS_OK)
@@ -454,7 +458,8 @@ static void late_rows_are_found_at_once_and_written_soon(void **state) {
     assert_int_equal(store_job_load(store, "j-99999", &loaded, NULL), STATUS_NOT_FOUND);
     store_job_settle(store);
     JobRows rows;
-    assert_int_equal(store_job_list(store, NULL, 10000, &rows, NULL), STATUS_OK);
+    const JobSearch all = job_search_all(10000);
+    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 3000);
     assert_string_equal(rows.at[0].id, "j-02999");
     assert_string_equal(rows.at[1].warnings, "[]");
@@ -489,7 +494,8 @@ static void late_rows_of_a_killed_process_are_written_at_the_next_start(void **s
     }
     Store *store = open_store(folder);
     JobRows rows;
-    assert_int_equal(store_job_list(store, NULL, 10000, &rows, NULL), STATUS_OK);
+    const JobSearch all = job_search_all(10000);
+    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1500);
     job_rows_clear(&rows);
     store_close(store);
@@ -502,7 +508,7 @@ static void late_rows_of_a_killed_process_are_written_at_the_next_start(void **s
         assert_int_equal(fputc(i * 7 % 251, file) == EOF, 0);
     fclose(file);
     store = open_store(folder);
-    assert_int_equal(store_job_list(store, NULL, 10000, &rows, NULL), STATUS_OK);
+    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 1500);
     job_rows_clear(&rows);
     store_close(store);
@@ -533,7 +539,8 @@ static void late_rows_wait_while_the_database_is_held_and_then_have_no_more_room
     store_close(store);
     store = open_store(folder);
     JobRows rows;
-    assert_int_equal(store_job_list(store, NULL, 100000, &rows, NULL), STATUS_OK);
+    const JobSearch all = job_search_all(100000);
+    assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, count);
     job_rows_clear(&rows);
     store_close(store);

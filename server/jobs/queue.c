@@ -1,0 +1,217 @@
+// Between clients: whoever was given the least CPU time goes next. Time is counted when work is
+// taken, as foretold; a client that comes back starts at what the others have reached, so that
+// neither idling nor new names save anything up. With equal jobs this is round robin.
+//
+// For one client: by rank = arrival + PATIENCE * seconds, so a job of 1 s is passed by quicker ones
+// for PATIENCE seconds and by none after that: nothing waits for ever. Equal ranks go by arrival.
+//
+// Each client has two lanes, quick and slow, each a pairing heap by rank: workers take the first of
+// both, the one that is kept for quick jobs looks into the quick ones alone.
+#include "server/jobs/queue.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+const double queue_quick = 0.1;
+
+static const double patience = 10; // [s] for each second
+static const double least = 1e-5;  // [s] that any job counts as
+
+enum { QUICK, SLOW };
+
+struct Queue {
+    Client *first, **last; // in order of their first job
+    QueueEntry *urgent, *urgent_last;
+    size_t count;
+    double seconds;
+    double reached; // `served` of the client that was taken from last
+    uint64_t arrivals;
+};
+
+Queue *queue_new(void) {
+    Queue *queue = calloc(1, sizeof *queue);
+    if (queue != NULL)
+        queue->last = &queue->first;
+    return queue;
+}
+
+void queue_free(Queue *queue) {
+    if (queue == NULL)
+        return;
+    while (queue->first != NULL) {
+        Client *client = queue->first;
+        queue->first = client->next;
+        free(client);
+    }
+    free(queue);
+}
+
+Client *queue_client(Queue *queue, const char *name) {
+    for (Client *client = queue->first; client != NULL; client = client->next)
+        if (strcmp(client->name, name) == 0)
+            return client;
+    const size_t size = strlen(name) + 1;
+    Client *client = calloc(1, sizeof *client + size);
+    if (client == NULL)
+        return NULL;
+    memcpy(client->name, name, size);
+    *queue->last = client;
+    queue->last = &client->next;
+    return client;
+}
+
+static bool is_before(const QueueEntry *a, const QueueEntry *b) {
+    return a->rank < b->rank || (a->rank == b->rank && a->number < b->number);
+}
+
+// Two heaps as one. `previous` is the left neighbour, or the parent of a first child.
+static QueueEntry *merge(QueueEntry *a, QueueEntry *b) {
+    if (a == NULL || b == NULL)
+        return a != NULL ? a : b;
+    if (is_before(b, a)) {
+        QueueEntry *other = a;
+        a = b;
+        b = other;
+    }
+    b->previous = a;
+    b->next = a->child;
+    if (a->child != NULL)
+        a->child->previous = b;
+    a->child = b;
+    a->next = a->previous = NULL;
+    return a;
+}
+
+static QueueEntry *merge_all(QueueEntry *first) {
+    QueueEntry *pairs = NULL, *root = NULL;
+    while (first != NULL) {
+        QueueEntry *a = first, *b = a->next;
+        first = b != NULL ? b->next : NULL;
+        a->next = a->previous = NULL;
+        if (b != NULL)
+            b->next = b->previous = NULL;
+        a = merge(a, b);
+        a->next = pairs;
+        pairs = a;
+    }
+    while (pairs != NULL) {
+        QueueEntry *next = pairs->next;
+        pairs->next = NULL;
+        root = merge(root, pairs);
+        pairs = next;
+    }
+    return root;
+}
+
+static QueueEntry **lane_of(Client *client, const QueueEntry *entry) {
+    return &client->lanes[entry->seconds <= queue_quick ? QUICK : SLOW];
+}
+
+static void count_in(Queue *queue, QueueEntry *entry) {
+    entry->child = entry->next = entry->previous = NULL;
+    entry->number = ++queue->arrivals;
+    queue->count++;
+    queue->seconds += entry->seconds;
+}
+
+static void count_out(Queue *queue, QueueEntry *entry) {
+    entry->child = entry->next = entry->previous = NULL;
+    entry->number = 0;
+    queue->count--;
+    // Sums of what comes and goes drift; an empty queue has none.
+    queue->seconds = queue->count > 0 ? queue->seconds - entry->seconds : 0;
+}
+
+static void join(Queue *queue, QueueEntry *entry, Client *client) {
+    if (client->waiting++ == 0 && client->served < queue->reached)
+        client->served = queue->reached;
+    entry->client = client;
+    QueueEntry **lane = lane_of(client, entry);
+    *lane = merge(*lane, entry);
+}
+
+void queue_put(Queue *queue, QueueEntry *entry, Client *client, double now) {
+    count_in(queue, entry);
+    entry->rank = now + patience * entry->seconds;
+    join(queue, entry, client);
+}
+
+void queue_urge(Queue *queue, QueueEntry *entry) {
+    count_in(queue, entry);
+    entry->client = NULL;
+    entry->previous = queue->urgent_last;
+    *(queue->urgent_last != NULL ? &queue->urgent_last->next : &queue->urgent) = entry;
+    queue->urgent_last = entry;
+}
+
+static void leave(QueueEntry *entry) {
+    Client *client = entry->client;
+    QueueEntry **lane = lane_of(client, entry);
+    QueueEntry *children = merge_all(entry->child);
+    client->waiting--;
+    if (*lane == entry) {
+        *lane = children;
+        return;
+    }
+    *(entry->previous->child == entry ? &entry->previous->child : &entry->previous->next) =
+        entry->next;
+    if (entry->next != NULL)
+        entry->next->previous = entry->previous;
+    *lane = merge(*lane, children);
+}
+
+void queue_remove(Queue *queue, QueueEntry *entry) {
+    if (entry->number == 0)
+        return;
+    if (entry->client != NULL) {
+        leave(entry);
+    } else {
+        *(entry->previous != NULL ? &entry->previous->next : &queue->urgent) = entry->next;
+        *(entry->next != NULL ? &entry->next->previous : &queue->urgent_last) = entry->previous;
+    }
+    count_out(queue, entry);
+}
+
+void queue_share(Queue *queue, QueueEntry *entry, Client *client) {
+    if (entry->number == 0 || entry->client == NULL || entry->client == client ||
+        entry->client->waiting <= client->waiting + 1)
+        return;
+    leave(entry);
+    entry->child = entry->next = entry->previous = NULL;
+    join(queue, entry, client);
+}
+
+static QueueEntry *first_of(const Client *client, bool only_quick) {
+    QueueEntry *quick = client->lanes[QUICK], *slow = client->lanes[SLOW];
+    if (only_quick || slow == NULL)
+        return quick;
+    return quick == NULL || is_before(slow, quick) ? slow : quick;
+}
+
+QueueEntry *queue_take(Queue *queue, bool only_quick) {
+    Client *next = NULL;
+    if (queue->urgent != NULL && (!only_quick || queue->urgent->seconds <= queue_quick)) {
+        QueueEntry *entry = queue->urgent;
+        queue_remove(queue, entry);
+        return entry;
+    }
+    for (Client *client = queue->first; client != NULL; client = client->next)
+        if (first_of(client, only_quick) != NULL && (next == NULL || client->served < next->served))
+            next = client;
+    if (next == NULL)
+        return NULL;
+    QueueEntry *entry = first_of(next, only_quick);
+    queue_remove(queue, entry);
+    if (next->served > queue->reached)
+        queue->reached = next->served;
+    next->served += entry->seconds > least ? entry->seconds : least;
+    return entry;
+}
+
+size_t queue_count(const Queue *queue) {
+    return queue->count;
+}
+
+double queue_seconds(const Queue *queue) {
+    return queue->seconds;
+}

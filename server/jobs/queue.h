@@ -1,0 +1,57 @@
+// What waits to be computed, in the order in which it will be: fair between clients by the time
+// they were given, and for each client the quick before the slow, until the slow have waited long
+// enough. Not locked and not the work itself: the intake's lock guards it. Used by intake.c,
+// submit.c, worker.c and quota.c.
+#ifndef SERVER_JOBS_QUEUE_H
+#define SERVER_JOBS_QUEUE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct Queue Queue;
+
+// Who sends jobs: the name of a token, "" for nobody in particular. There are as many as tokens;
+// each lives as long as the queue.
+typedef struct Client {
+    struct Client *next;
+    size_t live;        // unfinished jobs
+    double allowance;   // jobs it may send now, and when that was so; see quota.h
+    int64_t allowed_ns; // 0: never asked
+    size_t waiting;     // entries
+    double served;      // [s] of CPU foretold for what it was given
+    struct QueueEntry *lanes[2];
+    char name[];
+} Client;
+
+// First member of what waits. All zero: it does not.
+typedef struct QueueEntry {
+    struct QueueEntry *child, *next, *previous;
+    Client *client; // NULL: ahead of all
+    double seconds; // of CPU foretold
+    double rank;
+    uint64_t number; // of arrival, from 1; 0: does not wait
+} QueueEntry;
+
+// Foretold to take no longer than this [s], it is quick.
+extern const double queue_quick;
+
+Queue *queue_new(void); // NULL without memory
+void queue_free(Queue *queue);
+
+Client *queue_client(Queue *queue, const char *name); // made at first sight; NULL without memory
+
+// `now` in seconds on any clock that only rises; entry->seconds is set. Not waiting yet.
+void queue_put(Queue *queue, QueueEntry *entry, Client *client, double now);
+// Ahead of all clients, behind those that were urged before.
+void queue_urge(Queue *queue, QueueEntry *entry);
+// Whose turn it is, or NULL; `only_quick` passes over what is not quick.
+QueueEntry *queue_take(Queue *queue, bool only_quick);
+void queue_remove(Queue *queue, QueueEntry *entry); // fine if it does not wait
+// As if it had come from `client`, where that has fewer that wait.
+void queue_share(Queue *queue, QueueEntry *entry, Client *client);
+
+size_t queue_count(const Queue *queue);
+double queue_seconds(const Queue *queue); // of CPU foretold for all that wait
+
+#endif

@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""A full disk: writes are answered 507, reads go on, and all goes on without a restart when there is room."""
+
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+ASYNC = {"Prefer": "respond-async"}
+SIZE = 24  # [MiB] of the disk
+
+
+@contextlib.contextmanager
+def small_disk():
+    """A folder on a disk of its own."""
+    folder = tempfile.mkdtemp(prefix="impactd-disk-")
+    try:
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={SIZE}m", "tmpfs", folder],
+                              capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise program.Skipped(f"no disk of its own can be mounted here: {done.stderr.strip()}")
+        try:
+            yield folder
+        finally:
+            subprocess.run(["umount", "-l", folder], check=False)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def scene(number, psd=True):
+    """A scene whose spectrum alone takes some 100 KB."""
+    made = program.scene("paper_free_sponge")
+    made["dampers"][0]["clearance"] = 0.01 + 1e-6 * number
+    made["output"] = {"channels": ["displacement"], "psd": {"channels": ["displacement"], "segment": 8192}
+                      if psd else None}
+    return made
+
+
+def long_scene(number, duration):
+    made = program.scene("paper_sine_aluminium")
+    made.update(duration=duration, sample_rate=100, output={"channels": [], "psd": None},
+                accuracy={"solver": "rk4", "step": 1e-5})
+    made["dampers"][0]["clearance"] = 0.012 + 1e-6 * number
+    return made
+
+
+def fill(folder):
+    """Takes all that is free but for a few pages."""
+    ballast = os.path.join(folder, "ballast")
+    with open(ballast, "wb", buffering=0) as file:
+        with contextlib.suppress(OSError):
+            while True:
+                file.write(b"0" * 4096)
+    return ballast
+
+
+def until(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.1)
+    return condition()
+
+
+def test_a_full_disk_stops_writes_alone():
+    """POST 507 naming the folder and what is free; GET 200; with room again all as before, without a restart."""
+    with small_disk() as folder:
+        with program.daemon("--workers", "2", data=folder) as daemon:
+            before = daemon.submit(scene(0)).json()
+            ballast = fill(folder)
+            refused = None
+            for number in range(1, 400):
+                reply = daemon.submit(scene(number))
+                if reply.status != 200:
+                    refused = reply
+                    break
+            assert refused is not None and refused.status == 507, refused
+            problem = refused.json()
+            assert problem["type"] == "/problems/no-room", problem
+            assert folder in problem["detail"] and "bytes are free" in problem["detail"], problem
+            for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
+                         f"/v1/results/{before['result']}/series.npy", f"/v1/results/{before['result']}/psd.json",
+                         "/health/live"):
+                assert daemon.get(path).status == 200, path
+            os.remove(ballast)
+            assert until(lambda: daemon.submit(scene(1000)).status == 200), "no recovery"
+            assert daemon.get(f"/v1/jobs/{before['id']}").json()["status"] == "successful"
+
+
+def test_jobs_under_way_wait_for_room():
+    """Jobs whose results cannot be stored go on when there is room; none is lost, none is told to have finished before."""
+    with small_disk() as folder:
+        with program.daemon("--workers", "2", data=folder) as daemon:
+            jobs = [daemon.submit(long_scene(i, 10), headers=ASYNC).json()["id"] for i in range(6)]
+            ballast = fill(folder)
+            # The journal has room for some; it is filled with what is refused in the end.
+            for number in range(1, 400):
+                if daemon.submit(scene(number)).status == 507:
+                    break
+            time.sleep(3)
+            states = [daemon.get(f"/v1/jobs/{job}").json()["status"] for job in jobs]
+            assert "failed" not in states, states
+            os.remove(ballast)
+            done = [daemon.finished(job, 90) for job in jobs]
+            assert {job["status"] for job in done} == {"successful"}, done
+            for job in done:
+                assert daemon.get(f"/v1/results/{job['result']}").status == 200
+        with program.daemon(data=folder) as daemon:
+            assert {daemon.get(f"/v1/jobs/{job}").json()["status"] for job in jobs} == {"successful"}
+
+
+def test_a_full_disk_at_the_start_is_told():
+    """A daemon that cannot write at its start says so, or starts and refuses; it neither hangs nor crashes."""
+    with small_disk() as folder:
+        fill(folder)
+        code, _, errors = program.run("serve", "--listen", "127.0.0.1:0", "--data", folder)
+        assert code not in (0, -6, -11) and "room" in errors or "full" in errors, (code, errors)
+
+
+if __name__ == "__main__":
+    program.main(globals())

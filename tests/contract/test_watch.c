@@ -1,0 +1,110 @@
+// Every run and study looks often enough whether it is to stop: between two looks there are never
+// 100 ms of CPU, also where an example lasts long.
+#include <dirent.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/math/fourier.h"
+#include "server/base/clock.h"
+#include "server/jobs/intake.h"
+
+enum { LONGER = 40, MOST_MS = 100, RUN_MS = 1500 };
+
+typedef struct Gaps {
+    int64_t began_ns, last_ns, longest_ns;
+    int looks;
+} Gaps;
+
+static bool look(void *context, double fraction) {
+    (void)fraction;
+    Gaps *gaps = context;
+    const int64_t now = clock_thread_cpu_ns();
+    if (now - gaps->last_ns > gaps->longest_ns)
+        gaps->longest_ns = now - gaps->last_ns;
+    gaps->last_ns = now;
+    gaps->looks++;
+    return now - gaps->began_ns < (int64_t)RUN_MS * 1000000; // long enough seen
+}
+
+static double cpu(void *context) {
+    (void)context;
+    return 1e-9 * (double)clock_thread_cpu_ns();
+}
+
+// The longest time without a look [ms], of which the last counts too: stopping takes as long.
+static double longest(Store *store, const char *path, double longer) {
+    static const SimulationLimits limits = {
+        .samples = 1 << 25, .impacts = 500000, .steps = 1e15, .bytes = 4e9};
+    Problem *problem = calloc(1, sizeof *problem);
+    char *text = calloc(1, 1 << 20);
+    FILE *file = fopen(path, "r");
+    assert_true(problem != NULL && text != NULL && file != NULL);
+    const size_t size = fread(text, 1, (1 << 20) - 1, file);
+    fclose(file);
+    Inquiry inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    double ms = 0;
+    // The first look is for defaults alone; the duration is then stretched as a client would.
+    Status status = intake_prepare(store, text, size, &limits, &inquiry, &warnings, problem);
+    assert_int_equal(status, STATUS_OK);
+    inquiry.simulation.scene.duration *= longer;
+    Outcome *outcome = NULL;
+    Gaps gaps = {.began_ns = clock_thread_cpu_ns()};
+    gaps.last_ns = gaps.began_ns;
+    const Watch watch = {&gaps, look};
+    status = simulation_run(&inquiry.simulation, &limits, &watch, NULL, &outcome, problem);
+    if (status == STATUS_OK && inquiry.study != NULL) {
+        const StudyTools tools = {.limits = &limits, .watch = &watch, .cpu = cpu};
+        Variant *answer = NULL;
+        gaps.began_ns = gaps.last_ns = clock_thread_cpu_ns();
+        status = study_run(inquiry.study, &inquiry.simulation, &tools, &answer, problem);
+        variant_free(answer);
+    }
+    const int64_t last = clock_thread_cpu_ns() - gaps.last_ns;
+    ms = 1e-6 * (double)(last > gaps.longest_ns ? last : gaps.longest_ns);
+    outcome_drop(outcome);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+    free(problem);
+    free(text);
+    return ms;
+}
+
+static void no_run_goes_long_without_looking_whether_it_is_to_stop(void **state) {
+    (void)state;
+    Store *store;
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    DIR *folder = opendir(IMPACTD_SOURCE_DIR "/schema/examples");
+    assert_non_null(folder);
+    size_t count = 0;
+    for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
+        char path[512];
+        if (strstr(entry->d_name, ".json") == NULL)
+            continue;
+        snprintf(path, sizeof path, "%s/schema/examples/%s", IMPACTD_SOURCE_DIR, entry->d_name);
+        const double ms = longest(store, path, LONGER);
+        if (ms > 20)
+            print_message("%s: %.0f ms\n", entry->d_name, ms);
+        if (ms > MOST_MS)
+            fail_msg("%s goes %.0f ms of CPU without looking", entry->d_name, ms);
+        count++;
+    }
+    closedir(folder);
+    store_close(store);
+    assert_true(count > 20);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_run_goes_long_without_looking_whether_it_is_to_stop),
+    };
+    fourier_start();
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

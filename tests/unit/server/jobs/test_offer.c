@@ -1,0 +1,306 @@
+// What the jobs room offers its clients: quotas, keys, deletion, retention, and quick jobs beside
+// slow ones.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "server/jobs/intake.h"
+#include "server/store/job_search.h"
+#include "server/store/retention.h"
+
+typedef struct Room {
+    char directory[64];
+    Store *store;
+    Intake *intake;
+    IntakeSettings settings;
+} Room;
+
+static Problem problem;
+static const struct timespec moment = {0, 1000000};
+
+static void room_open(Room *room) {
+    problem_clear(&problem);
+    if (store_open(room->directory, &room->store, &problem) != STATUS_OK ||
+        intake_open(room->store, &room->settings, &room->intake, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+}
+
+static void room_close(Room *room) {
+    intake_close(room->intake);
+    store_close(room->store);
+}
+
+static Room room_make(size_t workers, size_t quota, double rate) {
+    Room room = {.settings = {.workers = workers,
+                              .queue_most = 1000,
+                              .cache_bytes = 1 << 24,
+                              .quota = quota,
+                              .rate = rate,
+                              .limits = {.samples = 1 << 25, .impacts = 1 << 20}}};
+    strcpy(room.directory, "/tmp/impactd-test-XXXXXX");
+    assert_non_null(mkdtemp(room.directory));
+    room_open(&room);
+    return room;
+}
+
+static void room_end(Room *room) {
+    char command[128];
+    room_close(room);
+    snprintf(command, sizeof command, "rm -rf '%s'", room->directory);
+    assert_int_equal(system(command), 0);
+}
+
+static Status send(Room *room, const char *client, const char *key, double displacement,
+                   double duration, Job **job, bool *is_replayed) {
+    char text[1024];
+    snprintf(text, sizeof text,
+             "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},"
+             " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
+             " \"excitation\": {\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1, "
+             "\"displacement\": %.17g},"
+             " \"duration\": %.17g, \"sample_rate\": 1000,"
+             " \"output\": {\"channels\": [\"displacement\"], \"psd\": {\"channels\": []}}}",
+             displacement, duration);
+    const Submission submission = {.text = text,
+                                   .size = strlen(text),
+                                   .client = client,
+                                   .idempotency_key = key,
+                                   .is_replayed = is_replayed};
+    problem_clear(&problem);
+    return intake_submit(room->intake, &submission, job, &problem);
+}
+
+static void wait_for(Job *job) {
+    bool is_kept = false;
+    for (int i = 0; i < 60000 && !(job_is_finished(job) && is_kept); i++) {
+        nanosleep(&moment, NULL);
+        assert_int_equal(job_kept(job, &is_kept, &problem), STATUS_OK);
+    }
+    assert_true(job_is_finished(job));
+}
+
+static void dismiss(Room *room, Job *job) {
+    JobShow now;
+    Job *same;
+    assert_int_equal(job_show(job, &now), STATUS_OK);
+    assert_int_equal(intake_dismiss(room->intake, now.id, &same, &problem), STATUS_OK);
+    wait_for(same);
+    job_show_clear(&now);
+    job_drop(same);
+    job_drop(job);
+}
+
+static void a_token_has_no_more_unfinished_jobs_than_its_quota(void **state) {
+    (void)state;
+    Room room = room_make(1, 2, 0);
+    Job *jobs[3], *more;
+    assert_int_equal(send(&room, "ann", NULL, 0.010, 20000, &jobs[0], NULL), STATUS_OK);
+    assert_int_equal(send(&room, "ann", NULL, 0.011, 20000, &jobs[1], NULL), STATUS_OK);
+    assert_int_equal(send(&room, "ann", NULL, 0.012, 20000, &more, NULL), STATUS_QUOTA);
+    assert_non_null(strstr(problem.detail, "\"ann\" has 2 unfinished jobs, 2 are allowed"));
+    assert_in_range(intake_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 3600);
+    assert_int_equal(send(&room, "bob", NULL, 0.012, 20000, &jobs[2], NULL), STATUS_OK);
+    for (double at = 0.02; at < 0.025; at += 0.001) { // nobody in particular has none
+        assert_int_equal(send(&room, NULL, NULL, at, 20000, &more, NULL), STATUS_OK);
+        dismiss(&room, more);
+    }
+    dismiss(&room, jobs[1]);
+    assert_int_equal(send(&room, "ann", NULL, 0.013, 20000, &jobs[1], NULL), STATUS_OK);
+    for (size_t i = 0; i < 3; i++)
+        dismiss(&room, jobs[i]);
+    room_end(&room);
+}
+
+static void a_quota_counts_the_jobs_of_an_earlier_life(void **state) {
+    (void)state;
+    Room room = room_make(1, 1, 0);
+    Job *job, *more;
+    bool is_kept = false;
+    assert_int_equal(send(&room, "ann", NULL, 0.010, 20000, &job, NULL), STATUS_OK);
+    while (!is_kept)
+        assert_int_equal(job_kept(job, &is_kept, &problem), STATUS_OK);
+    job_drop(job);
+    room_close(&room);
+    room_open(&room);
+    assert_int_equal(send(&room, "ann", NULL, 0.011, 20000, &more, NULL), STATUS_QUOTA);
+    assert_int_equal(send(&room, "bob", NULL, 0.011, 20000, &more, NULL), STATUS_OK);
+    job_drop(more);
+    room_end(&room);
+}
+
+static void a_token_sends_no_more_than_its_rate(void **state) {
+    (void)state;
+    Room room = room_make(1, 0, 3);
+    Job *job;
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(send(&room, "ann", NULL, 0.015, 1, &job, NULL), STATUS_OK);
+        wait_for(job);
+        job_drop(job);
+    }
+    assert_int_equal(send(&room, "ann", NULL, 0.015, 1, &job, NULL), STATUS_QUOTA);
+    // One every 20 s.
+    assert_in_range(intake_retry_after(room.intake, "ann", STATUS_QUOTA), 1, 20);
+    assert_int_equal(send(&room, "bob", NULL, 0.015, 1, &job, NULL), STATUS_OK);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void keys_are_each_clients_own(void **state) {
+    (void)state;
+    Room room = room_make(1, 0, 0);
+    Job *ann, *again, *bob, *nobody;
+    bool is_replayed = true;
+    assert_int_equal(send(&room, "ann", "k", 0.015, 1, &ann, &is_replayed), STATUS_OK);
+    assert_false(is_replayed);
+    assert_int_equal(send(&room, "ann", "\"k\"", 0.015, 1, &again, &is_replayed), STATUS_OK);
+    assert_true(is_replayed);
+    JobShow first, second;
+    assert_int_equal(job_show(ann, &first), STATUS_OK);
+    assert_int_equal(job_show(again, &second), STATUS_OK);
+    assert_string_equal(first.id, second.id);
+    assert_int_equal(send(&room, "bob", "k", 0.016, 1, &bob, &is_replayed), STATUS_OK);
+    assert_false(is_replayed);
+    assert_int_equal(send(&room, NULL, "k", 0.017, 1, &nobody, &is_replayed), STATUS_OK);
+    assert_false(is_replayed);
+    wait_for(ann);
+    job_drop(again);
+    assert_int_equal(send(&room, "ann", "k", 0.016, 1, &again, &is_replayed), STATUS_REUSED);
+    job_show_clear(&first);
+    job_show_clear(&second);
+    job_drop(ann);
+    job_drop(bob);
+    job_drop(nobody);
+    room_end(&room);
+}
+
+static void a_key_that_is_none_is_refused(void **state) {
+    (void)state;
+    Room room = room_make(1, 0, 0);
+    char longest[300];
+    memset(longest, 'k', sizeof longest);
+    longest[256] = '\0';
+    const char *const bad[] = {"", "\"\"", "a\"b", "a\\b", "a\tb", "\xc3\xa4", longest};
+    Job *job;
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        assert_int_equal(send(&room, NULL, bad[i], 0.015, 1, &job, NULL), STATUS_USAGE);
+        assert_null(job);
+    }
+    longest[255] = '\0';
+    assert_int_equal(send(&room, NULL, longest, 0.015, 1, &job, NULL), STATUS_OK);
+    wait_for(job);
+    job_drop(job);
+    room_end(&room);
+}
+
+static void quick_jobs_go_beside_slow_ones_that_have_every_worker(void **state) {
+    (void)state;
+    Room room = room_make(2, 0, 0);
+    Job *slow[5], *quick;
+    for (size_t i = 0; i < 5; i++)
+        assert_int_equal(send(&room, NULL, NULL, 0.01 + 0.001 * (double)i, 30000, &slow[i], NULL),
+                         STATUS_OK);
+    assert_int_equal(send(&room, NULL, NULL, 0.02, 1, &quick, NULL), STATUS_OK);
+    wait_for(quick);
+    size_t unfinished = 0;
+    for (size_t i = 0; i < 5; i++)
+        unfinished += !job_is_finished(slow[i]);
+    assert_true(unfinished >= 2);
+    job_drop(quick);
+    for (size_t i = 0; i < 5; i++)
+        job_drop(slow[i]);
+    room_end(&room);
+}
+
+static void a_deleted_result_is_known_no_more(void **state) {
+    (void)state;
+    Room room = room_make(1, 0, 0);
+    Job *job, *found;
+    assert_int_equal(send(&room, NULL, NULL, 0.015, 1, &job, NULL), STATUS_OK);
+    wait_for(job);
+    JobShow now, later;
+    assert_int_equal(job_show(job, &now), STATUS_OK);
+    assert_int_equal(intake_delete(room.intake, now.result, &problem), STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(intake_delete(room.intake, now.result, &problem), STATUS_NOT_FOUND);
+    assert_int_equal(intake_find(room.intake, now.id, &found, NULL), STATUS_OK);
+    assert_int_equal(job_show(found, &later), STATUS_OK);
+    assert_true(later.is_result_deleted);
+    job_show_clear(&later);
+    job_drop(found);
+    assert_int_equal(send(&room, NULL, NULL, 0.015, 1, &found, NULL), STATUS_OK);
+    wait_for(found);
+    assert_int_equal(job_show(found, &later), STATUS_OK);
+    assert_false(later.is_cached);
+    assert_string_equal(later.result, now.result);
+    job_show_clear(&later);
+    job_show_clear(&now);
+    job_drop(found);
+    job_drop(job);
+    room_end(&room);
+}
+
+static size_t count_jobs(Store *store) {
+    JobRows rows;
+    const JobSearch all = job_search_all(1000);
+    assert_int_equal(store_job_search(store, &all, &rows, &problem), STATUS_OK);
+    const size_t count = rows.count;
+    job_rows_clear(&rows);
+    return count;
+}
+
+static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(void **state) {
+    (void)state;
+    Room room = room_make(1, 0, 0);
+    Job *job;
+    Removed removed;
+    for (size_t i = 0; i < 200; i++) {
+        // Each scene twice.
+        assert_int_equal(send(&room, NULL, NULL, 0.001 * (double)(i / 2 + 1), 0.5, &job, NULL),
+                         STATUS_OK);
+        wait_for(job);
+        job_drop(job);
+    }
+    const JobRow unfinished = {.id = "j-0", .scene = "{}", .warnings = "[]", .created_unix_ms = 1};
+    assert_int_equal(store_job_add(room.store, &unfinished, &problem), STATUS_OK);
+    const KeepRules none = {0}, jobs = {.jobs = 31}, days = {.days = 1000}, bytes = {.bytes = 1};
+    assert_int_equal(store_remove(room.store, &none, &removed, &problem), STATUS_OK);
+    assert_false(removed.is_more);
+    assert_int_equal(store_remove(room.store, &days, &removed, &problem), STATUS_OK);
+    assert_false(removed.is_more);
+    size_t steps = 0, results = 0;
+    do {
+        assert_int_equal(store_remove(room.store, &jobs, &removed, &problem), STATUS_OK);
+        assert_true(removed.jobs <= RETENTION_BATCH);
+        results += removed.results;
+    } while (removed.is_more && ++steps < 100);
+    assert_int_equal(count_jobs(room.store), 31 + 1);
+    assert_int_equal(results, 84); // of 169 jobs; the last one's result is named by one that stays
+    for (steps = 0; steps < 100; steps++) {
+        assert_int_equal(store_remove(room.store, &bytes, &removed, &problem), STATUS_OK);
+        if (removed.jobs == 0)
+            break;
+    }
+    assert_int_equal(count_jobs(room.store), 1); // what is unfinished stays
+    room_end(&room);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_token_has_no_more_unfinished_jobs_than_its_quota),
+        cmocka_unit_test(a_quota_counts_the_jobs_of_an_earlier_life),
+        cmocka_unit_test(a_token_sends_no_more_than_its_rate),
+        cmocka_unit_test(keys_are_each_clients_own),
+        cmocka_unit_test(a_key_that_is_none_is_refused),
+        cmocka_unit_test(quick_jobs_go_beside_slow_ones_that_have_every_worker),
+        cmocka_unit_test(a_deleted_result_is_known_no_more),
+        cmocka_unit_test(what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
