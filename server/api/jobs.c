@@ -141,6 +141,29 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
     job_show_clear(&show);
 }
 
+static bool answer_known(App *app, const Submission *submission, Reply *reply) {
+    KnownAnswer known;
+    if (submission->idempotency_key != NULL || !intake_known(app->intake, submission, &known))
+        return false;
+    reply_borrow(reply, 200, type_json, known.body, known.size);
+    reply->release = free;
+    reply->context = known.body;
+    return true;
+}
+
+// What was answered before is answered on the event loop; anything else is left to jobs_create.
+Status jobs_create_known(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const Submission submission = {.text = request->body,
+                                   .size = request->body_size,
+                                   .client = request->client,
+                                   .idempotency_key = request->idempotency_key};
+    if (request->query_count == 0 && request->prefer == NULL && !atomic_load(&app->is_stopping)) {
+        TRY(body_require_json(request, problem));
+        (void)answer_known(app, &submission, reply);
+    }
+    return STATUS_OK;
+}
+
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
@@ -160,13 +183,8 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
                                        .client = request->client,
                                        .idempotency_key = request->idempotency_key,
                                        .is_replayed = &reply->is_replayed};
-        KnownAnswer known;
-        if (request->idempotency_key == NULL && intake_known(app->intake, &submission, &known)) {
-            reply_borrow(reply, 200, type_json, known.body, known.size);
-            reply->release = free;
-            reply->context = known.body;
+        if (answer_known(app, &submission, reply))
             return STATUS_OK;
-        }
         const uint64_t mark = intake_mark(app->intake);
         const Status status = intake_submit(app->intake, &submission, &job, problem);
         if (status == STATUS_BUSY || status == STATUS_QUOTA)

@@ -3,7 +3,8 @@
 #include "server/api/app.h"
 
 static const char *const of_submit[] = {"dry_run", NULL};
-static const char *const of_jobs[] = {"limit", "before", "status", "q", "label", "result", "kind", "since", "until", NULL};
+static const char *const of_jobs[] = {"limit",  "before", "status", "q",     "label",
+                                      "result", "kind",   "since",  "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_force[] = {"points", NULL};
@@ -61,6 +62,7 @@ const Route routes[] = {
 // clang-format on
 
 const QuickHandler quick_handlers[] = {
+    {jobs_create, jobs_create_known},
     {health_live, health_live},
     {health_ready, health_ready},
     {version_show, version_show},
