@@ -62,7 +62,7 @@ const Route routes[] = {
 // clang-format on
 
 const QuickHandler quick_handlers[] = {
-    {jobs_create, jobs_create_known},
+    {jobs_create, jobs_create_quick},
     {health_live, health_live},
     {health_ready, health_ready},
     {version_show, version_show},
