@@ -20,6 +20,7 @@ const Route routes[] = {
     {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss},
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
     {"DELETE", "/v1/results/{id}",                      "submit", NULL,         "Delete a result; its jobs stay", results_delete},
+    {"POST",   "/v1/results/{id}/again",                "submit", NULL,         "Submit its scene anew", results_again},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
     {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", results_series},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
