@@ -105,6 +105,8 @@ enum {
     FIELD_LONE = 8,
     // TEXTS: a text allowed may carry a number from 1: "displacement_2".
     FIELD_NUMBERED = 16,
+    // TEXTS: each is a JSON number, string, true or false, kept as JSON text.
+    FIELD_SCALARS = 32,
 };
 
 struct Field {

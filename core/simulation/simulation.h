@@ -51,6 +51,7 @@ typedef struct SimulationLimits {
     // SIMULATION_PATIENCE times as many where it was foretold too little. 0: none.
     double steps;
     double bytes; // of memory that a run may be foretold to take; 0: none
+    size_t points; // of a sweep; 0: the usual
 } SimulationLimits;
 
 #define SIMULATION_PATIENCE 3

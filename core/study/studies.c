@@ -4,6 +4,7 @@
 const StudyKind *const studies[] = {
     &study_tradeoff,
     &study_ensemble,
+    &study_sweep,
     NULL,
 };
 

@@ -25,6 +25,7 @@ extern const char program_build[];   // the compiler
 Handler jobs_create, jobs_list, jobs_show, jobs_dismiss;
 Handler results_show, results_manifest, results_series, results_psd, results_impacts,
     results_energy, results_tradeoff, results_ensemble;
+Handler sweeps_table, sweeps_point, sweeps_scene, sweeps_retry;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, version_show, landing_show;

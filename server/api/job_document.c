@@ -18,8 +18,11 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
     bytes_text(bytes, json != NULL ? json : "null");
 }
 
-static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result) {
+static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
+                        bool has_table) {
     bytes_format(bytes, ", \"links\": {\"self\": \"/v1/jobs/%s\"", id);
+    if (has_table)
+        bytes_format(bytes, ", \"table\": \"/v1/jobs/%s/table.json\"", id);
     if (has_result)
         bytes_format(bytes,
                      ", \"result\": \"/v1/results/%s\", \"series\": \"/v1/results/%s/series.json\"",
@@ -37,6 +40,10 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     }
     bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
     bytes_real(bytes, show->progress);
+    if (show->points > 0)
+        bytes_format(bytes, ", \"points\": {\"all\": %llu, \"done\": %llu, \"failed\": %llu}",
+                     (unsigned long long)show->points, (unsigned long long)show->points_done,
+                     (unsigned long long)show->points_failed);
     bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
     bytes_json_string(bytes, has_result ? show->result : NULL);
     write_time(bytes, "created", show->created_unix_ms);
@@ -58,7 +65,7 @@ void job_put(Bytes *bytes, const JobShow *show, int parts) {
     bytes_real(bytes, show->total);
     bytes_text(bytes, "}");
     if (parts & JOB_PUT_LINKS)
-        write_links(bytes, show->id, show->result, has_result);
+        write_links(bytes, show->id, show->result, has_result, show->points > 0);
     else
         bytes_text(bytes, ", \"links\": {}");
     bytes_text(bytes, "}");

@@ -74,7 +74,9 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
         bytes_format(bytes, ", \"%.*s\": \"/v1/results/%s/%s\"", (int)size, ways[i], id, ways[i]);
     }
     if (answer->study != NULL) {
-        const char *name = answer->study->kind->name;
+        // A sweep's rows are a table of their own.
+        const bool is_table = answer->study->kind == study_sweep.answer;
+        const char *name = is_table ? "table" : answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);
         bytes_format(bytes, ", \"%s\": \"/v1/results/%s/%s.json\"", name, id, name);
         while ((++format)->extension != NULL)

@@ -7,6 +7,7 @@
 #include "server/encode/chart_ensemble.h"
 #include "server/encode/ensemble_csv.h"
 #include "server/encode/svg.h"
+#include "server/encode/sweep_table.h"
 #include "server/jobs/documents.h"
 
 static void json_write(const Variant *answer, Bytes *bytes) {
@@ -26,6 +27,14 @@ static void ensemble_table(const Variant *answer, Bytes *bytes) {
     ensemble_csv((const Ensemble *)(const void *)answer, bytes);
 }
 
+static void sweep_whole(const Variant *answer, Bytes *bytes) {
+    sweep_json((const Sweep *)(const void *)answer, NULL, bytes);
+}
+
+static void sweep_table(const Variant *answer, Bytes *bytes) {
+    sweep_csv((const Sweep *)(const void *)answer, bytes);
+}
+
 static const struct {
     const StudyKind *study;
     AnswerFormat formats[ANSWER_FORMATS];
@@ -38,6 +47,10 @@ static const struct {
      {{"json", "application/json", json_write},
       {"csv", "text/csv; charset=utf-8", ensemble_table},
       {"svg", svg_type, ensemble_chart},
+      {NULL, NULL, NULL}}},
+    {&study_sweep,
+     {{"json", "application/json", sweep_whole},
+      {"csv", "text/csv; charset=utf-8", sweep_table},
       {NULL, NULL, NULL}}},
 };
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
@@ -25,6 +25,7 @@ Computation *computation_new(const char *result) {
 void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
+    sweep_free(computation->sweep);
     inquiry_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
@@ -100,6 +101,7 @@ void intake_detach(Job *job) {
     index_remove(job->intake->in_flight, &computation->indexed);
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
+        pthread_cond_broadcast(&job->intake->work); // a sweep that no worker has in hand
     } else {
         dequeue(job->intake, computation);
         computation_free(computation);
@@ -146,7 +148,11 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->settings.queue_bytes == 0)
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
-    pthread_cond_init(&intake->work, NULL);
+    pthread_condattr_t by_monotonic;
+    pthread_condattr_init(&by_monotonic);
+    pthread_condattr_setclock(&by_monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&intake->work, &by_monotonic);
+    pthread_condattr_destroy(&by_monotonic);
     intake->jobs = index_new();
     intake->in_flight = index_new();
     intake->cache = cache_new(settings->cache_bytes);
@@ -155,6 +161,8 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
         intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
+    if (status == STATUS_OK)
+        status = store_sweep_tidy(store, problem);
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
     while (status == STATUS_OK && intake->worker_count < settings->workers) {
@@ -195,6 +203,8 @@ void intake_close(Intake *intake) {
     for (size_t i = 0; i < intake->worker_count; i++)
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
+    for (SweepRun *run = intake->sweeps; run != NULL; run = run->next)
+        atomic_store(&run->computation->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
     pthread_mutex_unlock(&intake->lock);
     for (size_t i = 0; i < intake->worker_count; i++)
@@ -203,6 +213,11 @@ void intake_close(Intake *intake) {
     while (intake->first != NULL) {
         Computation *computation = intake->first;
         dequeue(intake, computation);
+        let_go(computation);
+    }
+    while (intake->sweeps != NULL) {
+        Computation *computation = intake->sweeps->computation;
+        intake->sweeps = intake->sweeps->next;
         let_go(computation);
     }
     // Those whose end could not be stored are still here.

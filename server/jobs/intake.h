@@ -37,12 +37,21 @@ typedef struct Submission {
     const char *text; // the scene's JSON, perhaps with a study
     size_t size;
     const char *client; // its token's name; NULL: nobody in particular
+    bool is_retry;      // also where its result is known: a sweep's open chunks are made again
 } Submission;
 
 // Accepts a scene: a job of its own, durable when this returns. Known results finish it at once
 // (cached), a scene in flight shares that computation. STATUS_BUSY when the queue is full,
 // STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
+
+// The id of the result that a job makes, has made or would have.
+Status intake_result_of(Intake *intake, const char *id, char result[72], Problem *problem);
+
+// Has those points of a finished job's sweep that failed made again, by a job of its own.
+// STATUS_CONFLICT where none failed or it is not finished, STATUS_GONE for another engine version.
+Status intake_retry(Intake *intake, const char *id, const char *client, Job **job,
+                    Problem *problem);
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {

@@ -12,6 +12,8 @@
 
 enum { OUTCOME_FAILURES = 64 };
 
+struct SweepRun;
+
 typedef struct Wakers {
     Waker *at;
     size_t count;
@@ -30,6 +32,7 @@ typedef struct Computation {
     Wakers askers; // readers of the outcome
     atomic_bool is_stopped;
     atomic_uint progress; // in 1/10,000
+    struct SweepRun *sweep; // of a sweep that is under way, under the lock
 } Computation;
 
 struct Job {
@@ -58,6 +61,9 @@ typedef struct Worker {
     Intake *intake;
     pthread_t thread;
     Computation *running; // or NULL
+    struct SweepRun *sweep; // of which it has a chunk in hand, or NULL
+    size_t chunk;
+    int64_t served_ns; // to ordinary jobs since its last turn on a sweep
     Workspace workspace;  // of its thread alone
 } Worker;
 
@@ -74,6 +80,7 @@ struct Intake {
     Index *jobs;      // not yet finished
     Index *in_flight; // computations
     Computation *first, *last;
+    struct SweepRun *sweeps; // under way; whose turn is next stands first
     size_t queued, live; // computations in the queue; jobs not yet finished
     size_t scene_bytes;  // of all live jobs
     Cache *cache;

@@ -41,6 +41,7 @@ typedef struct JobShow {
     char *warnings; // JSON array, of the scene
     char *notes;    // JSON array, of the run; NULL: none
     char *title;    // NULL if none
+    uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobShow;
 
 Job *job_hold(Job *job);

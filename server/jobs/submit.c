@@ -160,8 +160,9 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
-    const Status known = find_known(intake, job, problem);
+static Status submit(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry,
+                     Problem *problem) {
+    const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
     if (known == STATUS_OK)
         return finish_known(intake, job, problem);
     if (known != STATUS_NOT_FOUND)
@@ -192,7 +193,7 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
-        status = submit(intake, job, &inquiry, problem);
+        status = submit(intake, job, &inquiry, submission->is_retry, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {

@@ -4,12 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
@@ -27,18 +28,7 @@ static bool advance(void *context, double fraction) {
     return !atomic_load(&part->computation->is_stopped);
 }
 
-// What a computation came to, as documents.
-typedef struct Findings {
-    Status status;
-    Outcome *outcome;   // NULL unless STATUS_OK
-    StudyAnswer answer; // its study NULL where none was asked for
-    ResultRow result;
-    char *problem; // of failed jobs
-    char detail[256];
-    int64_t began_ns, ended_ns;
-} Findings;
-
-static void findings_clear(Findings *findings) {
+void findings_clear(Findings *findings) {
     outcome_drop(findings->outcome);
     fields_clear(study_answer_fields, &findings->answer);
     result_row_clear(&findings->result);
@@ -93,7 +83,7 @@ static Status describe(const Computation *computation, Findings *findings) {
                                                                               : status;
 }
 
-static void fail(Findings *findings, Status status, const Problem *problem) {
+void findings_fail(Findings *findings, Status status, const Problem *problem) {
     findings->status = status;
     text_fit(findings->detail, sizeof findings->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
@@ -115,6 +105,8 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
                               .watch = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
+    if (study_kind(computation->inquiry.study) == &study_sweep)
+        return sweep_open(worker, computation, findings, &watch, problem);
     return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
                      &findings->answer.study, problem);
 }
@@ -140,7 +132,7 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
             (void)problem_set(problem, status, "no memory for the result's documents");
     }
     if (status != STATUS_OK)
-        fail(findings, status, problem);
+        findings_fail(findings, status, problem);
     findings->status = status;
 }
 
@@ -166,8 +158,7 @@ static size_t close_jobs(Computation *computation, const Findings *findings, Job
     return count;
 }
 
-// A full disk and the like pass; then the jobs are worth another try.
-static bool is_passing(Status status) {
+bool status_is_passing(Status status) {
     return status == STATUS_IO || status == STATUS_BUSY || status == STATUS_NO_MEMORY;
 }
 
@@ -176,7 +167,7 @@ static Status save(Intake *intake, const Findings *findings, Job *const *jobs,
                    const JobRow *const *rows, size_t count, Problem *problem) {
     const ResultRow *result = findings->status == STATUS_OK ? &findings->result : NULL;
     const Status status = store_result_save(intake->store, result, rows, count, problem);
-    if (status == STATUS_OK || is_passing(status))
+    if (status == STATUS_OK || status_is_passing(status))
         return status;
     for (size_t i = 0; i < count; i++) {
         Bytes bytes = {.most = 1 << 20};
@@ -228,8 +219,8 @@ static void tell_askers(Intake *intake, Computation *computation, const Findings
     wakers_call(&computation->askers);
 }
 
-static void finish(Intake *intake, Computation *computation, const Findings *findings,
-                   Problem *problem) {
+void computation_finish(Intake *intake, Computation *computation, const Findings *findings,
+                        Problem *problem) {
     enum { BATCH = 256 };
     Job *jobs[BATCH];
     const JobRow *rows[BATCH];
@@ -267,9 +258,7 @@ static void finish(Intake *intake, Computation *computation, const Findings *fin
     pthread_mutex_unlock(&intake->lock);
 }
 
-// With the lock held: nobody waits for it any more, or the daemon ends and its jobs stay unfinished
-// in the store.
-static void abandon(Intake *intake, Computation *computation) {
+void computation_abandon(Intake *intake, Computation *computation) {
     index_remove(intake->in_flight, &computation->indexed);
     while (computation->jobs != NULL) {
         Job *job = computation->jobs;
@@ -283,12 +272,12 @@ static void abandon(Intake *intake, Computation *computation) {
     wakers_call(&computation->askers);
 }
 
-static Computation *next_computation(Worker *worker) {
+// Of a worker's time ordinary jobs get so much before a sweep that waits has its turn, and that so
+// much at least.
+static const int64_t jobs_turn_ns = 50000000, sweep_turn_ns = 10000000;
+
+static Computation *take_computation(Worker *worker) {
     Intake *intake = worker->intake;
-    while (intake->first == NULL && !intake->is_closing)
-        pthread_cond_wait(&intake->work, &intake->lock);
-    if (intake->is_closing)
-        return NULL;
     Computation *computation = intake->first;
     intake->first = computation->next;
     if (intake->first == NULL)
@@ -307,25 +296,84 @@ static Computation *next_computation(Worker *worker) {
     return computation;
 }
 
+// What a worker does next: a computation, a part of a sweep, or the end of one (no part).
+typedef struct Task {
+    Computation *computation;
+    SweepRun *sweep;
+    SweepPart *part;
+} Task;
+
+static void wait_for_work(Intake *intake, int64_t until_ns) {
+    if (until_ns == 0) {
+        pthread_cond_wait(&intake->work, &intake->lock);
+        return;
+    }
+    const struct timespec until = {until_ns / 1000000000, until_ns % 1000000000};
+    (void)pthread_cond_timedwait(&intake->work, &intake->lock, &until);
+}
+
+// With the lock held. False when the daemon ends.
+static bool next_task(Worker *worker, Task *task) {
+    Intake *intake = worker->intake;
+    *task = (Task){NULL, NULL, NULL};
+    worker->sweep = NULL;
+    while (!intake->is_closing) {
+        int64_t until_ns = 0;
+        const bool is_jobs_turn = intake->first != NULL && worker->served_ns < jobs_turn_ns;
+        if (!is_jobs_turn &&
+            (task->sweep = sweep_next(intake, &task->part, &until_ns)) != NULL) {
+            worker->sweep = task->sweep;
+            worker->chunk = task->part != NULL ? task->part->chunk : SIZE_MAX;
+            return true;
+        }
+        if (intake->first != NULL) {
+            task->computation = take_computation(worker);
+            return true;
+        }
+        wait_for_work(intake, until_ns);
+    }
+    return false;
+}
+
+static void compute(Worker *worker, Computation *computation, Problem *problem) {
+    Intake *intake = worker->intake;
+    Findings findings = {0};
+    const int64_t began_ns = clock_monotonic_ns();
+    run(worker, computation, &findings, problem);
+    worker->served_ns += clock_monotonic_ns() - began_ns;
+    const bool is_launched = findings.status == STATUS_OK && computation->sweep != NULL;
+    if (findings.status != STATUS_CANCELLED && !is_launched)
+        computation_finish(intake, computation, &findings, problem);
+    pthread_mutex_lock(&intake->lock);
+    worker->running = NULL;
+    if (findings.status == STATUS_CANCELLED)
+        computation_abandon(intake, computation);
+    pthread_mutex_unlock(&intake->lock);
+    if (is_launched) {
+        sweep_launch(intake, computation, &findings, problem); // takes both
+        return;
+    }
+    computation_free(computation);
+    findings_clear(&findings);
+}
+
 void *worker_main(void *context) {
     Worker *worker = context;
     Intake *intake = worker->intake;
     Problem problem; // large, but a thread's stack is larger
+    Task task;
     pthread_mutex_lock(&intake->lock);
-    Computation *computation;
-    while ((computation = next_computation(worker)) != NULL) {
+    while (next_task(worker, &task)) {
         pthread_mutex_unlock(&intake->lock);
-        Findings findings = {0};
-        run(worker, computation, &findings, &problem);
-        if (findings.status != STATUS_CANCELLED)
-            finish(intake, computation, &findings, &problem);
-        pthread_mutex_lock(&intake->lock);
-        worker->running = NULL;
-        if (findings.status == STATUS_CANCELLED)
-            abandon(intake, computation);
-        pthread_mutex_unlock(&intake->lock);
-        computation_free(computation);
-        findings_clear(&findings);
+        if (task.computation != NULL) {
+            compute(worker, task.computation, &problem);
+        } else if (task.part != NULL) {
+            const bool is_due = worker->served_ns >= jobs_turn_ns;
+            worker->served_ns = 0;
+            sweep_work(worker, task.sweep, task.part, is_due ? sweep_turn_ns : 0, &problem);
+        } else {
+            sweep_end(intake, task.sweep, &problem);
+        }
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);

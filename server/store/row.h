@@ -18,6 +18,7 @@ typedef enum ColumnKind {
     COLUMN_COUNT,   // uint64_t, size_t
     COLUMN_CHOICE,  // int
     COLUMN_FLAG,    // bool
+    COLUMN_BYTES,   // StoredBytes, owned
 } ColumnKind;
 
 typedef struct RowColumn {

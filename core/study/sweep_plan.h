@@ -1,0 +1,47 @@
+// The points of a sweep made ready: point i's scene is computed from i alone. Shared by threads,
+// never changes. Not runs: sweep_run.h. Used by sweep.c and server/jobs.
+#ifndef CORE_STUDY_SWEEP_PLAN_H
+#define CORE_STUDY_SWEEP_PLAN_H
+
+#include "core/base/pointer.h"
+#include "core/study/sweep.h"
+
+// An axis's values, read.
+typedef struct SweepValues {
+    const char *pointer;
+    size_t count, stride; // point p has value (p / stride) % count
+    Scalar *at;
+    char *texts; // of all its values
+    const Field *field;
+    bool is_tag;
+} SweepValues;
+
+typedef struct SweepPlan {
+    const SweepStudy *study;
+    const Simulation *simulation;
+    size_t points, axis_count;
+    SweepValues *axes;
+} SweepPlan;
+
+// Borrows both, which must be completed (the study: by rows at least). Adds the faults of axes
+// below "/study/axes", all of them; `limits` NULL: as many points as there are. Freed by
+// sweep_plan_free.
+Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
+                      const SimulationLimits *limits, SweepPlan **plan, Problem *problem);
+void sweep_plan_free(SweepPlan *plan);
+
+// The completed scene of a point: as the sweep's own, with this point's values. `is_bare`: nothing
+// sampled, as a row needs it. Cleared by simulation_clear in any case. Faults are the scene's.
+Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
+                   const SimulationLimits *limits, Simulation *target, Problem *problem);
+
+// Judges every point, or (`is_sample`) those where one axis alone leaves its first value, and the
+// last one. Each fault stands at the value it comes of and says which point it is of. `watch` may
+// stop it.
+Status sweep_check(const SweepPlan *plan, bool is_sample, const SimulationLimits *limits,
+                   const Watch *watch, Problem *problem);
+
+// Solver steps foretold for all, from some points spread over them.
+double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits);
+
+#endif
