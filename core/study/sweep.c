@@ -109,14 +109,9 @@ static void fill_spacing(SweepAxes *axes) {
 static Status study_complete(Study *asked, const Simulation *simulation,
                              const SimulationLimits *limits, Problem *problem) {
     SweepStudy *study = (SweepStudy *)(void *)asked;
-    SweepPlan *plan;
     fill_spacing(&study->axes);
     const Status metrics = check_metrics(study, problem);
-    Status status = sweep_plan_new(study, simulation, limits, &plan, problem);
-    // Without limits it was judged before.
-    if (status == STATUS_OK && limits != NULL)
-        status = sweep_check(plan, plan->points > CHECKED_AT_ONCE, limits, NULL, problem);
-    sweep_plan_free(plan);
+    const Status status = sweep_judge(study, simulation, CHECKED_AT_ONCE, limits, problem);
     return status == STATUS_OK ? metrics : status;
 }
 

@@ -154,6 +154,8 @@ static Status apply(const SweepPlan *plan, size_t point, Simulation *target, siz
     TRY(fields_copy(simulation_fields, plan->simulation, target));
     for (size_t i = 0; i < plan->axis_count; i++) {
         const SweepValues *values = &plan->axes[i];
+        if (values->field == NULL)
+            continue; // its pointer leads nowhere, which was told
         *axis = i;
         TRY(part_buffers(values->pointer, target));
         TRY(pointer_set(simulation_fields, target, values->pointer,
@@ -379,8 +381,9 @@ static Status check_size(const SweepStudy *study, const SimulationLimits *limits
     return STATUS_OK;
 }
 
-Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
-                      const SimulationLimits *limits, SweepPlan **made, Problem *problem) {
+// A plan whose pointers are faulty is made all the same: STATUS_INVALID, and *made is not NULL.
+static Status plan_make(const SweepStudy *study, const Simulation *simulation,
+                        const SimulationLimits *limits, SweepPlan **made, Problem *problem) {
     SweepPlan *plan = calloc(1, sizeof *plan);
     *made = NULL;
     if (plan == NULL)
@@ -407,12 +410,34 @@ Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
         stride *= values->count;
         status = read_values(&study->axes.at[i], values, problem);
     }
-    if (status == STATUS_OK)
-        status = check_pointers(plan, problem);
     if (status != STATUS_OK) {
         sweep_plan_free(plan);
         return status;
     }
     *made = plan;
-    return STATUS_OK;
+    return check_pointers(plan, problem);
+}
+
+Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
+                      const SimulationLimits *limits, SweepPlan **made, Problem *problem) {
+    const Status status = plan_make(study, simulation, limits, made, problem);
+    if (status != STATUS_OK) {
+        sweep_plan_free(*made);
+        *made = NULL;
+    }
+    return status;
+}
+
+Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t at_once,
+                   const SimulationLimits *limits, Problem *problem) {
+    SweepPlan *plan;
+    Status status = plan_make(study, simulation, limits, &plan, problem);
+    // Without limits it was judged before.
+    if (plan != NULL && limits != NULL) {
+        const Status points =
+            sweep_check(plan, plan->points > at_once, limits, NULL, problem);
+        status = status == STATUS_OK ? points : status;
+    }
+    sweep_plan_free(plan);
+    return status;
 }

@@ -41,6 +41,11 @@ Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
 Status sweep_check(const SweepPlan *plan, bool is_sample, const SimulationLimits *limits,
                    const Watch *watch, Problem *problem);
 
+// Judges axes and points, all points where they are at most `at_once`, else the sample of them;
+// `limits` NULL: the axes alone.
+Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t at_once,
+                   const SimulationLimits *limits, Problem *problem);
+
 // Solver steps foretold for all, from some points spread over them.
 double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits);
 

@@ -13,17 +13,10 @@
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep_rows.h"
 
-enum { RESULT_SIZE = 72 };
-
-// A path begins with a result or with the job that makes it.
-static Status find_result(App *app, const Request *request, char result[RESULT_SIZE],
-                          Problem *problem) {
-    static const char of_jobs[] = "/v1/jobs/";
-    if (strncmp(request->path, of_jobs, sizeof of_jobs - 1) != 0) {
-        text_fit(result, RESULT_SIZE, request->parameters[0]);
-        return STATUS_OK;
-    }
-    return intake_result_of(app->intake, request->parameters[0], result, problem);
+// A path begins with a result, or with the job that makes it.
+static bool is_of_job(const Request *request) {
+    static const char jobs[] = "/v1/jobs/";
+    return strncmp(request->path, jobs, sizeof jobs - 1) == 0;
 }
 
 // By the extension in the path, else by Accept.
@@ -69,15 +62,14 @@ static bool is_known(const Request *request, Reply *reply, const SweepShow *show
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
     const AnswerFormat *format;
-    char result[RESULT_SIZE];
     SweepShow show = {.sweep = NULL};
     TRY(choose_format(request, reply, &format, problem));
-    TRY(find_result(app, request, result, problem));
-    Status status = sweep_show_load(app->store, result, true, &show, problem);
+    Status status = sweep_show_load(app->store, request->parameters[0], is_of_job(request), true,
+                                    &show, problem);
     if (status == STATUS_OK && !is_known(request, reply, &show, format->extension)) {
         Bytes bytes = {.most = app->reply_most};
         if (format == answer_formats(study_sweep.answer))
-            sweep_json(show.sweep, result, &bytes);
+            sweep_json(show.sweep, show.row.result, &bytes);
         else
             format->write((const Variant *)(const void *)show.sweep, &bytes);
         status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
@@ -130,7 +122,7 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
     SweepShow show = {.sweep = NULL};
     SweepPointShow point = {.values = NULL};
     TRY(read_index(request, &index, problem));
-    Status status = sweep_show_load(app->store, request->parameters[0], false, &show, problem);
+    Status status = sweep_show_load(app->store, request->parameters[0], false, false, &show, problem);
     if (status == STATUS_OK)
         status = sweep_point_load(app->store, &show, index, &point, problem);
     if (status == STATUS_OK) {

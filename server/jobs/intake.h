@@ -45,9 +45,6 @@ typedef struct Submission {
 // STATUS_INVALID with the faults. The Job is a hold of the caller's.
 Status intake_submit(Intake *intake, const Submission *submission, Job **job, Problem *problem);
 
-// The id of the result that a job makes, has made or would have.
-Status intake_result_of(Intake *intake, const char *id, char result[72], Problem *problem);
-
 // Has those points of a finished job's sweep that failed made again, by a job of its own.
 // STATUS_CONFLICT where none failed or it is not finished, STATUS_GONE for another engine version.
 Status intake_retry(Intake *intake, const char *id, const char *client, Job **job,

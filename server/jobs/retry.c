@@ -4,14 +4,6 @@
 
 #include "server/jobs/intake_state.h"
 
-Status intake_result_of(Intake *intake, const char *id, char result[72], Problem *problem) {
-    Job *job = NULL;
-    TRY(intake_find(intake, id, &job, problem));
-    memcpy(result, job->row.result, 72); // never changes
-    job_drop(job);
-    return STATUS_OK;
-}
-
 static Status judge(Intake *intake, const char *id, SweepRow *row, Problem *problem) {
     Job *job = NULL;
     char result[72];

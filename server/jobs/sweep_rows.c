@@ -25,7 +25,8 @@ static Status read_scene(SweepShow *show, Problem *problem) {
     const Variant *study = show->inquiry.study;
     return study != NULL && study_kind(study) == &study_sweep
                ? STATUS_OK
-               : problem_set(problem, STATUS_INTERNAL, "the stored scene asks for no sweep");
+               : problem_set(problem, STATUS_NOT_FOUND,
+                             "the scene asked for no sweep: submit it with a member study");
 }
 
 static const SweepStudy *study_of(const SweepShow *show) {
@@ -89,16 +90,33 @@ static Status fill(const SweepShow *show, const SweepChunkRows *chunks, Problem 
     return STATUS_OK;
 }
 
-Status sweep_show_load(Store *store, const char *result, bool has_rows, SweepShow *show,
+// A sweep that has not begun has no rows, but is one.
+static Status find(Store *store, const char *id, bool is_job, SweepRow *row, Problem *problem) {
+    SweepRow begun;
+    if (!is_job)
+        return store_sweep_load(store, id, row, problem);
+    TRY(store_sweep_asked(store, id, row, problem));
+    const Status status = store_sweep_load(store, row->result, &begun, NULL);
+    if (status == STATUS_OK) {
+        sweep_row_clear(row);
+        *row = begun;
+        return STATUS_OK;
+    }
+    return status == STATUS_NOT_FOUND
+               ? STATUS_OK
+               : problem_set(problem, status, "the sweeps cannot be searched");
+}
+
+Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
                        Problem *problem) {
     SweepChunkRows chunks = {NULL, 0};
     memset(show, 0, sizeof *show);
-    TRY(store_sweep_load(store, result, &show->row, problem));
+    TRY(find(store, id, is_job, &show->row, problem));
     TRY(read_scene(show, problem));
     TRY(tell(show, problem));
     TRY(store_sweep_chunks(store, show->row.number, has_rows, &chunks, problem));
     show->chunks_done = chunks.count;
-    show->is_complete = chunks.count == show->row.chunks;
+    show->is_complete = show->row.chunks > 0 && chunks.count == show->row.chunks;
     for (size_t i = 0; i < chunks.count; i++)
         show->is_complete = show->is_complete && !chunks.at[i].is_open;
     const Status status = has_rows ? fill(show, &chunks, problem) : STATUS_OK;

@@ -16,8 +16,9 @@ typedef struct SweepShow {
     bool is_complete; // every chunk is there and none is open
 } SweepShow;
 
-// By its result. `has_rows`: the table too. Cleared by sweep_show_clear in any case.
-Status sweep_show_load(Store *store, const char *result, bool has_rows, SweepShow *show,
+// By its result, or (`is_job`) by a job that makes it or did. `has_rows`: the table too. Cleared by
+// sweep_show_clear in any case.
+Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
                        Problem *problem);
 void sweep_show_clear(SweepShow *show);
 

@@ -124,6 +124,9 @@ void sweep_chunk_rows_clear(SweepChunkRows *rows);
 Status store_sweep_begin(Store *store, SweepRow *row, Problem *problem);
 // STATUS_NOT_FOUND. `row` may be uninitialised.
 Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem *problem);
+// What a job asked for, of which nothing may be written down yet: result and scene alone.
+// STATUS_NOT_FOUND.
+Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
 Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem);
 // All that are there, by chunk; `has_rows` false: without reasons and rows.

@@ -82,6 +82,16 @@ Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem
                                   result);
 }
 
+Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem) {
+    static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :result";
+    const SweepRow key = key_of(job);
+    bool is_found;
+    memset(row, 0, sizeof *row);
+    TRY(store_first(store, sql, sweep_columns, &key, sweep_columns, row, &is_found, problem));
+    return is_found ? STATUS_OK
+                    : problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", job);
+}
+
 static Status take(Database *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO sweep_chunks (sweep, chunk, failed, is_open, reasons, rows) VALUES (:sweep, "
