@@ -38,14 +38,16 @@ size_t sweep_points(const SweepStudy *study) {
     return points;
 }
 
+// Equal differences as they are: whole numbers stay whole.
 static double range_value(const SweepAxis *axis, size_t index) {
-    const double share = (double)index / (double)(axis->count - 1);
+    const double last = (double)(axis->count - 1);
     if (index == 0)
         return axis->from;
     if (index + 1 == axis->count)
         return axis->to;
-    return axis->spacing == SWEEP_LOGARITHMIC ? axis->from * pow(axis->to / axis->from, share)
-                                              : axis->from + (axis->to - axis->from) * share;
+    return axis->spacing == SWEEP_LOGARITHMIC
+               ? axis->from * pow(axis->to / axis->from, (double)index / last)
+               : axis->from + (axis->to - axis->from) / last * (double)index;
 }
 
 static Status no_memory(Problem *problem) {

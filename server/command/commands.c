@@ -10,6 +10,7 @@
 #include "server/command/import.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
+#include "server/command/sweep.h"
 #include "server/command/tradeoff.h"
 #include "server/options.h"
 
@@ -32,8 +33,9 @@ static const Command command_version = {
 
 const Command *const commands[] = {
     &command_serve,    &command_run,      &command_check,
-    &command_tradeoff, &command_ensemble, &command_import,
-    &command_help,     &command_version,  NULL,
+    &command_tradeoff, &command_ensemble, &command_sweep,
+    &command_import,   &command_help,     &command_version,
+    NULL,
 };
 
 static const char overview[] =
@@ -45,6 +47,7 @@ static const char overview[] =
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
+    "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "\n"
     "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"

@@ -5,6 +5,7 @@
 
 #include "server/encode/chart.h"
 #include "server/encode/chart_ensemble.h"
+#include "server/encode/chart_sweep.h"
 #include "server/encode/ensemble_csv.h"
 #include "server/encode/svg.h"
 #include "server/encode/sweep_table.h"
@@ -31,6 +32,10 @@ static void sweep_whole(const Variant *answer, Bytes *bytes) {
     sweep_json((const Sweep *)(const void *)answer, NULL, bytes);
 }
 
+static void sweep_chart(const Variant *answer, Bytes *bytes) {
+    chart_sweep((const Sweep *)(const void *)answer, bytes);
+}
+
 static void sweep_table(const Variant *answer, Bytes *bytes) {
     sweep_csv((const Sweep *)(const void *)answer, bytes);
 }
@@ -51,6 +56,7 @@ static const struct {
     {&study_sweep,
      {{"json", "application/json", sweep_whole},
       {"csv", "text/csv; charset=utf-8", sweep_table},
+      {"svg", svg_type, sweep_chart},
       {NULL, NULL, NULL}}},
 };
 

@@ -101,7 +101,12 @@ def test_real_answers_have_the_promised_shapes():
         tradeoff = {"id": study["result"]}
         many = program.finished(daemon, program.scene("ensemble_random_sponge"))
         ensemble = {"id": many["result"]}
-        values = {"/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
+        swept = program.finished(daemon, program.scene("sweep_frequency"))
+        sweep = {"id": swept["result"], "index": "7"}
+        values = {"/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
+                  "/v1/results/{id}/points/{index}": sweep, "/v1/results/{id}/points/{index}/scene": sweep,
+                  "/v1/jobs/{id}/table.{format}": {"id": swept["id"]}, "/v1/jobs/{id}/table": {"id": swept["id"]},
+                  "/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
                   "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
@@ -140,6 +145,23 @@ def test_real_answers_have_the_promised_shapes():
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
+        call("GET", "/v1/results/{id}", f"/v1/results/{swept['result']}")
+        failing = program.scene("paper_free_sponge")
+        failing.update(accuracy={"solver": "rk4", "step": 1e-3},
+                       study={"kind": "sweep", "axes": [{"pointer": "/dampers/0/buffer", "values": ["aluminium"]}]})
+        failed = program.finished(daemon, failing)
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry")
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{swept['id']}/retry")
+        call("POST", "/v1/jobs/{id}/retry", "/v1/jobs/0/retry")
+        many_points = program.scene("paper_random_sponge")
+        many_points["study"] = {"kind": "sweep", "axes": [{"pointer": "/excitation/seed", "from": 1, "to": 3000,
+                                                           "count": 3000}]}
+        running = daemon.submit(many_points, headers={"Prefer": "respond-async"}).json()["id"]
+        for _ in range(20):
+            call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}?wait=0.05")
+            call("GET", "/v1/jobs/{id}/table.{format}", f"/v1/jobs/{running}/table.json")
+        call("GET", "/v1/jobs", "/v1/jobs")
+        daemon.request("DELETE", f"/v1/jobs/{running}")
         scene = program.scene("paper_random_sponge")
         slow = program.scene("paper_sine_aluminium")
         slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
