@@ -18,7 +18,7 @@
 
 enum { PICTURES = 6, CELLS = 48, COLUMNS = 560, LABEL = 40 };
 static const double width = 640, left = 66, right = 622, panel = 110, gap = 34;
-static const double map_width = 214, map_height = 168, map_left = 74, map_step = 308, map_row = 244;
+static const double map_width = 208, map_height = 168, map_left = 88, map_step = 306, map_row = 244;
 
 typedef struct Chart {
     const Sweep *sweep;

@@ -16,7 +16,8 @@ typedef enum ChunkState {
 
 typedef struct ExecutorLimits {
     size_t slots;         // chunks that run side by side
-    double chunk_seconds; // of CPU that a chunk is to take
+    double chunk_seconds; // of CPU that a chunk is to take, where that makes no more chunks than
+    size_t chunks;        // so many
     size_t chunk_points;  // that it has at most
 } ExecutorLimits;
 

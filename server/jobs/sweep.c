@@ -96,7 +96,8 @@ static Status fly_pilot(Worker *worker, SweepRun *run, double *seconds, Problem 
 
 static uint64_t count_chunks(const SweepPlan *plan, const ExecutorLimits *limits, double seconds) {
     const double points = (double)plan->points;
-    double chunks = ceil(seconds * points / limits->chunk_seconds);
+    double chunks =
+        fmin(ceil(seconds * points / limits->chunk_seconds), (double)limits->chunks);
     chunks = fmax(chunks, ceil(points / (double)limits->chunk_points));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * limits->slots));
     return (uint64_t)fmin(chunks, points);
