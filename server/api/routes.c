@@ -50,3 +50,5 @@ const Route routes[] = {
     {NULL, NULL, NULL, NULL, NULL, NULL},
 };
 // clang-format on
+
+Handler *const quick_handlers[] = {health_live, health_ready, version_show, NULL};

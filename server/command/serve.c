@@ -87,9 +87,11 @@ static void greet(const Listener *listener, const ServeSettings *settings) {
 
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    Dispatcher dispatcher = {&app, routes};
-    ListenerSettings door = {
-        .body_most = settings->max_body, .answer = dispatch, .context = &dispatcher};
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20)};
+    ListenerSettings door = {.body_most = settings->max_body,
+                             .answer_at_once = dispatch_at_once,
+                             .answer = dispatch,
+                             .context = &dispatcher};
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .cache_bytes = settings->cache_bytes,
@@ -116,6 +118,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (app.intake != NULL)
         intake_close(app.intake);
     listener_free(listener);
+    hot_free(dispatcher.hot);
     store_close(app.store);
     return status;
 }

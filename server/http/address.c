@@ -93,8 +93,8 @@ Status address_open(Address *address, int *descriptor, Problem *problem) {
     return STATUS_OK;
 }
 
-void address_url(const Address *address, char target[96]) {
+void address_url(const Address *address, bool is_tls, char target[96]) {
     const bool is_v6 = strchr(address->host, ':') != NULL;
-    snprintf(target, 96, "http://%s%s%s:%u", is_v6 ? "[" : "", address->host, is_v6 ? "]" : "",
-             (unsigned)address->port);
+    snprintf(target, 96, "http%s://%s%s%s:%u", is_tls ? "s" : "", is_v6 ? "[" : "", address->host,
+             is_v6 ? "]" : "", (unsigned)address->port);
 }

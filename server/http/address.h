@@ -3,6 +3,7 @@
 #ifndef SERVER_HTTP_ADDRESS_H
 #define SERVER_HTTP_ADDRESS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "core/base/status.h"
@@ -20,7 +21,7 @@ Status address_read(const char *text, Address *address, Problem *problem);
 // STATUS_CONFLICT if the port is taken, STATUS_IO for other reasons.
 Status address_open(Address *address, int *descriptor, Problem *problem);
 
-// "http://127.0.0.1:8080"
-void address_url(const Address *address, char target[96]);
+// "http://127.0.0.1:8080", or https
+void address_url(const Address *address, bool is_tls, char target[96]);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "core/base/field.h"
 #include "server/http/body.h"
+#include "server/http/header.h"
 #include "server/http/reply.h"
 
 static Status check_queries(const Route *route, const Request *request, Problem *problem) {
@@ -56,43 +57,106 @@ static Status set_parameters(Request *request, const RouteSpan *spans, size_t co
     return STATUS_OK;
 }
 
-static Status answer(const Dispatcher *dispatcher, Request *request, Reply *reply,
-                     Problem *problem) {
-    RouteSpan spans[REQUEST_PARAMETERS];
-    size_t count = 0;
-    char allow[64], near[ROUTE_SEGMENT_MOST], scratch[512];
-    const Route *route =
-        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
-    if (route == NULL && allow[0] != '\0') {
+// A finished answer as this client takes it; what never changes is kept for the next one.
+static Status finish(const Dispatcher *dispatcher, const Route *route, const Request *request,
+                     Reply *reply, Problem *problem) {
+    const bool is_packed = reply_pack(reply, request);
+    const bool is_kept = dispatcher->hot != NULL && reply->is_immutable && reply->code == 200 &&
+                         reply->stream.next == NULL && !reply->varies_by_accept;
+    if (is_kept)
+        hot_put(dispatcher->hot, request->target, is_packed, route->scope, reply);
+    return reply_range(reply, request, problem);
+}
+
+static Status answer(const Dispatcher *dispatcher, const Route *route, const RouteSpan *spans,
+                     size_t count, Request *request, Reply *reply, Problem *problem) {
+    char scratch[512];
+    TRY(check_queries(route, request, problem));
+    TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
+    TRY(route->handle(dispatcher->app, request, reply, problem));
+    return reply->wait_ms > 0 ? STATUS_OK : finish(dispatcher, route, request, reply, problem);
+}
+
+static Status refuse(const Dispatcher *dispatcher, const Request *request, const char *allow,
+                     Reply *reply, Problem *problem) {
+    char near[ROUTE_SEGMENT_MOST];
+    if (allow[0] != '\0') {
         snprintf(reply->allow, sizeof reply->allow, "%s", allow);
         return problem_set(problem, STATUS_METHOD, "%s is not for this path; it takes %s",
                            request->method, allow);
     }
-    if (route == NULL && route_nearest(dispatcher->table, request->path, near, sizeof near))
+    if (route_nearest(dispatcher->table, request->path, near, sizeof near))
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is nothing at this path; did you mean %s?", near);
-    if (route == NULL)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is nothing at this path; GET /openapi.json lists what there is");
-    TRY(check_queries(route, request, problem));
-    TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
-    TRY(route->handle(dispatcher->app, request, reply, problem));
-    if (reply->wait_ms > 0)
-        return STATUS_OK;
-    return reply_range(reply, request, problem);
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "there is nothing at this path; GET /openapi.json lists what there is");
+}
+
+static void close_up(Request *request, Status status, Problem *problem, Reply *reply) {
+    memset(request->parameters, 0, sizeof request->parameters);
+    if (status == STATUS_OK)
+        return;
+    if (problem->status == STATUS_OK)
+        problem_set(problem, status, "%s", status_title(status));
+    reply->wait_ms = 0;
+    body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target);
 }
 
 void dispatch(void *context, Request *request, Reply *reply) {
     const Dispatcher *dispatcher = context;
+    RouteSpan spans[REQUEST_PARAMETERS];
+    size_t count = 0;
+    char allow[64];
     // A Problem is large: problem_clear and write_problem touch only what is used of it.
     Problem problem;
     problem_clear(&problem);
-    const Status status = answer(dispatcher, request, reply, &problem);
-    memset(request->parameters, 0, sizeof request->parameters);
-    if (status == STATUS_OK)
-        return;
-    if (problem.status == STATUS_OK)
-        problem_set(&problem, status, "%s", status_title(status));
-    reply->wait_ms = 0;
-    body_problem(reply, &problem, reply->code == 416 ? 416 : 0, request->target);
+    const Route *route =
+        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
+    const Status status = route != NULL
+                              ? answer(dispatcher, route, spans, count, request, reply, &problem)
+                              : refuse(dispatcher, request, allow, reply, &problem);
+    close_up(request, status, &problem, reply);
+}
+
+static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *reply) {
+    const char *scope;
+    if (dispatcher->hot == NULL || strcmp(request->method, "GET") != 0)
+        return false;
+    const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
+    if ((!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, &scope)) &&
+        !hot_find(dispatcher->hot, request->target, false, reply, &scope))
+        return false;
+    Problem problem;
+    problem_clear(&problem);
+    Status status = STATUS_OK;
+    if (!reply_is_known(reply, request))
+        status = reply_range(reply, request, &problem);
+    close_up(request, status, &problem, reply);
+    return true;
+}
+
+static bool is_quick(const Dispatcher *dispatcher, const Route *route) {
+    Handler *const *quick = dispatcher->quick;
+    while (quick != NULL && *quick != NULL && *quick != route->handle)
+        quick++;
+    return quick != NULL && *quick != NULL;
+}
+
+bool dispatch_at_once(void *context, Request *request, Reply *reply) {
+    const Dispatcher *dispatcher = context;
+    enum { QUICK_BYTES = 64 * 1024 }; // of a body that is read in a moment
+    if (find_hot(dispatcher, request, reply))
+        return true;
+    RouteSpan spans[REQUEST_PARAMETERS];
+    size_t count = 0;
+    char allow[64];
+    const Route *route =
+        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
+    if (route == NULL || !is_quick(dispatcher, route) || request->body_size > QUICK_BYTES)
+        return false;
+    Problem problem;
+    problem_clear(&problem);
+    const Status status = answer(dispatcher, route, spans, count, request, reply, &problem);
+    close_up(request, status, &problem, reply);
+    return true;
 }

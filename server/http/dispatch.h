@@ -4,14 +4,21 @@
 #ifndef SERVER_HTTP_DISPATCH_H
 #define SERVER_HTTP_DISPATCH_H
 
+#include "server/http/hot.h"
 #include "server/http/route.h"
 
 typedef struct Dispatcher {
     App *app;
     const Route *table;
+    Handler *const *quick; // of the table's; may be NULL
+    Hot *hot;              // whole answers that never change; may be NULL
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.
 void dispatch(void *context, Request *request, Reply *reply);
+
+// The same for what takes no more than a moment: an answer that is there already, or a quick
+// route's. False if it is neither, with `reply` untouched.
+bool dispatch_at_once(void *context, Request *request, Reply *reply);
 
 #endif

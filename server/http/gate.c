@@ -4,6 +4,7 @@
 #include "server/http/gate.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -76,6 +77,8 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
         gate->lengths++;
         if (value_size == 0 || value_size > 18 || strspn(value, "0123456789") != value_size)
             gate->has_bad_length = true;
+        else
+            gate->length = strtoull(value, NULL, 10);
     } else if (is_name(name, name_size, "Transfer-Encoding")) {
         gate->encodings++;
         gate->is_chunked = is_name(value_size > 0 ? value : "", value_size, "chunked");

@@ -13,6 +13,7 @@
 // Facts gathered header by header; all zero to begin with.
 typedef struct Gate {
     size_t hosts, lengths, encodings;
+    unsigned long long length; // of the body, as told
     bool is_chunked, is_foreign_host, has_bad_length, has_control;
     char fault_name[40]; // the header that has_control is about
     char host[64];

@@ -128,6 +128,33 @@ int header_accept(const char *accept, const char *const *types) {
     return best;
 }
 
+bool header_accepts_gzip(const char *accept_encoding) {
+    if (accept_encoding == NULL)
+        return false;
+    const char *end = accept_encoding + strlen(accept_encoding), *text = accept_encoding;
+    bool any = false, is_named = false, named = false;
+    Span item, coding, name, value;
+    while (item_next(&text, end, ',', &item)) {
+        const char *piece = item.at, *item_end = item.at + item.size;
+        double quality = 1;
+        if (!item_next(&piece, item_end, ';', &coding))
+            continue;
+        while (item_next(&piece, item_end, ';', &item)) {
+            double number;
+            split(item, &name, &value);
+            if (span_is(name, "q") && number_of(value, &number))
+                quality = number;
+        }
+        if (span_is(coding, "gzip") || span_is(coding, "x-gzip")) {
+            is_named = true;
+            named = quality > 0;
+        } else if (span_is(coding, "*")) {
+            any = quality > 0;
+        }
+    }
+    return is_named ? named : any;
+}
+
 Prefer header_prefer(const char *prefer) {
     Prefer result = {0};
     if (prefer == NULL)

@@ -12,6 +12,9 @@
 // play no part.
 int header_accept(const char *accept, const char *const *types);
 
+// Whether an Accept-Encoding takes gzip. NULL or "" does not: plain is what all can read.
+bool header_accepts_gzip(const char *accept_encoding);
+
 // RFC 7240.
 typedef struct Prefer {
     bool responds_async;

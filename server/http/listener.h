@@ -1,5 +1,6 @@
 // The door: listens on loopback, collects requests, has them answered, sends the replies.
-// libmicrohttpd lives in listener.c alone. Not routes and not rights (dispatch.h). Used by
+// libmicrohttpd lives in listener.c, exchange.c and sending.c
+// alone. Not routes and not rights (dispatch.h). Used by
 // command/serve.c.
 #ifndef SERVER_HTTP_LISTENER_H
 #define SERVER_HTTP_LISTENER_H
@@ -12,8 +13,13 @@ typedef struct Listener Listener;
 typedef struct ListenerSettings {
     Address address;
     size_t body_most; // bytes; a larger body is answered 413
-    void (*answer)(void *context, Request *request, Reply *reply); // from several threads
+    // Both are called from several threads. The first answers what takes no waiting and no more
+    // than a moment, on the event loop, or returns false with `reply` untouched; then the second
+    // is called on a thread where it may take its time.
+    bool (*answer_at_once)(void *context, Request *request, Reply *reply);
+    void (*answer)(void *context, Request *request, Reply *reply);
     void *context;
+    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
 } ListenerSettings;
 
 // Fails as address_open does.

@@ -4,7 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/base/deflate.h"
 #include "server/http/header.h"
+
+#define PACKED "-gz" // behind the tag of what is packed: other bytes, another tag
 
 const char type_json[] = "application/json";
 
@@ -53,13 +56,64 @@ Status reply_bytes(Reply *reply, int code, const char *content_type, Bytes *byte
 static bool tag(Reply *reply, const Request *request, const char *text, const char *cache_control) {
     snprintf(reply->etag, sizeof reply->etag, "\"%s\"", text);
     snprintf(reply->cache_control, sizeof reply->cache_control, "%s", cache_control);
-    if (!header_etag_matches(request->if_none_match, reply->etag))
+    return reply_is_known(reply, request);
+}
+
+bool reply_is_known(Reply *reply, const Request *request) {
+    char packed[sizeof reply->etag + 8];
+    // The client may have it as it is, or packed.
+    snprintf(packed, sizeof packed, "%.*s" PACKED "\"", (int)strlen(reply->etag) - 1, reply->etag);
+    if (!header_etag_matches(request->if_none_match, reply->etag) &&
+        !header_etag_matches(request->if_none_match, packed))
         return false;
-    reply_borrow(reply, 304, NULL, NULL, 0);
+    char etag[sizeof reply->etag], cache_control[sizeof reply->cache_control];
+    memcpy(etag, reply->etag, sizeof etag);
+    memcpy(cache_control, reply->cache_control, sizeof cache_control);
+    const bool varies_by_encoding = reply->varies_by_encoding;
+    const bool varies_by_accept = reply->varies_by_accept;
+    reply_clear(reply);
+    memcpy(reply->etag, etag, sizeof etag);
+    memcpy(reply->cache_control, cache_control, sizeof cache_control);
+    reply->varies_by_encoding = varies_by_encoding;
+    reply->varies_by_accept = varies_by_accept;
+    reply->code = 304;
+    return true;
+}
+
+static bool is_text(const char *type) {
+    return type != NULL && (strncmp(type, "text/", 5) == 0 || strstr(type, "json") != NULL ||
+                            strstr(type, "xml") != NULL);
+}
+
+bool reply_pack(Reply *reply, const Request *request) {
+    enum { LEAST = 1024, MOST = 64 << 20 };
+    if (!is_text(reply->content_type) || reply->stream.next != NULL || reply->body_size < LEAST ||
+        reply->code == 206 || reply->content_encoding != NULL)
+        return false;
+    reply->varies_by_encoding = true;
+    if (reply->body_size > MOST || !header_accepts_gzip(request->accept_encoding))
+        return false;
+    Bytes packed = {0};
+    if (!deflate_gzip(&packed, reply->body, reply->body_size) || packed.count >= reply->body_size) {
+        bytes_clear(&packed);
+        return false;
+    }
+    if (reply->release != NULL)
+        reply->release(reply->context);
+    size_t size = 0;
+    char *body = bytes_take(&packed, &size);
+    reply->body = reply->context = body;
+    reply->body_size = size;
+    reply->release = free;
+    reply->content_encoding = "gzip";
+    const size_t length = strlen(reply->etag);
+    if (length > 0 && length + sizeof PACKED <= sizeof reply->etag)
+        memcpy(reply->etag + length - 1, PACKED "\"", sizeof PACKED + 1);
     return true;
 }
 
 bool reply_immutable(Reply *reply, const Request *request, const char *text) {
+    reply->is_immutable = true;
     return tag(reply, request, text, "private, max-age=31536000, immutable");
 }
 
@@ -68,7 +122,8 @@ bool reply_tagged(Reply *reply, const Request *request, const char *text) {
 }
 
 Status reply_range(Reply *reply, const Request *request, Problem *problem) {
-    if (!reply->accepts_ranges || reply->code != 200 || strcmp(request->method, "GET") != 0)
+    if (!reply->accepts_ranges || reply->stream.next != NULL || reply->code != 200 ||
+        strcmp(request->method, "GET") != 0)
         return STATUS_OK;
     // If-Range: a part only of what the client already has the other parts of.
     if (request->if_range != NULL && strcmp(request->if_range, reply->etag) != 0)

@@ -26,6 +26,13 @@ bool reply_immutable(Reply *reply, const Request *request, const char *tag);
 // The same for what may change: the client asks again each time.
 bool reply_tagged(Reply *reply, const Request *request, const char *tag);
 
+// The same for a reply that has its tag: whatever else it holds is given up where the client has
+// it.
+bool reply_is_known(Reply *reply, const Request *request);
+
+// Turns a text that is whole in memory into gzip where the client takes it and it pays.
+bool reply_pack(Reply *reply, const Request *request);
+
 // Turns a whole 200 into 206 or 416 where the request asks for a part of a body that accepts
 // ranges. STATUS_USAGE with code 416 set in `reply` where there is no such part.
 Status reply_range(Reply *reply, const Request *request, Problem *problem);

@@ -91,8 +91,12 @@ typedef struct Reply {
     char preference_applied[48];
     char allow[64];
     char content_range[80];
-    int retry_after; // seconds, -1 for none
+    int retry_after;              // seconds, -1 for none
+    const char *content_encoding; // "gzip", or NULL
+    const void *shared; // not NULL: a whole answer out of the cache, the same for all who get it
+    bool is_immutable;  // the same target gets it for ever
     bool accepts_ranges;
+    bool varies_by_encoding;
     bool varies_by_accept; // the same path has several representations
     int wait_ms; // > 0: not a reply yet; call the handler again when woken or after so long
     void *keep;  // with wait_ms: handed back as request->kept; `forget` frees it, always, after the

@@ -19,6 +19,10 @@ typedef struct Route {
     Handler *handle;
 } Route;
 
+// Handlers that take a moment at most and wait for nothing: answered on the event loop. Ends with
+// NULL.
+extern Handler *const quick_handlers[];
+
 extern const Route routes[]; // ends with method == NULL; of two patterns that fit, the first counts
 
 enum { ROUTE_SEGMENT_MOST = 160 };

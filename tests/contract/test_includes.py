@@ -28,9 +28,11 @@ SYSTEM = PURE | set("dirent fcntl grp libgen netdb poll pthread pwd sched semaph
                     "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "
                     "sys/statvfs sys/time sys/types sys/un sys/wait".split())
 
+MHD_FILES = [f"server/http/{name}" for name in ("listener.c", "exchange.c", "exchange.h", "sending.c", "sending.h")]
+
 # One room per foreign library: header -> the only files or folders that may include it.
 FOREIGN = {
-    "microhttpd.h": ["server/http/listener.c"],
+    "microhttpd.h": MHD_FILES,
     "sqlite3.h": ["server/store/database.c", "server/store/row.c"],
     "jansson.h": ["server/codec/"],
     "fftw3.h": ["core/math/fourier.c"],
@@ -54,7 +56,7 @@ BANNED = {
     r"clock_gettime|gettimeofday|time|clock": ("the clock is one room", ["server/base/clock.c"]),
     r"json_object_\w+|json_array_\w+|json_loadb|json_loads|json_dumps": ("JSON is codec's", ["server/codec/"]),
     r"sqlite3_\w+": ("SQL is the store's", ["server/store/database.c", "server/store/row.c"]),
-    r"MHD_\w+": ("libmicrohttpd is the listener's", ["server/http/listener.c"]),
+    r"MHD_\w+": ("libmicrohttpd is the listener's", MHD_FILES),
     r"fftw_\w+": ("FFTW is fourier.c's", ["core/math/fourier.c"]),
     r"LAPACKE_\w+": ("LAPACK is linear.c's", ["core/math/linear.c"]),
     r"gnutls_\w+": ("GnuTLS is digest.c's", ["server/base/digest.c"]),

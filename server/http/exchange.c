@@ -1,0 +1,314 @@
+// request line -> head: the gate -> body: collected up to its cap -> answer -> sent
+//
+// What can be answered without waiting is answered on the event loop. Anything else goes to the
+// pool, its connection suspended meanwhile; a handler that asks to wait sleeps in its seat and goes
+// on where it began. A reply queued before the body is read closes the connection, which is what
+// refusals want. What the library answers by itself (a head over its memory, a line that is no
+// HTTP, a Content-Length past 2^64) is no problem document, and a NUL in a header's value is cut
+// before we see it.
+#include "server/http/exchange.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "server/base/clock.h"
+#include "server/codec/write.h"
+#include "server/http/bell.h"
+#include "server/http/body.h"
+#include "server/http/reply.h"
+#include "server/http/sending.h"
+
+enum {
+    IDLE_MS = 60000, // from the last reply to the next request line
+    HEAD_MS =
+        10000, // from the connection to its first request line, from any to the end of its head
+    BODY_MS = 60000,
+    DRAINED = 4, // times the body's limit is read and thrown away, so that the client sees the 413
+    BODIES_HELD = 16, // times the body's limit may be in memory over all connections
+};
+
+static enum MHD_Result send_problem(Exchange *exchange, int code, const Problem *problem,
+                                    bool closes) {
+    Reply reply;
+    reply_default(&reply);
+    body_problem(&reply, problem, code, NULL);
+    return sending_queue(exchange, &reply, closes);
+}
+
+static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const char *name,
+                                   size_t name_size, const char *value, size_t value_size) {
+    (void)kind;
+    Exchange *exchange = context;
+    gate_header(&exchange->gate, name, name_size, value, value_size);
+    if (value != NULL)
+        request_header(&exchange->request, name, value);
+    return MHD_YES;
+}
+
+// The head is complete: judge it, and refuse at once what cannot be read to its end.
+static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connection,
+                             const char *method, const char *version) {
+    Desk *desk = exchange->desk;
+    Request *request = &exchange->request;
+    exchange->is_begun = true;
+    exchange->connection = connection;
+    request->method = method;
+    request->path = request->target = exchange->target;
+    const uint64_t number = desk->first_id + atomic_fetch_add(&desk->requests, 1);
+    snprintf(request->id, sizeof request->id, "q-%012llx",
+             (unsigned long long)(number & 0xffffffffffff));
+    request->started_ns = clock_monotonic_ns();
+    request->waker = seat_waker(exchange->seat);
+    request->body_most = desk->settings.body_most;
+    MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
+
+    if (request->host == NULL)
+        request->host = strstr(desk->url, "://") + 3;
+
+    Problem problem;
+    problem_clear(&problem);
+    int code = gate_judge(&exchange->gate, method, exchange->target, version, &problem);
+    if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
+        code = write_problem_code(problem.status);
+    const unsigned long long body_size = exchange->gate.length;
+    const size_t most = request->body_most;
+    const bool waits_for_leave =
+        request->expect != NULL && strcasecmp(request->expect, "100-continue") == 0;
+    if (code == 0 && request->expect != NULL && !waits_for_leave) {
+        code = 417;
+        problem_set(&problem, STATUS_USAGE, "the only expectation understood is 100-continue");
+    }
+    if (code == 0 && body_size > (waits_for_leave ? most : DRAINED * most)) {
+        code = 413;
+        problem_set(&problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes", most);
+    }
+    if (code != 0)
+        return send_problem(exchange, code, &problem, true);
+    if (strcmp(method, "HEAD") == 0) {
+        request->method = "GET";
+        request->range = NULL;
+    }
+    exchange->body.most = most;
+    seat_limit(exchange->seat, body_size > 0 || exchange->gate.is_chunked ? BODY_MS : 0);
+    return MHD_YES;
+}
+
+static void drop_body(Exchange *exchange) {
+    if (exchange->is_counted)
+        atomic_fetch_sub(&exchange->desk->held, exchange->body.count);
+    exchange->is_counted = false;
+    bytes_clear(&exchange->body);
+    exchange->request.body = NULL;
+    exchange->request.body_size = 0;
+}
+
+static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t size) {
+    Desk *desk = exchange->desk;
+    const size_t most = desk->settings.body_most;
+    exchange->received += size;
+    if (exchange->received > DRAINED * most)
+        return MHD_NO;
+    if (exchange->request.is_too_large || exchange->is_busy ||
+        strcmp(exchange->request.method, "GET") == 0)
+        return MHD_YES;
+    exchange->request.is_too_large = exchange->received > most;
+    if (!exchange->request.is_too_large) {
+        exchange->is_counted = true;
+        exchange->is_busy = atomic_fetch_add(&desk->held, size) + size > BODIES_HELD * most;
+        bytes_put(&exchange->body, data, size);
+        if (exchange->body.is_failed) {
+            atomic_fetch_sub(&desk->held, exchange->received);
+            exchange->is_counted = false;
+            exchange->is_busy = true;
+        }
+    }
+    if (exchange->request.is_too_large || exchange->is_busy)
+        drop_body(exchange);
+    return MHD_YES;
+}
+
+// The handler asked to wait.
+static void note_wait(Exchange *exchange, const Reply *reply) {
+    drop_body(exchange);
+    exchange->request.kept = reply->keep;
+    exchange->forget = reply->forget;
+    exchange->is_asleep = true;
+}
+
+// What the last sleep ended by.
+static void note_wake(Exchange *exchange) {
+    exchange->request.is_woken = seat_was_woken(exchange->seat);
+    exchange->request.is_expired = !exchange->request.is_woken;
+}
+
+// Another thread's word: the loop does not hear of it by itself. The exchange may be gone when this
+// returns.
+static void resume(Exchange *exchange) {
+    const int bell = exchange->loop->bell;
+    MHD_resume_connection(exchange->connection);
+    bell_ring(bell);
+}
+
+// In the pool.
+static void answer_in_pool(Task *task) {
+    Exchange *exchange = (Exchange *)(void *)task;
+    const ListenerSettings *settings = &exchange->desk->settings;
+    if (exchange->is_asleep)
+        note_wake(exchange);
+    for (;;) {
+        Reply *reply = &exchange->reply;
+        reply_default(reply);
+        settings->answer(settings->context, &exchange->request, reply);
+        if (reply->wait_ms == 0)
+            break;
+        note_wait(exchange, reply);
+        if (seat_sleep(exchange->seat, exchange, reply->wait_ms))
+            return; // it may be in the pool again already
+        note_wake(exchange);
+    }
+    exchange->request.kept = exchange->reply.keep;
+    exchange->forget = exchange->reply.forget;
+    exchange->is_in_pool = false;
+    exchange->is_answered = true;
+    resume(exchange);
+}
+
+static enum MHD_Result hand_over(Exchange *exchange) {
+    exchange->is_in_pool = true;
+    exchange->is_asleep = false;
+    exchange->task.run = answer_in_pool;
+    // The state first: the answer may be there before this returns.
+    MHD_suspend_connection(exchange->connection);
+    pool_put(exchange->desk->pool, &exchange->task);
+    return MHD_YES;
+}
+
+static enum MHD_Result answer(Exchange *exchange) {
+    const ListenerSettings *settings = &exchange->desk->settings;
+    Request *request = &exchange->request;
+    if (exchange->is_answered)
+        return sending_queue(exchange, &exchange->reply, false);
+    if (exchange->is_busy) {
+        Problem problem;
+        problem_clear(&problem);
+        problem_set(&problem, STATUS_BUSY, "too many large bodies at once");
+        return send_problem(exchange, 0, &problem, false);
+    }
+    if (exchange->is_asleep) {
+        note_wake(exchange);
+    } else {
+        seat_limit(exchange->seat, 0);
+        seat_begin(exchange->seat);
+        request->body = exchange->body.at;
+        request->body_size = exchange->body.count;
+    }
+    for (;;) {
+        Reply reply;
+        reply_default(&reply);
+        if (!settings->answer_at_once(settings->context, request, &reply))
+            return hand_over(exchange);
+        if (reply.wait_ms == 0) {
+            request->kept = reply.keep;
+            exchange->forget = reply.forget;
+            return sending_queue(exchange, &reply, false);
+        }
+        note_wait(exchange, &reply);
+        if (seat_sleep(exchange->seat, exchange, reply.wait_ms))
+            return MHD_YES;
+        note_wake(exchange);
+    }
+}
+
+// In the pool a connection is suspended already, and its sleep ends with a place in the queue.
+static void fall_asleep(void *context) {
+    Exchange *exchange = context;
+    if (!exchange->is_in_pool)
+        MHD_suspend_connection(exchange->connection);
+}
+
+static void wake_up(void *context) {
+    Exchange *exchange = context;
+    if (exchange->is_in_pool)
+        pool_put(exchange->desk->pool, &exchange->task);
+    else
+        resume(exchange);
+}
+
+const HallCalls exchange_calls = {fall_asleep, wake_up};
+
+void exchange_connection(void *context, struct MHD_Connection *connection, void **seat,
+                         enum MHD_ConnectionNotificationCode code) {
+    Loop *loop = context;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info =
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        *seat = info != NULL ? seat_take(loop->desk->hall, info->connect_fd) : NULL;
+        if (*seat != NULL)
+            seat_limit(*seat, HEAD_MS);
+        return;
+    }
+    if (*seat != NULL)
+        seat_leave(*seat);
+    *seat = NULL;
+    atomic_fetch_sub(&loop->connections, 1);
+}
+
+// The request line is in; `target` is as sent.
+void *exchange_open(void *context, const char *target, struct MHD_Connection *connection) {
+    Loop *loop = context;
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    Seat *seat = info != NULL ? info->socket_context : NULL;
+    Exchange *exchange = seat != NULL ? calloc(1, sizeof *exchange) : NULL;
+    if (exchange == NULL)
+        return NULL;
+    exchange->target = strdup(target);
+    if (exchange->target == NULL) {
+        free(exchange);
+        return NULL;
+    }
+    exchange->loop = loop;
+    exchange->desk = loop->desk;
+    exchange->seat = seat;
+    reply_default(&exchange->reply);
+    atomic_fetch_add(&loop->desk->exchanges, 1);
+    seat_limit(seat, HEAD_MS);
+    return exchange;
+}
+
+enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, const char *url,
+                               const char *method, const char *version, const char *data,
+                               size_t *size, void **state) {
+    (void)loop, (void)url; // the url is decoded and cut at a NUL; the target is what counts
+    Exchange *exchange = *state;
+    if (exchange == NULL)
+        return MHD_NO;
+    if (!exchange->is_begun)
+        return begin(exchange, connection, method, version);
+    if (*size > 0) {
+        const size_t taken = *size;
+        *size = 0;
+        return take_body(exchange, data, taken);
+    }
+    return answer(exchange);
+}
+
+void exchange_close(void *context, struct MHD_Connection *connection, void **state,
+                    enum MHD_RequestTerminationCode code) {
+    (void)connection, (void)code;
+    Loop *loop = context;
+    Exchange *exchange = *state;
+    if (exchange == NULL)
+        return;
+    *state = NULL;
+    if (exchange->forget != NULL)
+        exchange->forget(exchange->request.kept);
+    drop_body(exchange);
+    request_close(&exchange->request);
+    seat_limit(exchange->seat, IDLE_MS);
+    free(exchange->target);
+    free(exchange);
+    atomic_fetch_sub(&loop->desk->exchanges, 1);
+}

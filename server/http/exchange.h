@@ -1,0 +1,76 @@
+// One request, from its first line to its last byte, as libmicrohttpd's callbacks. Knows no routes
+// (dispatch.h) and opens no sockets (listener.h). Used by listener.c, which starts the event loops
+// with them.
+#ifndef SERVER_HTTP_EXCHANGE_H
+#define SERVER_HTTP_EXCHANGE_H
+
+#include <microhttpd.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "server/base/bytes.h"
+#include "server/http/gate.h"
+#include "server/http/listener.h"
+#include "server/http/pool.h"
+#include "server/http/seat.h"
+#include "server/http/sending.h"
+
+// What all exchanges of a listener share.
+typedef struct Desk {
+    ListenerSettings settings;
+    Hall *hall;
+    Pool *pool;
+    const char *url;
+    uint64_t first_id;
+    atomic_uint_fast64_t requests;
+    atomic_size_t exchanges; // under way
+    atomic_size_t held;      // bytes of bodies
+} Desk;
+
+// An event loop: its daemon and its thread alone, but for what is locked.
+typedef struct Loop {
+    Desk *desk;
+    struct MHD_Daemon *daemon;
+    pthread_t thread;
+    int bell; // eventfd: there are arrivals, or it is to stop
+    pthread_mutex_t lock;
+    int *arrivals; // descriptors, locked
+    size_t arrival_count, arrival_room;
+    atomic_bool is_stopping;
+    atomic_size_t connections; // with the arrivals
+    SentAgain sent_again[SENT_AGAIN];
+} Loop;
+
+typedef struct Exchange {
+    Task task; // in the pool
+    Loop *loop;
+    Desk *desk;
+    struct MHD_Connection *connection;
+    Seat *seat;
+    Request request;
+    Gate gate;
+    Bytes body;
+    size_t received;
+    char *target;
+    Reply reply; // once it is answered in the pool
+    void (*forget)(void *kept);
+    bool is_begun, is_counted, is_busy;
+    bool is_asleep;   // the handler asked to wait
+    bool is_in_pool;  // it is answered there, its connection suspended
+    bool is_answered; // there, with `reply`
+} Exchange;
+
+// For hall_open.
+extern const HallCalls exchange_calls;
+
+// The callbacks; `loop` is a Loop.
+void exchange_connection(void *loop, struct MHD_Connection *connection, void **seat,
+                         enum MHD_ConnectionNotificationCode code);
+void *exchange_open(void *loop, const char *target, struct MHD_Connection *connection);
+enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, const char *url,
+                               const char *method, const char *version, const char *data,
+                               size_t *size, void **exchange);
+void exchange_close(void *loop, struct MHD_Connection *connection, void **exchange,
+                    enum MHD_RequestTerminationCode code);
+
+#endif
