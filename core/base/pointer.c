@@ -131,8 +131,9 @@ static bool refuse(char why[POINTER_SENTENCE], const char *format, ...) {
 static bool refuse_name(const Field *fields, const char *token, const char *of,
                         char why[POINTER_SENTENCE]) {
     const char *near = fields_nearest(fields, token);
-    return refuse(why, "there is no \"%s\" in %s%s%s%s", token, of, near != NULL ? ": perhaps " : "",
-                  near != NULL ? near : "", near != NULL ? " is meant" : "");
+    return refuse(why, "there is no \"%s\" in %s%s%s%s", token, of,
+                  near != NULL ? ": perhaps " : "", near != NULL ? near : "",
+                  near != NULL ? " is meant" : "");
 }
 
 static bool element(const Reals *reals, const char *token, const char *of, void **member,
@@ -184,9 +185,8 @@ static bool go_into(Place *place, const Field *field, void *member, const char *
     switch (field->kind) {
     case FIELD_KIND_ITEM: {
         size_t offset = 0;
-        const Field *name = field->shorthand != NULL
-                                ? fields_find(field->fields, field->shorthand, &offset)
-                                : NULL;
+        const Field *name =
+            field->shorthand != NULL ? fields_find(field->fields, field->shorthand, &offset) : NULL;
         if (name != NULL) {
             place->name = (char **)(void *)((char *)member + offset + name->offset);
             place->around = member;

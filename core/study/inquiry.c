@@ -25,8 +25,7 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
                        "would take about %.2g s of CPU in all, at most %.4g s are allowed: %s",
-                       cost.cpu_seconds, most * SOLVER_STEP,
-                       study_kind(inquiry->study)->lessen);
+                       cost.cpu_seconds, most * SOLVER_STEP, study_kind(inquiry->study)->lessen);
 }
 
 Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,

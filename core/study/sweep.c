@@ -15,17 +15,29 @@ static const double most_runs = 1000;
 
 const char *const sweep_spacing_names[] = {"linear", "logarithmic", NULL};
 const char *const sweep_mode_names[] = {"grid", "list", NULL};
-const char *const sweep_status_names[] = {"made",  "invalid", "unstable", "limit",
+const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limit",
                                           "failed", "pending", NULL};
 const char *const sweep_metric_names[] = {
-    "peak_displacement",  "rms_displacement", "peak_acceleration",
-    "rms_acceleration",   "impacts",          "peak_contact_force",
-    "energy_residual",    "error_estimate",   "trust_horizon",
-    "steps",              NULL,
+    "peak_displacement",
+    "rms_displacement",
+    "peak_acceleration",
+    "rms_acceleration",
+    "impacts",
+    "peak_contact_force",
+    "energy_residual",
+    "error_estimate",
+    "trust_horizon",
+    "steps",
+    NULL,
 };
 static const char *const usual_metrics[] = {
-    "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",
-    "peak_contact_force", NULL,
+    "peak_displacement",
+    "rms_displacement",
+    "peak_acceleration",
+    "rms_acceleration",
+    "impacts",
+    "peak_contact_force",
+    NULL,
 };
 
 const char *sweep_metric_unit(const char *name) {

@@ -10,9 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-
 enum {
-    PLACE = sizeof((Fault){0}.pointer), COST_SAMPLES = 64,
+    PLACE = sizeof((Fault){0}.pointer),
+    COST_SAMPLES = 64,
     CHECK_ADVANCE = 256,
     SWEEP_VALUES = 1 << 21,
 };
@@ -286,8 +286,7 @@ double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {
 static Status check_axis(const SweepAxis *axis, size_t number, Problem *problem) {
     char place[PLACE];
     snprintf(place, sizeof place, "/study/axes/%zu", number);
-    const bool has_range =
-        !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
+    const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
     if (axis->values.count > 0 && (has_range || axis->spacing != CHOICE_ABSENT))
         return problem_add(problem, STATUS_INVALID, place,
                            "has values and a range: leave out values, or from, to, count and "
@@ -370,12 +369,11 @@ static Status check_size(const SweepStudy *study, const SimulationLimits *limits
     for (size_t i = 0; i < study->axes.count; i++)
         values += axis_length(&study->axes.at[i]);
     if (limits != NULL && points > most)
-        return problem_add(problem, STATUS_INVALID, "/study/axes",
-                           "are %.4g points, at most %zu are allowed: take fewer values%s",
-                           (double)points, most,
-                           study->axes.count > 1 && study->mode == SWEEP_GRID
-                               ? " or fewer axes, or mode list"
-                               : "");
+        return problem_add(
+            problem, STATUS_INVALID, "/study/axes",
+            "are %.4g points, at most %zu are allowed: take fewer values%s", (double)points, most,
+            study->axes.count > 1 && study->mode == SWEEP_GRID ? " or fewer axes, or mode list"
+                                                               : "");
     if (values > SWEEP_VALUES)
         return problem_add(problem, STATUS_INVALID, "/study/axes",
                            "have %zu values in all, at most %d are allowed: take fewer", values,
@@ -436,8 +434,7 @@ Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t
     Status status = plan_make(study, simulation, limits, &plan, problem);
     // Without limits it was judged before.
     if (plan != NULL && limits != NULL) {
-        const Status points =
-            sweep_check(plan, plan->points > at_once, limits, NULL, problem);
+        const Status points = sweep_check(plan, plan->points > at_once, limits, NULL, problem);
         status = status == STATUS_OK ? points : status;
     }
     sweep_plan_free(plan);

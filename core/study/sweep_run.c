@@ -159,8 +159,8 @@ static Status make_rows(const SweepPlan *plan, const StudyTools *tools, SweepTab
     return STATUS_OK;
 }
 
-Status sweep_run_all(const SweepStudy *study, const Simulation *simulation,
-                     const StudyTools *tools, Sweep *answer, Problem *problem) {
+Status sweep_run_all(const SweepStudy *study, const Simulation *simulation, const StudyTools *tools,
+                     Sweep *answer, Problem *problem) {
     SweepPlan *plan;
     SweepTable *table = &answer->table;
     TRY(sweep_plan_new(study, simulation, tools->limits, &plan, problem));

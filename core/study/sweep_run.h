@@ -17,7 +17,7 @@ Status sweep_add_failure(SweepFailures *failures, SweepStatus status, uint64_t p
                          const char *detail);
 
 // Judges all points, runs them one by one and fills `answer` with its table.
-Status sweep_run_all(const SweepStudy *study, const Simulation *simulation,
-                     const StudyTools *tools, Sweep *answer, Problem *problem);
+Status sweep_run_all(const SweepStudy *study, const Simulation *simulation, const StudyTools *tools,
+                     Sweep *answer, Problem *problem);
 
 #endif

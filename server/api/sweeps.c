@@ -122,7 +122,8 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
     SweepShow show = {.sweep = NULL};
     SweepPointShow point = {.values = NULL};
     TRY(read_index(request, &index, problem));
-    Status status = sweep_show_load(app->store, request->parameters[0], false, false, &show, problem);
+    Status status =
+        sweep_show_load(app->store, request->parameters[0], false, false, &show, problem);
     if (status == STATUS_OK)
         status = sweep_point_load(app->store, &show, index, &point, problem);
     if (status == STATUS_OK) {

@@ -133,8 +133,7 @@ static char *scalar_text(const json_t *value) {
 }
 
 static void add_scalar(Reader *reader, const json_t *value, Texts *texts, const char *place) {
-    const bool is_scalar =
-        json_is_string(value) || json_is_boolean(value) || json_is_number(value);
+    const bool is_scalar = json_is_string(value) || json_is_boolean(value) || json_is_number(value);
     if (!is_scalar)
         refuse_type(reader, place, value, NULL, "a number, a string, true or false");
     char *text = is_scalar ? scalar_text(value) : strdup("0");

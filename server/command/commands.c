@@ -32,10 +32,8 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,      &command_check,
-    &command_tradeoff, &command_ensemble, &command_sweep,
-    &command_import,   &command_help,     &command_version,
-    NULL,
+    &command_serve, &command_run,    &command_check, &command_tradeoff, &command_ensemble,
+    &command_sweep, &command_import, &command_help,  &command_version,  NULL,
 };
 
 static const char overview[] =

@@ -67,8 +67,7 @@ static void sweep_print(const Variant *answer) {
         printf("\n%llu failed, %s; point %llu: %s\n",
                (unsigned long long)table->failures.at[i].count,
                sweep_status_names[table->failures.at[i].status],
-               (unsigned long long)table->failures.at[i].first_point,
-               table->failures.at[i].detail);
+               (unsigned long long)table->failures.at[i].first_point, table->failures.at[i].detail);
 }
 
 static const StudyCommand study = {"sweep", &study_sweep, study_choose, sweep_print};
@@ -89,14 +88,16 @@ const Command command_sweep = {
     .operands = "SCENE.json",
     .summary = "the scene at many points: a grid or a list of values of its members",
     .help =
-        "  impactd sweep scene.json                             smallest and largest of each metric\n"
+        "  impactd sweep scene.json                             smallest and largest of each "
+        "metric\n"
         "  impactd sweep scene.json -o out.csv -o out.svg       every point, and the chart\n"
         "  impactd sweep - < scene.json                         from standard input\n"
         "\n"
         "The scene says what varies, by JSON Pointers into itself:\n"
         "\n"
         "  \"study\": {\"kind\": \"sweep\", \"axes\": [\n"
-        "    {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.005, \"to\": 0.03, \"count\": 26},\n"
+        "    {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.005, \"to\": 0.03, \"count\": "
+        "26},\n"
         "    {\"pointer\": \"/dampers/0/buffer\", \"values\": [\"sponge\", \"aluminium\"]}]}\n"
         "\n"
         "Every point is judged before the first runs. The same sweep gives the same bytes, here\n"

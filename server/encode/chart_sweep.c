@@ -28,8 +28,9 @@ typedef struct Chart {
 
 static double value_of(const Chart *chart, size_t point, size_t metric) {
     const long row = chart->rows[point];
-    return row < 0 ? (double)NAN
-                   : chart->sweep->table.values.at[(size_t)row * chart->sweep->metrics.count + metric];
+    return row < 0
+               ? (double)NAN
+               : chart->sweep->table.values.at[(size_t)row * chart->sweep->metrics.count + metric];
 }
 
 static size_t pictures(const Sweep *sweep) {
@@ -85,8 +86,8 @@ static void metric_name(const Sweep *sweep, size_t metric, char name[96]) {
 
 static void put_label(Bytes *bytes, double x, double y, const char *anchor, const char *class_,
                       const char *text) {
-    bytes_format(bytes, "<text class=\"%s\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", class_, x, y,
-                 anchor);
+    bytes_format(bytes, "<text class=\"%s\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", class_, x,
+                 y, anchor);
     svg_text(bytes, text);
     bytes_text(bytes, "</text>\n");
 }
@@ -176,7 +177,8 @@ static void put_line(const Chart *chart, const Across *of, const Scale *scale, s
         const double x = across_x(of, i);
         double low = (double)NAN, high = (double)NAN;
         size_t among = 0;
-        for (; i < of->count && (among == 0 || (of->count > COLUMNS && fabs(across_x(of, i) - x) < 1));
+        for (; i < of->count &&
+               (among == 0 || (of->count > COLUMNS && fabs(across_x(of, i) - x) < 1));
              i++, among++) {
             const double value = value_of(chart, i, metric);
             if (isnan(value))
@@ -260,7 +262,8 @@ static void colour_of(double share, char colour[8]) {
     const size_t i = at >= COUNT(stops) - 1 ? COUNT(stops) - 2 : (size_t)at;
     unsigned parts[3];
     for (size_t k = 0; k < 3; k++)
-        parts[k] = (unsigned)(stops[i][k] + (stops[i + 1][k] - stops[i][k]) * (at - (double)i) + 0.5);
+        parts[k] =
+            (unsigned)(stops[i][k] + (stops[i + 1][k] - stops[i][k]) * (at - (double)i) + 0.5);
     snprintf(colour, 8, "#%02x%02x%02x", parts[0] & 255, parts[1] & 255, parts[2] & 255);
 }
 
@@ -287,8 +290,8 @@ static void put_legend(const Chart *chart, const Scale *scale, double x, double 
     for (int i = 0; i < 24; i++) {
         colour_of((i + 0.5) / 24, colour);
         bytes_format(chart->bytes,
-                     "<rect fill=\"%s\" x=\"%.1f\" y=\"%.1f\" width=\"%.2f\" height=\"6\"/>", colour,
-                     x + map_width * i / 24, y, map_width / 24 + 0.3);
+                     "<rect fill=\"%s\" x=\"%.1f\" y=\"%.1f\" width=\"%.2f\" height=\"6\"/>",
+                     colour, x + map_width * i / 24, y, map_width / 24 + 0.3);
     }
     snprintf(text, sizeof text, "%.4g", scale->least);
     put_label(chart->bytes, x, y + 18, "start", "small", text);
@@ -319,8 +322,8 @@ static void put_map(const Chart *chart, const Map *map, size_t metric, double x,
     metric_name(chart->sweep, metric, name);
     put_label(chart->bytes, x, y - 7, "start", "name", name);
     bytes_format(chart->bytes,
-                 "<rect class=\"bad\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n", x, y,
-                 map_width, map_height);
+                 "<rect class=\"bad\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n", x,
+                 y, map_width, map_height);
     for (size_t row = 0; row < map->rows; row++)
         for (size_t column = 0; column < map->columns; column++) {
             const double value = map_value(chart, map, metric, column, row);
@@ -394,8 +397,8 @@ void chart_sweep(const Sweep *sweep, Bytes *bytes) {
     free(rows);
     bytes_format(
         bytes,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n", width,
-        bottom + 6);
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n",
+        width, bottom + 6);
     bytes_format(bytes, "<title>A sweep of %llu points</title>\n",
                  (unsigned long long)sweep->points);
     put_description(sweep, bytes);

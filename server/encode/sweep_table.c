@@ -89,8 +89,7 @@ static void put_failures(Bytes *bytes, const Sweep *sweep) {
         const SweepFailure *failure = &failures->at[i];
         bytes_format(bytes, "%s{\"status\": \"%s\", \"count\": %llu, \"first_point\": %llu",
                      i > 0 ? ", " : "", sweep_status_names[failure->status],
-                     (unsigned long long)failure->count,
-                     (unsigned long long)failure->first_point);
+                     (unsigned long long)failure->count, (unsigned long long)failure->first_point);
         bytes_text(bytes, ", \"detail\": ");
         bytes_json_string(bytes, failure->detail);
         bytes_text(bytes, "}");

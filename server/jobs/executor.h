@@ -25,8 +25,8 @@ typedef struct Executor {
     const char *name, *doc;
     // Whether it can take work, and its limits.
     Status (*probe)(Intake *intake, ExecutorLimits *limits, Problem *problem);
-    // Takes chunks of a sweep that is written down. A chunk may be submitted twice: equal bytes make
-    // that harmless. After a failure none was taken.
+    // Takes chunks of a sweep that is written down. A chunk may be submitted twice: equal bytes
+    // make that harmless. After a failure none was taken.
     Status (*submit)(SweepRun *run, const size_t *chunks, size_t count, Problem *problem);
     ChunkState (*poll)(SweepRun *run, size_t chunk);
     // Lets all of its chunks go that no slot has in hand; those end soon by themselves.

@@ -31,7 +31,7 @@ typedef struct Computation {
     Job *jobs;     // those who wait for it, by next_shared
     Wakers askers; // readers of the outcome
     atomic_bool is_stopped;
-    atomic_uint progress; // in 1/10,000
+    atomic_uint progress;   // in 1/10,000
     struct SweepRun *sweep; // of a sweep that is under way, under the lock
 } Computation;
 
@@ -60,11 +60,11 @@ typedef struct Failure {
 typedef struct Worker {
     Intake *intake;
     pthread_t thread;
-    Computation *running; // or NULL
+    Computation *running;   // or NULL
     struct SweepRun *sweep; // of which it has a chunk in hand, or NULL
     size_t chunk;
-    int64_t served_ns; // to ordinary jobs since its last turn on a sweep
-    Workspace workspace;  // of its thread alone
+    int64_t served_ns;   // to ordinary jobs since its last turn on a sweep
+    Workspace workspace; // of its thread alone
 } Worker;
 
 struct Intake {
@@ -81,8 +81,8 @@ struct Intake {
     Index *in_flight; // computations
     Computation *first, *last;
     struct SweepRun *sweeps; // under way; whose turn is next stands first
-    size_t queued, live; // computations in the queue; jobs not yet finished
-    size_t scene_bytes;  // of all live jobs
+    size_t queued, live;     // computations in the queue; jobs not yet finished
+    size_t scene_bytes;      // of all live jobs
     Cache *cache;
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;

@@ -34,13 +34,13 @@ typedef struct JobShow {
     char result[72];                                            // "" while there is none
     int64_t created_unix_ms, started_unix_ms, finished_unix_ms; // 0: not yet
     double queued, run, total;                                  // [s]
-    char *problem;  // problem+json of a failed job; NULL
-    char *plan;     // JSON; NULL while unknown
-    char *summary;  // JSON; NULL while unknown
-    char *work;     // JSON; NULL while unknown
-    char *warnings; // JSON array, of the scene
-    char *notes;    // JSON array, of the run; NULL: none
-    char *title;    // NULL if none
+    char *problem;                               // problem+json of a failed job; NULL
+    char *plan;                                  // JSON; NULL while unknown
+    char *summary;                               // JSON; NULL while unknown
+    char *work;                                  // JSON; NULL while unknown
+    char *warnings;                              // JSON array, of the scene
+    char *notes;                                 // JSON array, of the run; NULL: none
+    char *title;                                 // NULL if none
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobShow;
 

@@ -160,8 +160,7 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry,
-                     Problem *problem) {
+static Status submit(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, Problem *problem) {
     const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
     if (known == STATUS_OK)
         return finish_known(intake, job, problem);

@@ -17,7 +17,7 @@
 
 enum { PILOT = 16, CHUNKS_PER_SLOT = 4, REASONS = 1000, REASON = 160 };
 static const double pilot_seconds = 0.2;
-static const double judging = 0.1;       // of the progress of the study, to judge all points
+static const double judging = 0.1;         // of the progress of the study, to judge all points
 static const double before = 0.05 + 0.095; // of the whole job's progress, until chunks run
 static const int64_t pause_least_ns = 100000000, pause_most_ns = 10000000000;
 static const int64_t look_ns = 1000000; // how often a chunk looks whether others wait
@@ -96,8 +96,7 @@ static Status fly_pilot(Worker *worker, SweepRun *run, double *seconds, Problem 
 
 static uint64_t count_chunks(const SweepPlan *plan, const ExecutorLimits *limits, double seconds) {
     const double points = (double)plan->points;
-    double chunks =
-        fmin(ceil(seconds * points / limits->chunk_seconds), (double)limits->chunks);
+    double chunks = fmin(ceil(seconds * points / limits->chunk_seconds), (double)limits->chunks);
     chunks = fmax(chunks, ceil(points / (double)limits->chunk_points));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * limits->slots));
     return (uint64_t)fmin(chunks, points);
@@ -389,8 +388,7 @@ void sweep_work(Worker *worker, SweepRun *run, SweepPart *part, int64_t least_ns
                 Problem *problem) {
     Intake *intake = worker->intake;
     problem_clear(problem);
-    Status status =
-        part->is_computed ? STATUS_OK : make_rows(worker, run, part, least_ns, problem);
+    Status status = part->is_computed ? STATUS_OK : make_rows(worker, run, part, least_ns, problem);
     const bool is_parked = status == STATUS_BUSY;
     if (status == STATUS_OK)
         status = store_sweep_take(intake->store, &part->row, problem);

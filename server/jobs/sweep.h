@@ -14,7 +14,7 @@
 typedef struct SweepPart {
     struct SweepPart *next;
     size_t chunk;
-    size_t place; // row that comes next
+    size_t place;  // row that comes next
     bool is_again; // its rows were loaded: those that came to nothing are made anew
     bool is_computed;
     SweepChunkRow row; // as it goes to the store

@@ -14,8 +14,8 @@ static Status read_scene(SweepShow *show, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return no_memory(problem);
-    const Status status = read_json(show->row.scene, strlen(show->row.scene), inquiry_fields,
-                                    &show->inquiry, fault);
+    const Status status =
+        read_json(show->row.scene, strlen(show->row.scene), inquiry_fields, &show->inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
@@ -143,8 +143,7 @@ Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, Swe
     target->values = calloc(row->metrics, sizeof *target->values);
     if (target->values == NULL)
         return no_memory(problem);
-    const Status known =
-        store_sweep_chunk(store, row->number, point % row->chunks, &chunk, NULL);
+    const Status known = store_sweep_chunk(store, row->number, point % row->chunks, &chunk, NULL);
     if (known != STATUS_OK && known != STATUS_NOT_FOUND)
         return problem_set(problem, known, "the sweep's rows cannot be read");
     const size_t place = (size_t)(point / row->chunks);

@@ -320,8 +320,7 @@ static bool next_task(Worker *worker, Task *task) {
     while (!intake->is_closing) {
         int64_t until_ns = 0;
         const bool is_jobs_turn = intake->first != NULL && worker->served_ns < jobs_turn_ns;
-        if (!is_jobs_turn &&
-            (task->sweep = sweep_next(intake, &task->part, &until_ns)) != NULL) {
+        if (!is_jobs_turn && (task->sweep = sweep_next(intake, &task->part, &until_ns)) != NULL) {
             worker->sweep = task->sweep;
             worker->chunk = task->part != NULL ? task->part->chunk : SIZE_MAX;
             return true;

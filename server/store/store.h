@@ -110,7 +110,7 @@ void sweep_row_clear(SweepRow *row);
 typedef struct SweepChunkRow {
     int64_t sweep;
     uint64_t chunk, failed;
-    bool is_open; // those that failed are to be tried again
+    bool is_open;  // those that failed are to be tried again
     char *reasons; // "place sentence" lines of those that failed; NULL: none
     StoredBytes rows;
 } SweepChunkRow;

@@ -113,8 +113,9 @@ Status store_sweep_chunks(Store *store, int64_t sweep, bool has_rows, SweepChunk
                                 "FROM sweep_chunks WHERE sweep = :sweep ORDER BY chunk";
     const SweepChunkRow key = {.sweep = sweep};
     void *at;
-    const Status status = store_all(store, has_rows ? whole : heads, chunk_columns, &key,
-                                    chunk_columns, sizeof *chunks->at, &at, &chunks->count, problem);
+    const Status status =
+        store_all(store, has_rows ? whole : heads, chunk_columns, &key, chunk_columns,
+                  sizeof *chunks->at, &at, &chunks->count, problem);
     chunks->at = at;
     if (status != STATUS_OK)
         sweep_chunk_rows_clear(chunks);
@@ -134,9 +135,8 @@ Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChun
 }
 
 static Status reopen(Database *database, const void *work, Problem *problem) {
-    static const char chunks[] =
-        "UPDATE sweep_chunks SET is_open = 1 WHERE failed > 0 AND sweep = "
-        "(SELECT number FROM sweeps WHERE result = :result)";
+    static const char chunks[] = "UPDATE sweep_chunks SET is_open = 1 WHERE failed > 0 AND sweep = "
+                                 "(SELECT number FROM sweeps WHERE result = :result)";
     static const char sweep[] = "UPDATE sweeps SET retries = retries + 1 WHERE result = :result";
     int changes = 0;
     TRY(database_change(database, chunks, sweep_columns, work, &changes, problem));
