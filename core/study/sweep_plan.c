@@ -15,6 +15,7 @@ enum {
     COST_SAMPLES = 64,
     CHECK_ADVANCE = 256,
     SWEEP_VALUES = 1 << 21,
+    RANGE_SAMPLES = 512,
 };
 
 static bool is_range(const SweepAxis *axis) {
@@ -239,11 +240,20 @@ static Status check_next(Check *check, size_t point) {
 static Status check_sample(Check *check) {
     const SweepPlan *plan = check->plan;
     TRY(check_next(check, plan->points - 1));
-    if (plan->study->mode == SWEEP_LIST)
-        return check_next(check, 0);
-    for (size_t i = 0; i < plan->axis_count; i++)
-        for (size_t k = i > 0; k < plan->axes[i].count; k++)
-            TRY(check_next(check, k * plan->axes[i].stride));
+    if (plan->study->mode == SWEEP_LIST) {
+        for (size_t k = 0; k < RANGE_SAMPLES; k++)
+            TRY(check_next(check, k * (plan->points - 1) / (RANGE_SAMPLES - 1)));
+        return STATUS_OK;
+    }
+    for (size_t i = 0; i < plan->axis_count; i++) {
+        // Of a long range some values, both ends among them; of given values all.
+        const size_t count = plan->axes[i].count;
+        const bool is_long = is_range(&plan->study->axes.at[i]) && count > RANGE_SAMPLES;
+        const size_t samples = is_long ? RANGE_SAMPLES : count;
+        for (size_t k = i > 0; k < samples; k++)
+            TRY(check_next(check,
+                           (is_long ? k * (count - 1) / (samples - 1) : k) * plan->axes[i].stride));
+    }
     return STATUS_OK;
 }
 

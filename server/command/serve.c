@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/math/fourier.h"
+#include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/command/serve.h"
@@ -18,7 +19,8 @@
 
 typedef struct ServeSettings {
     char *listen, *data, *config;
-    uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, cache_bytes;
+    uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, max_points,
+        cache_bytes;
     double max_cpu_seconds;
     bool print_config;
 } ServeSettings;
@@ -38,6 +40,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
+    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
@@ -98,7 +101,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
-                                            .bytes = (double)settings->max_run_bytes}};
+                                            .bytes = (double)settings->max_run_bytes,
+                                            .points = settings->max_points}};
     Listener *listener = NULL;
     fourier_start();
     TRY(address_read(settings->listen, &door.address, problem));
