@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NAME_SIZE = 96, LINE_SIZE = 4096 };
+enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096 };
 
 static const char *const origin_names[] = {"default", "file", "environment", "flag"};
 
@@ -356,13 +356,26 @@ void options_print(const Field *fields, const void *item, const Options *options
     }
 }
 
+char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]) {
+    name_spell(name, "--", row->name, true);
+    bool is_first = row->name[0] != 'h'; // -h is help
+    for (const Field *other = fields; other < row; other++)
+        is_first = is_first && other->name[0] != row->name[0];
+    return is_first ? row->name[0] : '\0';
+}
+
 void options_help(const Field *fields, FILE *file) {
+    static const OptionGroup none[] = {{NULL, NULL}};
+    options_help_grouped(fields, none, file);
+}
+
+void options_help_grouped(const Field *fields, const OptionGroup *groups, FILE *file) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         char spelt[NAME_SIZE], left[2 * NAME_SIZE];
-        name_spell(spelt, "--", row->name, true);
-        bool is_first = true;
-        for (const Field *other = fields; other < row; other++)
-            is_first = is_first && other->name[0] != row->name[0];
+        for (const OptionGroup *group = groups; group->first != NULL; group++)
+            if (strcmp(group->first, row->name) == 0)
+                fprintf(file, "%s%s\n", row == fields ? "" : "\n", group->title);
+        const bool is_first = option_spell(fields, row, spelt) != '\0';
         const char *value = row->kind == FIELD_KIND_TEXT    ? " TEXT"
                             : row->kind == FIELD_KIND_TEXTS ? " TEXT ..."
                             : row->kind == FIELD_KIND_FLAG  ? ""

@@ -8,7 +8,7 @@
 
 #include "core/base/field.h"
 
-enum { OPTIONS_ROWS = 48, OPTIONS_OPERANDS = 8 };
+enum { OPTIONS_ROWS = 96, OPTIONS_OPERANDS = 8 };
 
 typedef enum OptionOrigin {
     OPTION_DEFAULT,
@@ -34,7 +34,18 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
 // One line per row as a config file would have it, with its origin behind a "#".
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file);
 
+// How a row is typed: "--queue-most" into `name`; returns its letter, '\0' where another has it.
+enum { OPTION_NAME = 96 };
+char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]);
+
 // One line per row for --help.
 void options_help(const Field *fields, FILE *file);
+
+// A heading over the row `first` and those behind it.
+typedef struct OptionGroup {
+    const char *first, *title;
+} OptionGroup;
+// The same with headings, which end with first == NULL.
+void options_help_grouped(const Field *fields, const OptionGroup *groups, FILE *file);
 
 #endif

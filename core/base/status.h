@@ -23,6 +23,7 @@
     X(CONFLICT, "conflict", "Conflict")                                                            \
     X(GONE, "gone", "Gone")                                                                        \
     X(TIMEOUT, "timeout", "Timed out")                                                             \
+    X(UNREACHABLE, "unreachable", "The server cannot be reached")                                  \
     X(BUSY, "busy", "Too busy")                                                                    \
     X(CANCELLED, "cancelled", "Cancelled")                                                         \
     X(LIMIT, "limit", "A limit was reached")                                                       \

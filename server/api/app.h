@@ -13,7 +13,12 @@
 struct App {
     Store *store;
     Intake *intake;
-    size_t reply_most; // bytes of one answer
+    const struct Meter *meter;
+    struct Hot *hot;
+    struct Listener *listener; // NULL until it is open
+    size_t reply_most;         // bytes of one answer
+    char base_url[256];        // as clients see us, without a slash at its end; "": by their Host
+    bool has_tls;
     int64_t started_unix_ms;
     atomic_bool is_stopping;
 };
@@ -28,6 +33,6 @@ Handler results_show, results_manifest, results_series, results_psd, results_imp
 Handler sweeps_table, sweeps_point, sweeps_scene, sweeps_retry;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
-Handler health_live, health_ready, version_show, landing_show;
+Handler health_live, health_ready, metrics_show, version_show, landing_show;
 
 #endif

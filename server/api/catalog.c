@@ -7,6 +7,7 @@
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/base/embedded.h"
+#include "server/base/link.h"
 #include "server/codec/describe.h"
 #include "server/codec/read.h"
 #include "server/http/reply.h"
@@ -49,7 +50,8 @@ static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *na
     bytes_json_string(bytes, name);
     bytes_text(bytes, ", \"title\": ");
     bytes_json_string(bytes, is_read ? inquiry.simulation.title : NULL);
-    bytes_format(bytes, ", \"links\": {\"self\": \"/v1/examples/%s\"}, \"scene\": ", name);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/examples/%s\"}, \"scene\": ", link_base(),
+                 name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
     inquiry_clear(&inquiry);
@@ -93,7 +95,8 @@ Status schemas_list(App *app, const Request *request, Reply *reply, Problem *pro
                      "%s{\"name\": \"%s\", \"title\": ", document == schema_documents ? "" : ", ",
                      document->name);
         bytes_json_string(&bytes, document->title);
-        bytes_format(&bytes, ", \"links\": {\"self\": \"/schemas/%s\"}}", document->name);
+        bytes_format(&bytes, ", \"links\": {\"self\": \"%s/schemas/%s\"}}", link_base(),
+                     document->name);
     }
     bytes_text(&bytes, "]}\n");
     return reply_bytes(reply, 200, type_json, &bytes, problem);
@@ -115,13 +118,22 @@ Status schemas_show(App *app, const Request *request, Reply *reply, Problem *pro
                        "there is no schema \"%.60s\"; GET /schemas lists them", name);
 }
 
+// The description names the server that it stands for in the file; here that is the base URL.
 Status openapi_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    (void)app;
+    static const char before[] = "\"servers\": [{\"url\": \"";
     const EmbeddedFile *file = embedded_find(embedded_schemas, "schema/openapi.json");
-    if (file == NULL)
+    const char *servers = file != NULL ? strstr(file->bytes, before) : NULL;
+    if (servers == NULL)
         return problem_set(problem, STATUS_INTERNAL,
                            "this program was built without its API description");
-    return show_file(request, reply, file, type_json);
+    if (app->base_url[0] == '\0')
+        return show_file(request, reply, file, type_json);
+    const char *url = servers + sizeof before - 1, *rest = strchr(url, '"');
+    Bytes bytes = {.most = app->reply_most};
+    bytes_put(&bytes, file->bytes, (size_t)(url - file->bytes));
+    bytes_text(&bytes, app->base_url);
+    bytes_text(&bytes, rest);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status health_live(App *app, const Request *request, Reply *reply, Problem *problem) {

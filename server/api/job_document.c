@@ -1,6 +1,7 @@
 #include "server/api/job_document.h"
 
 #include "server/base/clock.h"
+#include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 
@@ -20,13 +21,14 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
 
 static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
                         bool has_table) {
-    bytes_format(bytes, ", \"links\": {\"self\": \"/v1/jobs/%s\"", id);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/%s\"", link_base(), id);
     if (has_table)
-        bytes_format(bytes, ", \"table\": \"/v1/jobs/%s/table.json\"", id);
+        bytes_format(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", link_base(), id);
     if (has_result)
-        bytes_format(bytes,
-                     ", \"result\": \"/v1/results/%s\", \"series\": \"/v1/results/%s/series.json\"",
-                     result, result);
+        bytes_format(
+            bytes,
+            ", \"result\": \"%s/v1/results/%s\", \"series\": \"%s/v1/results/%s/series.json\"",
+            link_base(), result, link_base(), result);
     bytes_text(bytes, "}");
 }
 

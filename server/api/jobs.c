@@ -108,6 +108,10 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         TRY(body_require_json(request, problem));
         if (is_dry)
             return dry_run(app, request, reply, problem);
+        if (atomic_load(&app->is_stopping))
+            return problem_set(problem, STATUS_BUSY,
+                               "the daemon is stopping and takes no new jobs; try again when it "
+                               "is back");
         const Submission submission = {
             .text = request->body, .size = request->body_size, .client = request->client};
         TRY(intake_submit(app->intake, &submission, &job, problem));

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "server/api/app.h"
+#include "server/base/link.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 
@@ -47,6 +48,8 @@ static const Step steps[] = {
      "@/v1/jobs | " RESULT ")"},
     {NULL, "curl -s @/v1/results/$R/table.csv"},
     {NULL, "curl -s @/v1/results/$R/points/17/scene | curl -s --json @- @/v1/jobs"},
+    {"Where tokens are asked for, every line needs this too:",
+     "curl -s -H \"Authorization: Bearer $IMPACTD_TOKEN\" @/v1/jobs"},
     {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
     {NULL, "curl -s @/v1/materials"},
     {NULL, "curl -s @/v1/examples"},
@@ -99,24 +102,26 @@ static void write_escaped(Bytes *bytes, const char *text) {
 static void write_html(Bytes *bytes, const char *text) {
     static const char *const links[] = {"/v1/jobs", "/v1/materials", "/v1/examples",
                                         "/schemas", "/openapi.json", "/health/ready",
-                                        "/version"};
+                                        "/metrics", "/version"};
     bytes_text(bytes,
                "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
                "<meta name=\"viewport\" content=\"width=device-width\">\n<title>impactd</title>\n"
                "<h1>impactd</h1>\n<p>");
     for (size_t i = 0; i < COUNT(links); i++)
-        bytes_format(bytes, "<a href=\"%s\">%s</a>\n", links[i], links[i]);
+        bytes_format(bytes, "<a href=\"%s%s\">%s</a>\n", link_base(), links[i], links[i]);
     bytes_text(bytes, "</p>\n<pre>");
     write_escaped(bytes, text);
     bytes_text(bytes, "</pre>\n</html>\n");
 }
 
 Status landing_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    (void)app;
     static const char *const types[] = {"text/plain", "text/html", NULL};
-    char url[96];
+    char url[sizeof app->base_url];
     // The gate lets through no Host but ours, so it can stand in a line for the shell.
-    snprintf(url, sizeof url, "http://%.80s", request->host);
+    if (app->base_url[0] != '\0')
+        text_fit(url, sizeof url, app->base_url);
+    else
+        snprintf(url, sizeof url, "%s://%.80s", app->has_tls ? "https" : "http", request->host);
     Bytes text = {.most = 1 << 16};
     write_text(&text, url);
     reply->varies_by_accept = true;

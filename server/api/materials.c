@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "server/api/app.h"
+#include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/http/reply.h"
 
@@ -14,8 +15,9 @@ static void write_material(Bytes *bytes, const MaterialRevision *material) {
         bytes_text(bytes, ", ");
     bytes_format(
         bytes,
-        "\"links\": {\"self\": \"/v1/materials/%s\", \"revision\": \"/v1/materials/%s@%llu\"}}",
-        material->slug, material->slug, (unsigned long long)material->revision);
+        "\"links\": {\"self\": \"%s/v1/materials/%s\", \"revision\": \"%s/v1/materials/%s@%llu\"}}",
+        link_base(), material->slug, link_base(), material->slug,
+        (unsigned long long)material->revision);
 }
 
 static bool holds(const char *text, const char *word) {

@@ -9,6 +9,7 @@
 #include "server/api/app.h"
 #include "server/api/studies.h"
 #include "server/base/clock.h"
+#include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
@@ -66,22 +67,23 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
 static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer) {
     static const char *const ways[] = {"manifest", "series.json",  "series.csv", "series.npy",
                                        "psd.json", "impacts.json", "energy.json"};
-    bytes_format(bytes, "{\"self\": \"/v1/results/%s\"", id);
+    bytes_format(bytes, "{\"self\": \"%s/v1/results/%s\"", link_base(), id);
     for (size_t i = 0; i < COUNT(ways); i++) {
         // "series" is the JSON one; the other formats are named in full.
         const size_t size =
             strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
-        bytes_format(bytes, ", \"%.*s\": \"/v1/results/%s/%s\"", (int)size, ways[i], id, ways[i]);
+        bytes_format(bytes, ", \"%.*s\": \"%s/v1/results/%s/%s\"", (int)size, ways[i], link_base(),
+                     id, ways[i]);
     }
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
         const bool is_table = answer->study->kind == study_sweep.answer;
         const char *name = is_table ? "table" : answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);
-        bytes_format(bytes, ", \"%s\": \"/v1/results/%s/%s.json\"", name, id, name);
+        bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, link_base(), id, name);
         while ((++format)->extension != NULL)
-            bytes_format(bytes, ", \"%s.%s\": \"/v1/results/%s/%s.%s\"", name, format->extension,
-                         id, name, format->extension);
+            bytes_format(bytes, ", \"%s.%s\": \"%s/v1/results/%s/%s.%s\"", name, format->extension,
+                         link_base(), id, name, format->extension);
     }
     bytes_text(bytes, "}");
 }
@@ -209,11 +211,13 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
         bytes_text(&bytes, json_or(row.scene, "null"));
         bytes_text(&bytes, ", \"materials\": ");
         write_materials(app, &bytes, &inquiry.simulation);
-        bytes_text(&bytes,
-                   ", \"again\": {\"method\": \"POST\", \"path\": \"/v1/jobs\", \"content_type\": "
-                   "\"application/json\", \"body\": \"the member scene of this document\", "
-                   "\"why\": \"the same "
-                   "scene and engine give the same id and the same bytes");
+        bytes_format(
+            &bytes,
+            ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", \"content_type\": "
+            "\"application/json\", \"body\": \"the member scene of this document\", "
+            "\"why\": \"the same "
+            "scene and engine give the same id and the same bytes",
+            link_base());
         // It is measured once and then kept; elsewhere it comes out a little differently.
         if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
             bytes_text(&bytes, ", but for the CPU time that a study measures and what follows of "

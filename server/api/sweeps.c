@@ -5,6 +5,7 @@
 
 #include "server/api/app.h"
 #include "server/api/job_document.h"
+#include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
 #include "server/encode/sweep_table.h"
@@ -16,7 +17,7 @@
 // A path begins with a result, or with the job that makes it.
 static bool is_of_job(const Request *request) {
     static const char jobs[] = "/v1/jobs/";
-    return strncmp(request->path, jobs, sizeof jobs - 1) == 0;
+    return strncmp(link_inside(request->path), jobs, sizeof jobs - 1) == 0;
 }
 
 // By the extension in the path, else by Accept.
@@ -108,12 +109,12 @@ static void put_point(Bytes *bytes, const SweepShow *show, uint64_t index,
     }
     bytes_text(bytes, "}, \"scene\": ");
     document_scene(bytes, &point->scene);
-    bytes_format(bytes,
-                 ", \"links\": {\"self\": \"/v1/results/%s/points/%llu\", \"scene\": "
-                 "\"/v1/results/%s/points/%llu/scene\", \"table\": "
-                 "\"/v1/results/%s/table.json\"}}\n",
-                 show->row.result, (unsigned long long)index, show->row.result,
-                 (unsigned long long)index, show->row.result);
+    const char *base = link_base(), *id = show->row.result;
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s/points/%llu\"", base, id,
+                 (unsigned long long)index);
+    bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/%llu/scene\"", base, id,
+                 (unsigned long long)index);
+    bytes_format(bytes, ", \"table\": \"%s/v1/results/%s/table.json\"}}\n", base, id);
 }
 
 static Status show_point(App *app, const Request *request, Reply *reply, bool is_scene,

@@ -6,8 +6,6 @@
 #include <gnutls/crypto.h>
 #include <gnutls/gnutls.h>
 
-enum { SHA256_BYTES = 32 };
-
 struct Digest {
     gnutls_hash_hd_t hash;
 };
@@ -28,14 +26,22 @@ void digest_take(void *digest, const void *bytes, size_t size) {
     (void)gnutls_hash(((Digest *)digest)->hash, bytes, size);
 }
 
-void digest_end(Digest *digest, char target[65]) {
+void digest_spell(const unsigned char sum[DIGEST_BYTES], char target[65]) {
     static const char hexadecimal[] = "0123456789abcdef";
-    unsigned char sum[SHA256_BYTES];
-    gnutls_hash_deinit(digest->hash, sum);
-    free(digest);
-    for (size_t i = 0; i < SHA256_BYTES; i++) {
+    for (size_t i = 0; i < DIGEST_BYTES; i++) {
         target[2 * i] = hexadecimal[sum[i] >> 4];
         target[2 * i + 1] = hexadecimal[sum[i] & 15];
     }
-    target[2 * SHA256_BYTES] = '\0';
+    target[2 * (size_t)DIGEST_BYTES] = '\0';
+}
+
+void digest_end(Digest *digest, char target[65]) {
+    unsigned char sum[DIGEST_BYTES];
+    gnutls_hash_deinit(digest->hash, sum);
+    free(digest);
+    digest_spell(sum, target);
+}
+
+void digest_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]) {
+    (void)gnutls_hash_fast(GNUTLS_DIG_SHA256, bytes, size, target);
 }

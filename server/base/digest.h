@@ -11,4 +11,10 @@ void digest_take(void *digest, const void *bytes, size_t size); // fits canonica
 // Ends and frees; 64 lower-case hexadecimal digits and a NUL.
 void digest_end(Digest *digest, char target[65]);
 
+enum { DIGEST_BYTES = 32 };
+// The digest of all of `bytes` at once, as it is.
+void digest_sum(const void *bytes, size_t size, unsigned char target[DIGEST_BYTES]);
+// The same as 64 digits and a NUL.
+void digest_spell(const unsigned char sum[DIGEST_BYTES], char target[65]);
+
 #endif

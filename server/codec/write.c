@@ -192,6 +192,7 @@ int write_problem_code(Status status) {
         [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
         [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 422,
         [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,
+        [STATUS_UNREACHABLE] = 502,
     };
     // clang-format on
     return (size_t)status < COUNT(codes) && codes[status] != 0 ? codes[status] : 500;

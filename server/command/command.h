@@ -21,10 +21,11 @@ typedef enum CommandExit {
 
 typedef struct Command {
     const char *name;
-    const char *operands; // as help shows them: "SCENE.json"; NULL: takes none
-    const char *summary;  // one line
-    const char *help;     // examples and what else one should know; whole lines
-    const Field *options; // rows for help; NULL: none
+    const char *operands;      // as help shows them: "SCENE.json"; NULL: takes none
+    const char *summary;       // one line
+    const char *help;          // examples and what else one should know; whole lines
+    const Field *options;      // rows for help; NULL: none
+    const OptionGroup *groups; // headings over them; NULL: none
     // argv[0] is the first argument behind the command's name. Returns the exit code.
     int (*run)(int argc, char *const *argv);
 } Command;

@@ -4,14 +4,20 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
+#include "server/command/cancel.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
+#include "server/command/compare.h"
 #include "server/command/ensemble.h"
+#include "server/command/get.h"
 #include "server/command/import.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
+#include "server/command/submit.h"
 #include "server/command/sweep.h"
+#include "server/command/token.h"
 #include "server/command/tradeoff.h"
+#include "server/command/watch.h"
 #include "server/options.h"
 
 static int help_run(int argc, char *const *argv);
@@ -32,8 +38,10 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve, &command_run,    &command_check, &command_tradeoff, &command_ensemble,
-    &command_sweep, &command_import, &command_help,  &command_version,  NULL,
+    &command_serve,    &command_run,   &command_check,   &command_tradeoff,
+    &command_ensemble, &command_sweep, &command_import,  &command_token,
+    &command_submit,   &command_watch, &command_get,     &command_cancel,
+    &command_compare,  &command_help,  &command_version, NULL,
 };
 
 static const char overview[] =
@@ -46,7 +54,10 @@ static const char overview[] =
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
     "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
+    "  impactd token create --name lab      let a client in who has this token\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
+    "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"
+    "  impactd get JOB series -o out.npy    what became of it\n"
     "\n"
     "A scene: release a structure from 15 mm, a ball between two sponges inside it.\n"
     "\n"
@@ -82,7 +93,10 @@ static void command_print(const Command *command) {
     fputs(command->help, stdout);
     if (command->options != NULL) {
         putchar('\n');
-        options_help(command->options, stdout);
+        if (command->groups != NULL)
+            options_help_grouped(command->options, command->groups, stdout);
+        else
+            options_help(command->options, stdout);
     }
 }
 
@@ -166,6 +180,8 @@ int command_exit(Status status) {
     case STATUS_UNAUTHORIZED:
     case STATUS_FORBIDDEN:
         return COMMAND_NOT_ALLOWED;
+    case STATUS_UNREACHABLE:
+        return COMMAND_UNREACHABLE;
     case STATUS_TIMEOUT:
         return COMMAND_TIMED_OUT;
     case STATUS_CANCELLED:

@@ -19,6 +19,8 @@ enum { PATH_SIZE = 4096 };
 static char final_path[PATH_SIZE], part_path[PATH_SIZE];
 static volatile sig_atomic_t has_part;
 static int part = -1;
+static char farewell[512];
+static volatile sig_atomic_t farewell_size;
 
 static void interrupted(int number) {
     (void)number;
@@ -26,6 +28,7 @@ static void interrupted(int number) {
         (void)unlink(part_path);
     if (isatty(STDERR_FILENO))
         (void)!write(STDERR_FILENO, "\n", 1);
+    (void)!write(STDERR_FILENO, farewell, (size_t)farewell_size);
     _exit(COMMAND_INTERRUPTED);
 }
 
@@ -43,6 +46,14 @@ static void signals_hold(sigset_t *before) {
     sigaddset(&held, SIGINT);
     sigaddset(&held, SIGTERM);
     (void)sigprocmask(SIG_BLOCK, &held, before);
+}
+
+void output_farewell(const char *text) {
+    sigset_t before;
+    signals_hold(&before);
+    snprintf(farewell, sizeof farewell, "%s", text != NULL ? text : "");
+    farewell_size = (sig_atomic_t)strlen(farewell);
+    (void)sigprocmask(SIG_SETMASK, &before, NULL);
 }
 
 Status output_open(const char *path, Problem *problem) {

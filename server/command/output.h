@@ -1,5 +1,6 @@
 // A file that appears whole or not at all: written beside its name, renamed at the end, removed
-// when the program is interrupted. Not a stream to a terminal. Used by run.c and import.c.
+// when the program is interrupted. Not a stream to a terminal. Used by the commands that
+// write files.
 #ifndef SERVER_COMMAND_OUTPUT_H
 #define SERVER_COMMAND_OUTPUT_H
 
@@ -18,5 +19,8 @@ void output_drop(void);
 // From here on Ctrl-C and SIGTERM remove the open output and end the program at once with exit code
 // 130.
 void output_guard(void);
+
+// What those two say on stderr from here on, a whole line; NULL: nothing.
+void output_farewell(const char *text);
 
 #endif

@@ -1,28 +1,35 @@
 // impactd serve: the daemon. Opens store, intake and listener in this order, waits for SIGTERM or
 // SIGINT, and closes them so that nobody meets a room that is gone: first no more requests, then no
 // more work, then what sleepers used.
+#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "core/math/fourier.h"
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
+#include "server/base/notify.h"
+#include "server/command/data_folder.h"
+#include "server/command/reach.h"
 #include "server/command/serve.h"
 #include "server/http/dispatch.h"
 #include "server/http/listener.h"
 #include "server/options.h"
 
 typedef struct ServeSettings {
-    char *listen, *data, *config;
-    uint64_t workers, queue, max_body, max_samples, max_impacts, max_run_bytes, max_points,
-        cache_bytes;
+    char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
+    Texts host;
+    uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
+        max_points, cache_bytes;
     double max_cpu_seconds;
-    bool print_config;
+    int journal;
+    bool require_tokens, print_config;
 } ServeSettings;
 
 enum { GRACE_MS = 1500 };
@@ -31,10 +38,11 @@ enum { GRACE_MS = 1500 };
 
 // clang-format off
 static const Field serve_fields[] = {
-    FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT on loopback; port 0 takes any free one (127.0.0.1:8080)"),
+    FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT, in digits or localhost; port 0 takes any free one; beyond loopback a token must exist (127.0.0.1:8080)"),
     FIELD_TEXT(ServeSettings, data, 4000, PRESENCE_OPTIONAL, 0, "folder of the database ($XDG_STATE_HOME/impactd, else ~/.local/state/impactd)"),
     FIELD_COUNT(ServeSettings, workers, NULL, WITHIN(0, 256), 0, "simulations at once; 0 takes the number of processors"),
     FIELD_COUNT(ServeSettings, queue, NULL, WITHIN(1, 1e6), 10000, "unfinished jobs at most; more are answered 503"),
+    FIELD_COUNT(ServeSettings, queue_bytes, "B", WITHIN(1024, 1099511627776.0), 256 * MIB, "of unfinished jobs' scenes at most; more are answered 503"),
     FIELD_COUNT(ServeSettings, max_body, "B", WITHIN(1024, 1024 * MIB), 16 * MIB, "a larger request body is answered 413"),
     FIELD_COUNT(ServeSettings, max_samples, NULL, WITHIN(2, 1073741824.0), 33554432, "samples per channel a scene may ask for"),
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
@@ -42,35 +50,32 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another name that requests may call this machine by; may be repeated, or a list with commas"),
+    FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "how clients reach it behind a proxy, as https://sim.example.org/impactd; every link begins with it"),
+    FIELD_FLAG(ServeSettings, require_tokens, false, "ask for a token on loopback too, even while there is none"),
+    FIELD_TEXT(ServeSettings, tls_cert, 4000, PRESENCE_OPTIONAL, 0, "PEM file of the certificate, for HTTPS"),
+    FIELD_TEXT(ServeSettings, tls_key, 4000, PRESENCE_OPTIONAL, 0, "PEM file of its key"),
+    FIELD_CHOICE(ServeSettings, journal, journal_mode_names, JOURNAL_ERRORS, "which requests get a line on standard error: off, errors or all"),
     FIELD_TEXT(ServeSettings, config, 4000, PRESENCE_OPTIONAL, 0, "a file of settings, one \"name = value\" a line"),
     FIELD_FLAG(ServeSettings, print_config, false, "print each setting and where it came from, and stop"),
     FIELD_END,
 };
 // clang-format on
 
-static Status set_text(char **target, const char *text) {
-    if (*target != NULL)
-        return STATUS_OK;
-    *target = strdup(text);
-    return *target != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-}
+static const OptionGroup serve_groups[] = {
+    {"listen", "Where it listens and keeps its data"},
+    {"workers", "Work"},
+    {"max_body", "Limits"},
+    {"cache_bytes", "Memory"},
+    {"host", "Who can reach it, and how"},
+    {"journal", "Journal and settings"},
+    {NULL, NULL},
+};
 
 // The defaults that depend on where we run.
 static Status complete(ServeSettings *settings, Problem *problem) {
-    char folder[4096];
-    const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
-    int size = -1;
-    // The specification of XDG has relative paths ignored.
-    if (state != NULL && state[0] == '/')
-        size = snprintf(folder, sizeof folder, "%s/impactd", state);
-    else if (home != NULL && home[0] == '/')
-        size = snprintf(folder, sizeof folder, "%s/.local/state/impactd", home);
-    if (settings->data == NULL && (size < 0 || (size_t)size >= sizeof folder))
-        return problem_set(
-            problem, STATUS_USAGE,
-            "no place for the data: neither XDG_STATE_HOME nor HOME is set; use --data DIR");
-    if (set_text(&settings->data, folder) != STATUS_OK ||
-        set_text(&settings->listen, "127.0.0.1:8080") != STATUS_OK)
+    TRY(data_folder_default(&settings->data, problem));
+    if (settings->listen == NULL && (settings->listen = strdup("127.0.0.1:8080")) == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory");
     if (settings->workers == 0) {
         const long processors = sysconf(_SC_NPROCESSORS_ONLN);
@@ -79,51 +84,127 @@ static Status complete(ServeSettings *settings, Problem *problem) {
     return STATUS_OK;
 }
 
-static void greet(const Listener *listener, const ServeSettings *settings) {
-    const char *url = listener_url(listener);
-    printf("impactd %s listens on %s\n", program_version, url);
+static Status refuse(Problem *problem, const char *small, uint64_t value, const char *large,
+                     uint64_t other, const char *why) {
+    return problem_add(problem, STATUS_USAGE, small, "must be at least %s, %llu, is %llu: %s",
+                       large, (unsigned long long)other, (unsigned long long)value, why);
+}
+
+// Settings that are right by themselves and wrong together.
+static Status check(const ServeSettings *settings, Problem *problem) {
+    Status status = STATUS_OK;
+    if (settings->queue_bytes < settings->max_body)
+        status = refuse(problem, "--queue-bytes", settings->queue_bytes, "--max-body",
+                        settings->max_body, "a scene that is taken must find room in the queue");
+    if (settings->queue < settings->workers)
+        status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
+                        "a worker without a job is of no use");
+    return status;
+}
+
+static void greet(const Listener *listener, const ServeSettings *settings, const App *app) {
+    const char *url = app->base_url[0] != '\0' ? app->base_url : listener_url(listener);
+    printf("impactd %s listens on %s\n", program_version, listener_url(listener));
     printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
            (unsigned long long)settings->workers);
     printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
     fflush(stdout);
 }
 
+// Waits for a signal to end, and tells systemd meanwhile that we live.
+static int wait_for_end(const sigset_t *stops) {
+    const int64_t period_ms = notify_watchdog_ms();
+    const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
+                                    .tv_nsec = (long)(period_ms % 1000) * 1000000};
+    for (;;) {
+        const int signal =
+            period_ms > 0 ? sigtimedwait(stops, NULL, &period) : sigwaitinfo(stops, NULL);
+        if (signal > 0)
+            return signal;
+        if (errno == EAGAIN)
+            notify_send("WATCHDOG=1");
+    }
+}
+
+// From here on a second signal ends us at once; what is acknowledged is in the database.
+static void let_signals_kill(const sigset_t *stops) {
+    signal(SIGTERM, SIG_DFL);
+    signal(SIGINT, SIG_DFL);
+    pthread_sigmask(SIG_UNBLOCK, stops, NULL);
+}
+
+static void run_until_stopped(App *app, const ServeSettings *settings, const sigset_t *stops) {
+    greet(app->listener, settings, app);
+    notify_send("READY=1");
+    const int signal = wait_for_end(stops);
+    notify_send("STOPPING=1");
+    atomic_store(&app->is_stopping, true);
+    let_signals_kill(stops);
+    fprintf(stderr, "impactd: %s, stopping\n", signal == SIGINT ? "interrupted" : "asked to end");
+}
+
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
-    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20)};
+    Doorman doorman = {.journal = (JournalMode)settings->journal};
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20), &doorman};
     ListenerSettings door = {.body_most = settings->max_body,
                              .answer_at_once = dispatch_at_once,
                              .answer = dispatch,
+                             .admits = dispatch_admits,
+                             .note = dispatch_note,
                              .context = &dispatcher};
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
+                                 .queue_bytes = settings->queue_bytes,
                                  .cache_bytes = settings->cache_bytes,
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
                                             .bytes = (double)settings->max_run_bytes,
                                             .points = settings->max_points}};
-    Listener *listener = NULL;
+    const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,
+                                 settings->tls_key, settings->require_tokens};
+    Reach ready = {0};
+    Meter *meter = NULL;
     fourier_start();
-    TRY(address_read(settings->listen, &door.address, problem));
-    TRY(store_open(settings->data, &app.store, problem));
-    Status status = intake_open(app.store, &work, &app.intake, problem);
-    if (status == STATUS_OK)
-        status = listener_open(&door, &listener, problem);
+    Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
-        int signal = 0;
-        greet(listener, settings);
-        sigwait(stops, &signal);
-        atomic_store(&app.is_stopping, true);
-        fprintf(stderr, "impactd: %s, stopping\n",
-                signal == SIGINT ? "interrupted" : "asked to end");
+        const Status together = check(settings, problem);
+        status = reach_read(&asked, &door.address, &ready, problem);
+        status = together != STATUS_OK ? together : status;
     }
-    listener_stop(listener, GRACE_MS);
+    if (status == STATUS_OK && (meter = meter_new(routes)) == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
+    if (status == STATUS_OK)
+        status = store_open(settings->data, &app.store, problem);
+    if (status == STATUS_OK)
+        status = tokens_open(app.store, ready.needs_tokens, &doorman.tokens, problem);
+    if (status == STATUS_OK)
+        status = reach_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
+    if (status == STATUS_OK)
+        status = intake_open(app.store, &work, &app.intake, problem);
+    if (status == STATUS_OK) {
+        link_base_set(ready.url.path);
+        text_fit(app.base_url, sizeof app.base_url, ready.url.text);
+        app.has_tls = ready.tls_cert != NULL;
+        app.meter = doorman.meter = meter;
+        app.hot = dispatcher.hot;
+        door.hosts = &ready.hosts;
+        door.tls_cert = ready.tls_cert;
+        door.tls_key = ready.tls_key;
+        status = listener_open(&door, &app.listener, problem);
+    }
+    if (status == STATUS_OK)
+        run_until_stopped(&app, settings, stops);
+    listener_stop(app.listener, GRACE_MS);
     if (app.intake != NULL)
         intake_close(app.intake);
-    listener_free(listener);
+    listener_free(app.listener);
     hot_free(dispatcher.hot);
+    tokens_close(doorman.tokens);
     store_close(app.store);
+    meter_free(meter);
+    reach_clear(&ready);
     return status;
 }
 
@@ -173,13 +254,17 @@ static int run(int argc, char *const *argv) {
 const Command command_serve = {
     .name = "serve",
     .summary = "the daemon: takes scenes over HTTP, keeps jobs and results",
-    .help = "  impactd serve\n"
-            "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
-            "  impactd serve --print-config\n"
-            "\n"
-            "Prints its URL and a curl line. SIGTERM or Ctrl-C ends it within 5 seconds; "
-            "unfinished jobs go on at\n"
-            "the next start. GET / of the URL shows what it can do.\n",
+    .help =
+        "  impactd serve\n"
+        "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
+        "  impactd serve --print-config\n"
+        "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert c.pem "
+        "--tls-key k.pem\n"
+        "\n"
+        "Prints its URL and a curl line. SIGTERM or Ctrl-C ends it within 5 seconds; "
+        "unfinished jobs go on at\n"
+        "the next start. GET / of the URL shows what it can do.\n",
     .options = serve_fields,
+    .groups = serve_groups,
     .run = run,
 };

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "server/base/link.h"
+
 static const char *unit_of(const Sweep *sweep, size_t metric) {
     return sweep_metric_unit(sweep->metrics.at[metric]);
 }
@@ -97,6 +99,13 @@ static void put_failures(Bytes *bytes, const Sweep *sweep) {
     bytes_text(bytes, "]");
 }
 
+static void put_links(Bytes *bytes, const char *result) {
+    const char *base = link_base();
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s/table.json\"", base, result);
+    bytes_format(bytes, ", \"point\": \"%s/v1/results/%s/points/{index}\"", base, result);
+    bytes_format(bytes, ", \"scene\": \"%s/v1/results/%s/points/{index}/scene\"}", base, result);
+}
+
 void sweep_json(const Sweep *sweep, const char *result, Bytes *bytes) {
     const size_t rows = sweep->table.points.count;
     bytes_text(bytes, "{\"kind\": \"sweep\", ");
@@ -110,11 +119,7 @@ void sweep_json(const Sweep *sweep, const char *result, Bytes *bytes) {
     put_failures(bytes, sweep);
     put_columns(bytes, sweep);
     if (result != NULL)
-        bytes_format(bytes,
-                     ", \"links\": {\"self\": \"/v1/results/%s/table.json\", \"point\": "
-                     "\"/v1/results/%s/points/{index}\", \"scene\": "
-                     "\"/v1/results/%s/points/{index}/scene\"}",
-                     result, result, result);
+        put_links(bytes, result);
     bytes_text(bytes, "}\n");
 }
 

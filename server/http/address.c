@@ -1,6 +1,5 @@
-// Where the daemon listens, and the socket for it: loopback only, while there are no access tokens.
-// Knows no HTTP. The socket is our own, so that a taken port can be told from other faults and port
-// 0 can be asked which one it became.
+// Where the daemon listens, and the socket for it. Knows no HTTP. The socket is our own, so that a
+// taken port can be told from other faults and port 0 can be asked which one it became.
 #include "server/http/address.h"
 
 #include <arpa/inet.h>
@@ -40,15 +39,31 @@ Status address_read(const char *text, Address *address, Problem *problem) {
                            "\"%.60s\" is not HOST:PORT with a port within [0, 65535]", text);
     if (strcmp(host, "localhost") == 0)
         snprintf(host, sizeof host, "127.0.0.1");
-    if (strcmp(host, "127.0.0.1") != 0 && strcmp(host, "::1") != 0)
-        return problem_set(
-            problem, STATUS_FORBIDDEN,
-            "will not listen on %s: without access tokens only loopback is open; use 127.0.0.1, "
-            "[::1] or localhost",
-            host);
+    unsigned char ignored[16];
+    if (inet_pton(text[0] == '[' ? AF_INET6 : AF_INET, host, ignored) != 1)
+        return problem_set(problem, STATUS_USAGE,
+                           "\"%.60s\" is not the address of an interface; write it in digits, as "
+                           "127.0.0.1, [::1] or 0.0.0.0 for all, or localhost",
+                           host);
     snprintf(address->host, sizeof address->host, "%s", host);
     address->port = (uint16_t)number;
     return STATUS_OK;
+}
+
+bool address_is_loopback(const Address *address) {
+    return strncmp(address->host, "127.", 4) == 0 || strcmp(address->host, "::1") == 0;
+}
+
+bool address_is_any(const Address *address) {
+    unsigned char bytes[16] = {1};
+    const bool is_v6 = strchr(address->host, ':') != NULL;
+    const size_t size = is_v6 ? 16 : 4;
+    if (inet_pton(is_v6 ? AF_INET6 : AF_INET, address->host, bytes) != 1)
+        return false;
+    for (size_t i = 0; i < size; i++)
+        if (bytes[i] != 0)
+            return false;
+    return true;
 }
 
 Status address_open(Address *address, int *descriptor, Problem *problem) {
@@ -93,8 +108,8 @@ Status address_open(Address *address, int *descriptor, Problem *problem) {
     return STATUS_OK;
 }
 
-void address_url(const Address *address, bool is_tls, char target[96]) {
+void address_url(const Address *address, bool has_tls, char target[96]) {
     const bool is_v6 = strchr(address->host, ':') != NULL;
-    snprintf(target, 96, "http%s://%s%s%s:%u", is_tls ? "s" : "", is_v6 ? "[" : "", address->host,
-             is_v6 ? "]" : "", (unsigned)address->port);
+    snprintf(target, 96, "%s://%s%s%s:%u", has_tls ? "https" : "http", is_v6 ? "[" : "",
+             address->host, is_v6 ? "]" : "", (unsigned)address->port);
 }

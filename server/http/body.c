@@ -25,7 +25,8 @@ Status body_require_json(const Request *request, Problem *problem) {
     return STATUS_OK;
 }
 
-void body_problem(Reply *reply, const Problem *problem, int code, const char *instance) {
+void body_problem(Reply *reply, const Problem *problem, int code, const char *instance,
+                  const char *request_id) {
     if (code == 0)
         code = write_problem_code(problem->status);
     if (reply->release != NULL)
@@ -33,11 +34,19 @@ void body_problem(Reply *reply, const Problem *problem, int code, const char *in
     reply->release = NULL;
     Bytes bytes = {.most = 1 << 20};
     write_problem(&bytes, problem, code, instance);
+    if (request_id != NULL && bytes.count > 0) {
+        bytes.count--; // the closing brace
+        bytes_text(&bytes, ", \"request_id\": ");
+        bytes_json_string(&bytes, request_id);
+        bytes_text(&bytes, "}");
+    }
     bytes_text(&bytes, "\n");
     if (reply_bytes(reply, code, type_problem, &bytes, NULL) != STATUS_OK)
         reply_borrow(reply, code, type_problem, no_memory, sizeof no_memory - 1);
     if (code == 503 && reply->retry_after < 0)
         reply->retry_after = 1;
+    if (code == 401)
+        reply->authenticate = "Bearer realm=\"impactd\"";
     reply->etag[0] = '\0';
     reply->accepts_ranges = false;
     reply->location[0] = '\0';

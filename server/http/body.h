@@ -13,6 +13,8 @@ Status body_require_json(const Request *request, Problem *problem);
 // Makes the reply problem+json. `code` 0: write_problem_code(problem->status). Headers already set
 // in `reply` (Allow, Retry-After, Content-Range) stay. Never fails: without memory the body is a
 // constant.
-void body_problem(Reply *reply, const Problem *problem, int code, const char *instance);
+// `instance` and `request_id` may be NULL.
+void body_problem(Reply *reply, const Problem *problem, int code, const char *instance,
+                  const char *request_id);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "server/base/link.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
@@ -64,17 +65,22 @@ static Status finish(const Dispatcher *dispatcher, const Route *route, const Req
     const bool is_kept = dispatcher->hot != NULL && reply->is_immutable && reply->code == 200 &&
                          reply->stream.next == NULL && !reply->varies_by_accept;
     if (is_kept)
-        hot_put(dispatcher->hot, request->target, is_packed, route->scope, reply);
+        hot_put(dispatcher->hot, request->target, is_packed, route, reply);
     return reply_range(reply, request, problem);
 }
 
 static Status answer(const Dispatcher *dispatcher, const Route *route, const RouteSpan *spans,
                      size_t count, Request *request, Reply *reply, Problem *problem) {
     char scratch[512];
+    TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
     TRY(route->handle(dispatcher->app, request, reply, problem));
-    return reply->wait_ms > 0 ? STATUS_OK : finish(dispatcher, route, request, reply, problem);
+    if (reply->wait_ms > 0)
+        return STATUS_OK;
+    link_apply(reply->location, sizeof reply->location);
+    link_apply(reply->link, sizeof reply->link);
+    return finish(dispatcher, route, request, reply, problem);
 }
 
 static Status refuse(const Dispatcher *dispatcher, const Request *request, const char *allow,
@@ -92,14 +98,27 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
                        "there is nothing at this path; GET /openapi.json lists what there is");
 }
 
-static void close_up(Request *request, Status status, Problem *problem, Reply *reply) {
+// Turns a fault into its problem document, and has the answer noted if it is one.
+static void close_up(const Dispatcher *dispatcher, Request *request, Status status,
+                     Problem *problem, Reply *reply) {
     memset(request->parameters, 0, sizeof request->parameters);
-    if (status == STATUS_OK)
-        return;
-    if (problem->status == STATUS_OK)
-        problem_set(problem, status, "%s", status_title(status));
-    reply->wait_ms = 0;
-    body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target);
+    if (status != STATUS_OK) {
+        if (problem->status == STATUS_OK)
+            problem_set(problem, status, "%s", status_title(status));
+        reply->wait_ms = 0;
+        link_apply(reply->link, sizeof reply->link);
+        body_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
+    }
+    if (reply->wait_ms == 0)
+        doorman_note(dispatcher->doorman, request, reply);
+}
+
+static const Route *find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans,
+                         size_t *count, char allow[64]) {
+    request->path = link_inside(request->path);
+    request->route =
+        route_find(dispatcher->table, request->method, request->path, spans, count, allow);
+    return request->route;
 }
 
 void dispatch(void *context, Request *request, Reply *reply) {
@@ -110,28 +129,51 @@ void dispatch(void *context, Request *request, Reply *reply) {
     // A Problem is large: problem_clear and write_problem touch only what is used of it.
     Problem problem;
     problem_clear(&problem);
-    const Route *route =
-        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
+    const Route *route = find(dispatcher, request, spans, &count, allow);
     const Status status = route != NULL
                               ? answer(dispatcher, route, spans, count, request, reply, &problem)
                               : refuse(dispatcher, request, allow, reply, &problem);
-    close_up(request, status, &problem, reply);
+    close_up(dispatcher, request, status, &problem, reply);
+}
+
+bool dispatch_admits(void *context, Request *request, Reply *reply) {
+    const Dispatcher *dispatcher = context;
+    RouteSpan spans[REQUEST_PARAMETERS];
+    size_t count = 0;
+    char allow[64];
+    Problem problem;
+    problem_clear(&problem);
+    const Route *route = find(dispatcher, request, spans, &count, allow);
+    const Status status = route != NULL
+                              ? doorman_admit(dispatcher->doorman, route->scope, request, &problem)
+                              : refuse(dispatcher, request, allow, reply, &problem);
+    if (status == STATUS_OK)
+        return true;
+    close_up(dispatcher, request, status, &problem, reply);
+    return false;
+}
+
+void dispatch_note(void *context, const Request *request, const Reply *reply) {
+    const Dispatcher *dispatcher = context;
+    doorman_note(dispatcher->doorman, request, reply);
 }
 
 static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *reply) {
-    const char *scope;
     if (dispatcher->hot == NULL || strcmp(request->method, "GET") != 0)
         return false;
     const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
-    if ((!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, &scope)) &&
-        !hot_find(dispatcher->hot, request->target, false, reply, &scope))
+    const Route **route = &request->route;
+    if ((!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) &&
+        !hot_find(dispatcher->hot, request->target, false, reply, route))
         return false;
     Problem problem;
     problem_clear(&problem);
-    Status status = STATUS_OK;
-    if (!reply_is_known(reply, request))
+    Status status = doorman_admit(dispatcher->doorman, request->route->scope, request, &problem);
+    if (status != STATUS_OK)
+        reply_clear(reply);
+    else if (!reply_is_known(reply, request))
         status = reply_range(reply, request, &problem);
-    close_up(request, status, &problem, reply);
+    close_up(dispatcher, request, status, &problem, reply);
     return true;
 }
 
@@ -150,13 +192,12 @@ bool dispatch_at_once(void *context, Request *request, Reply *reply) {
     RouteSpan spans[REQUEST_PARAMETERS];
     size_t count = 0;
     char allow[64];
-    const Route *route =
-        route_find(dispatcher->table, request->method, request->path, spans, &count, allow);
+    const Route *route = find(dispatcher, request, spans, &count, allow);
     if (route == NULL || !is_quick(dispatcher, route) || request->body_size > QUICK_BYTES)
         return false;
     Problem problem;
     problem_clear(&problem);
     const Status status = answer(dispatcher, route, spans, count, request, reply, &problem);
-    close_up(request, status, &problem, reply);
+    close_up(dispatcher, request, status, &problem, reply);
     return true;
 }

@@ -4,14 +4,16 @@
 #ifndef SERVER_HTTP_DISPATCH_H
 #define SERVER_HTTP_DISPATCH_H
 
+#include "server/http/doorman.h"
 #include "server/http/hot.h"
 #include "server/http/route.h"
 
 typedef struct Dispatcher {
     App *app;
     const Route *table;
-    Handler *const *quick; // of the table's; may be NULL
-    Hot *hot;              // whole answers that never change; may be NULL
+    Handler *const *quick;  // of the table's; may be NULL
+    Hot *hot;               // whole answers that never change; may be NULL
+    const Doorman *doorman; // NULL: whoever comes, nothing counted
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.
@@ -20,5 +22,11 @@ void dispatch(void *context, Request *request, Reply *reply);
 // The same for what takes no more than a moment: an answer that is there already, or a quick
 // route's. False if it is neither, with `reply` untouched.
 bool dispatch_at_once(void *context, Request *request, Reply *reply);
+
+// Judges a request by its head, before its body is taken: false where dispatch would refuse it for
+// its path or its token, with the refusal in `reply`.
+bool dispatch_admits(void *context, Request *request, Reply *reply);
+// Notes an answer that did not come from here: a refusal of the listener's.
+void dispatch_note(void *context, const Request *request, const Reply *reply);
 
 #endif

@@ -33,7 +33,10 @@ static enum MHD_Result send_problem(Exchange *exchange, int code, const Problem 
                                     bool closes) {
     Reply reply;
     reply_default(&reply);
-    body_problem(&reply, problem, code, NULL);
+    body_problem(&reply, problem, code, NULL, exchange->request.id);
+    const ListenerSettings *settings = &exchange->desk->settings;
+    if (settings->note != NULL)
+        settings->note(settings->context, &exchange->request, &reply);
     return sending_queue(exchange, &reply, closes);
 }
 
@@ -47,6 +50,13 @@ static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const
     return MHD_YES;
 }
 
+static void write_id(char id[REQUEST_ID_SIZE], uint64_t number) {
+    memcpy(id, "q-", 2);
+    for (size_t i = 13; i >= 2; i--, number >>= 4)
+        id[i] = "0123456789abcdef"[number & 15];
+    id[14] = '\0';
+}
+
 // The head is complete: judge it, and refuse at once what cannot be read to its end.
 static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connection,
                              const char *method, const char *version) {
@@ -56,13 +66,13 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     exchange->connection = connection;
     request->method = method;
     request->path = request->target = exchange->target;
-    const uint64_t number = desk->first_id + atomic_fetch_add(&desk->requests, 1);
-    snprintf(request->id, sizeof request->id, "q-%012llx",
-             (unsigned long long)(number & 0xffffffffffff));
     request->started_ns = clock_monotonic_ns();
     request->waker = seat_waker(exchange->seat);
     request->body_most = desk->settings.body_most;
+    exchange->gate.names = desk->settings.hosts;
     MHD_get_connection_values_n(connection, MHD_HEADER_KIND, take_header, exchange);
+    if (request->id[0] == '\0')
+        write_id(request->id, desk->first_id + atomic_fetch_add(&desk->requests, 1));
 
     if (request->host == NULL)
         request->host = strstr(desk->url, "://") + 3;
@@ -90,8 +100,16 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         request->method = "GET";
         request->range = NULL;
     }
+    const ListenerSettings *settings = &desk->settings;
+    const bool has_body = body_size > 0 || exchange->gate.is_chunked;
+    Reply refusal;
+    if (has_body && settings->admits != NULL) {
+        reply_default(&refusal);
+        if (!settings->admits(settings->context, request, &refusal))
+            return sending_queue(exchange, &refusal, true);
+    }
     exchange->body.most = most;
-    seat_limit(exchange->seat, body_size > 0 || exchange->gate.is_chunked ? BODY_MS : 0);
+    seat_limit(exchange->seat, has_body ? BODY_MS : 0);
     return MHD_YES;
 }
 
@@ -203,6 +221,7 @@ static enum MHD_Result answer(Exchange *exchange) {
         seat_begin(exchange->seat);
         request->body = exchange->body.at;
         request->body_size = exchange->body.count;
+        request->received = exchange->received;
     }
     for (;;) {
         Reply reply;

@@ -3,6 +3,7 @@
 // ended.
 #include "server/http/gate.h"
 
+#include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,24 +14,47 @@
 static const char *const known_methods[] = {"GET",    "HEAD",    "POST", "PUT",
                                             "DELETE", "OPTIONS", "PATCH"};
 
-bool gate_host_is_ours(const char *host, size_t size) {
-    static const char *const ours[] = {"localhost", "127.0.0.1", "[::1]"};
-    for (size_t i = 0; i < COUNT(ours); i++) {
-        const size_t length = strlen(ours[i]);
-        if (size < length || strncasecmp(host, ours[i], length) != 0)
-            continue;
-        if (size == length)
+static const char *const loopback[] = {"localhost", "127.0.0.1", "[::1]", NULL};
+const GateHosts gate_loopback = {loopback, false};
+
+// The size of the name in "name:port"; 0 where the port is no port. An IPv6 address has brackets.
+static size_t name_size_of(const char *host, size_t size) {
+    size_t name_size = 0;
+    while (name_size < size && host[name_size] != ':')
+        if (host[name_size++] == '[')
+            while (name_size < size && host[name_size] != ']')
+                name_size++;
+    if (name_size == size)
+        return size;
+    const size_t digits = size - name_size - 1;
+    for (size_t i = 0; i < digits; i++)
+        if (host[name_size + 1 + i] < '0' || host[name_size + 1 + i] > '9')
+            return 0;
+    return digits <= 5 ? name_size : 0;
+}
+
+// Dotted decimal, or something in brackets that only an address may be.
+static bool is_address(const char *name, size_t size) {
+    char text[64];
+    unsigned char ignored[16];
+    const bool has_brackets = size > 2 && name[0] == '[' && name[size - 1] == ']';
+    const size_t inner = has_brackets ? size - 2 : size;
+    if (inner >= sizeof text)
+        return false;
+    memcpy(text, name + has_brackets, inner);
+    text[inner] = '\0';
+    return inet_pton(has_brackets ? AF_INET6 : AF_INET, text, ignored) == 1;
+}
+
+bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size) {
+    const size_t name_size = name_size_of(host, size);
+    if (name_size == 0)
+        return false;
+    for (size_t i = 0; hosts->names[i] != NULL; i++)
+        if (strlen(hosts->names[i]) == name_size &&
+            strncasecmp(host, hosts->names[i], name_size) == 0)
             return true;
-        if (host[length] != ':' || size - length - 1 > 5)
-            continue;
-        size_t digits = 0;
-        while (length + 1 + digits < size && host[length + 1 + digits] >= '0' &&
-               host[length + 1 + digits] <= '9')
-            digits++;
-        if (length + 1 + digits == size)
-            return true;
-    }
-    return false;
+    return hosts->takes_addresses && is_address(host, name_size);
 }
 
 static bool is_name(const char *name, size_t size, const char *text) {
@@ -68,7 +92,8 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
     }
     if (is_name(name, name_size, "Host")) {
         gate->hosts++;
-        if (!gate_host_is_ours(value_size > 0 ? value : "", value_size)) {
+        const GateHosts *names = gate->names != NULL ? gate->names : &gate_loopback;
+        if (!gate_host_is_ours(names, value_size > 0 ? value : "", value_size)) {
             gate->is_foreign_host = true;
             if (value_size > 0 && !has_control(value, value_size))
                 text_fit(gate->host, sizeof gate->host, value);
@@ -113,6 +138,24 @@ static const char *path_fault(const char *target) {
     return strstr(target, "%00") != NULL ? "the target holds an escaped NUL" : NULL;
 }
 
+static int refuse_host(const Gate *gate, Problem *problem) {
+    const GateHosts *hosts = gate->names != NULL ? gate->names : &gate_loopback;
+    char list[256] = "";
+    for (size_t i = 0; hosts->names[i] != NULL; i++) {
+        const size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s",
+                 i == 0                        ? ""
+                 : hosts->names[i + 1] == NULL ? " or "
+                                               : ", ",
+                 hosts->names[i]);
+    }
+    problem_set(
+        problem, STATUS_USAGE,
+        "the Host must be %s%s, with any port, is \"%s\"; the daemon's --host NAME adds one", list,
+        hosts->takes_addresses ? ", or an address in digits" : "", gate->host);
+    return 421;
+}
+
 int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
                Problem *problem) {
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
@@ -142,10 +185,7 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
     if (gate->hosts == 0 && strcmp(version, "HTTP/1.1") == 0)
         return refuse(problem, 400, "HTTP/1.1 needs a Host");
     if (gate->is_foreign_host) {
-        problem_set(problem, STATUS_USAGE,
-                    "the Host must be localhost, 127.0.0.1 or [::1], with any port, is \"%s\"",
-                    gate->host);
-        return 400;
+        return refuse_host(gate, problem);
     }
     if (gate->lengths > 1)
         return refuse(problem, 400, "more than one Content-Length");

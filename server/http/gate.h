@@ -10,8 +10,16 @@
 
 #include "core/base/status.h"
 
-// Facts gathered header by header; all zero to begin with.
+// The names that requests may call us by.
+typedef struct GateHosts {
+    const char *const *names; // without port, "[::1]", NULL-terminated
+    bool takes_addresses;     // any numeric address as well: no other site's name leads to it
+} GateHosts;
+extern const GateHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
+
+// Facts gathered header by header; all zero to begin with, but for `names`.
 typedef struct Gate {
+    const GateHosts *names; // NULL: gate_loopback
     size_t hosts, lengths, encodings;
     unsigned long long length; // of the body, as told
     bool is_chunked, is_foreign_host, has_bad_length, has_control;
@@ -22,12 +30,12 @@ typedef struct Gate {
 void gate_header(Gate *gate, const char *name, size_t name_size, const char *value,
                  size_t value_size);
 
-// 0 if the request may go on, else the HTTP status (400, 414, 501, 505), with the reason in
+// 0 if the request may go on, else the HTTP status (400, 414, 421, 501, 505), with the reason in
 // `problem`.
 int gate_judge(const Gate *gate, const char *method, const char *target, const char *version,
                Problem *problem);
 
-// Whether a Host header's value is localhost, 127.0.0.1 or [::1], with any port or none.
-bool gate_host_is_ours(const char *host, size_t size);
+// Whether a Host header's value is one of the names, with any port or none.
+bool gate_host_is_ours(const GateHosts *hosts, const char *host, size_t size);
 
 #endif

@@ -18,8 +18,8 @@ typedef struct Entry {
     uint64_t hash;
     size_t bytes;
     bool is_packed;
-    const char *scope; // of the route, which lives as long as the program
-    Reply reply;       // owns the body
+    const struct Route *route; // lives as long as the program
+    Reply reply;               // owns the body
     char target[];
 } Entry;
 
@@ -107,7 +107,8 @@ static void lend(Entry *entry, Reply *reply) {
     reply->shared = entry;
 }
 
-void hot_put(Hot *hot, const char *target, bool is_packed, const char *scope, Reply *reply) {
+void hot_put(Hot *hot, const char *target, bool is_packed, const struct Route *route,
+             Reply *reply) {
     const size_t bytes = sizeof(Entry) + strlen(target) + 1 + reply->body_size;
     if (bytes > hot->most_bytes / SHARE)
         return;
@@ -117,7 +118,7 @@ void hot_put(Hot *hot, const char *target, bool is_packed, const char *scope, Re
     memcpy(entry->target, target, strlen(target) + 1);
     entry->is_packed = is_packed;
     entry->hash = hash_of(target, is_packed);
-    entry->scope = scope;
+    entry->route = route;
     entry->bytes = bytes;
     entry->reply = *reply;
     atomic_init(&entry->holds, 1);
@@ -139,7 +140,8 @@ void hot_put(Hot *hot, const char *target, bool is_packed, const char *scope, Re
     pthread_mutex_unlock(&hot->lock);
 }
 
-bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply, const char **scope) {
+bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
+              const struct Route **route) {
     const uint64_t hash = hash_of(target, is_packed);
     pthread_mutex_lock(&hot->lock);
     Entry *entry = *place(hot, hash, target, is_packed);
@@ -147,7 +149,7 @@ bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply, const 
         unlink_entry(hot, entry);
         link_newest(hot, entry);
         lend(entry, reply);
-        *scope = entry->scope;
+        *route = entry->route;
         hot->tally.hits++;
     } else {
         hot->tally.misses++;

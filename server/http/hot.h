@@ -13,11 +13,12 @@ void hot_free(Hot *hot);         // NULL is fine; answers still held live on
 
 // Keeps a finished 200 of a body that is whole in memory: what `reply` owns moves into the cache,
 // and `reply` becomes a borrower of it. One that is too large for the budget stays as it is.
-// `target` is as sent, `is_packed` says that the body is gzip, `scope` what its route asks for.
-void hot_put(Hot *hot, const char *target, bool is_packed, const char *scope, Reply *reply);
+// `target` is as sent, `is_packed` says that the body is gzip, `route` whose it is.
+void hot_put(Hot *hot, const char *target, bool is_packed, const struct Route *route, Reply *reply);
 
-// Fills `reply`, a borrower, and *scope. False if it is not there.
-bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply, const char **scope);
+// Fills `reply`, a borrower, and *route. False if it is not there.
+bool hot_find(Hot *hot, const char *target, bool is_packed, Reply *reply,
+              const struct Route **route);
 
 // Forgets all: something that never changes was deleted.
 void hot_clear(Hot *hot);

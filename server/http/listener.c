@@ -81,7 +81,7 @@ static void *run_loop(void *context) {
     return NULL;
 }
 
-static size_t connections(const Listener *listener) {
+size_t listener_connections(const Listener *listener) {
     size_t count = 0;
     for (size_t i = 0; i < listener->loop_count; i++)
         count += atomic_load(&listener->loops[i].connections);
@@ -121,7 +121,7 @@ static void *accept_all(void *context) {
         if (events[1].revents != 0)
             return NULL;
         // Beyond the limit newcomers wait in the kernel's queue until someone leaves.
-        const bool is_full = connections(listener) >= listener->connections_most;
+        const bool is_full = listener_connections(listener) >= listener->connections_most;
         const int descriptor = is_full ? -1 : accept(listener->descriptor, NULL, NULL);
         if (descriptor >= 0)
             hand_on(listener, descriptor);

@@ -1,4 +1,4 @@
-// The door: listens on loopback, collects requests, has them answered, sends the replies.
+// The door: listens, collects requests, has them answered, sends the replies.
 // libmicrohttpd lives in listener.c, exchange.c and sending.c
 // alone. Not routes and not rights (dispatch.h). Used by
 // command/serve.c.
@@ -6,6 +6,7 @@
 #define SERVER_HTTP_LISTENER_H
 
 #include "server/http/address.h"
+#include "server/http/gate.h"
 #include "server/http/request.h"
 
 typedef struct Listener Listener;
@@ -18,7 +19,12 @@ typedef struct ListenerSettings {
     // is called on a thread where it may take its time.
     bool (*answer_at_once)(void *context, Request *request, Reply *reply);
     void (*answer)(void *context, Request *request, Reply *reply);
+    // Asked before a body is taken, on the event loop: false and a refusal in `reply`. May be NULL.
+    bool (*admits)(void *context, Request *request, Reply *reply);
+    // Told of refusals that none of them made. May be NULL.
+    void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
+    const GateHosts *hosts;         // NULL: gate_loopback
     const char *tls_cert, *tls_key; // PEM; NULL: no TLS
 } ListenerSettings;
 
@@ -31,5 +37,8 @@ const char *listener_url(const Listener *listener);
 void listener_stop(Listener *listener, int grace_ms);
 // Frees what wakers point to: after whoever may call them is gone.
 void listener_free(Listener *listener);
+
+// How many clients are connected now.
+size_t listener_connections(const Listener *listener);
 
 #endif

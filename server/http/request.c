@@ -100,6 +100,14 @@ void request_header(Request *request, const char *name, const char *value) {
         request->prefer = request->prefers;
         return;
     }
+    if (strcasecmp(name, "X-Request-Id") == 0 && request->id[0] == '\0') {
+        static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                      "0123456789._-";
+        const size_t size = strlen(value);
+        if (size < sizeof request->id && strspn(value, allowed) == size)
+            memcpy(request->id, value, size + 1);
+        return;
+    }
     const struct {
         const char *name;
         const char **target;

@@ -8,9 +8,15 @@
 #include <stdint.h>
 
 #include "core/base/status.h"
+#include "server/auth/tokens.h"
 #include "server/jobs/job.h"
 
-enum { REQUEST_PARAMETERS = 4, REQUEST_QUERIES = 32, REQUEST_TARGET_MOST = 4096 };
+enum {
+    REQUEST_PARAMETERS = 4,
+    REQUEST_QUERIES = 32,
+    REQUEST_TARGET_MOST = 4096,
+    REQUEST_ID_SIZE = 65,
+};
 
 typedef struct RequestPair {
     const char *name, *value; // decoded
@@ -19,7 +25,7 @@ typedef struct RequestPair {
 typedef struct Request {
     const char *method; // "GET"; HEAD is shown as GET, the listener drops the body
     const char *target; // path and query as sent
-    const char *path;   // as sent, without query
+    const char *path;   // as sent, without query and, once dispatched, base path
     const char *parameters[REQUEST_PARAMETERS]; // what {..} in the route's pattern matched, in
                                                 // order, decoded
     RequestPair queries[REQUEST_QUERIES];
@@ -28,6 +34,7 @@ typedef struct Request {
     size_t body_size;
     bool is_too_large; // the body was over its limit and is not here
     size_t body_most;  // that limit
+    uint64_t received; // bytes of the body, also of one that is not here
     const char *host;  // as the client names us, else our address
     const char *content_type, *accept, *prefer, *if_none_match, *if_range,
         *range; // NULL if absent
@@ -35,11 +42,13 @@ typedef struct Request {
         *last_event_id;
     char prefers[128];  // all Prefer headers in one: `prefer` points here
     const char *client; // the name of the token it came with; NULL: none was asked for
-    char id[24];        // for the client and the journal
-    int64_t started_ns; // monotonic
-    bool is_woken;      // the handler asked to wait and is called again
-    bool is_expired;    // ... because the time was up
-    void *kept;         // what the handler kept when it asked to wait; see Reply
+    char client_name[TOKEN_NAME_SIZE]; // `client` points here
+    char id[REQUEST_ID_SIZE];          // the client's own or ours; for the client and the journal
+    const struct Route *route;         // that fits; NULL before and where there is none
+    int64_t started_ns;                // monotonic
+    bool is_woken;                     // the handler asked to wait and is called again
+    bool is_expired;                   // ... because the time was up
+    void *kept;                        // what the handler kept when it asked to wait; see Reply
     const Waker *waker; // wakes this request; outlives it, so that a late call does no harm
     char *storage;      // what the texts above point into
 } Request;
@@ -50,7 +59,8 @@ typedef struct Request {
 Status request_open(Request *request, const char *target, Problem *problem);
 void request_close(Request *request);
 
-// Keeps the headers named above, the first of each kind; `value` must outlive the request.
+// Keeps the headers named above, the first of each kind; `value` must outlive the request. An
+// X-Request-Id becomes `id` if it is 1 to 64 of [A-Za-z0-9._-].
 void request_header(Request *request, const char *name, const char *value);
 
 const char *request_query(const Request *request, const char *name); // NULL if absent
@@ -84,10 +94,11 @@ typedef struct Reply {
     Stream stream;                  // `next` not NULL: in place of body
     void (*release)(void *context); // called once when the body was sent or given up; may be NULL
     void *context;
-    char location[128]; // "" for none
+    char location[192]; // "" for none; of our own pages without the base path, dispatch puts it
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[192];
+    char link[320];           // likewise
+    const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];
     char allow[64];
     char content_range[80];

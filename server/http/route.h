@@ -13,7 +13,7 @@ typedef struct Route {
     const char *method; // "GET"
     const char
         *pattern; // "/v1/results/{id}/series.{format}": {x} matches one segment or the rest of one
-    const char *scope;          // "read", "submit", "materials", "admin"
+    const char *scope;          // "read", "submit", "materials", "admin"; "open": needs no token
     const char *const *queries; // names allowed in the query, NULL-terminated; NULL for none
     const char *doc;
     Handler *handle;

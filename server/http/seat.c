@@ -1,11 +1,12 @@
 // A seat:   empty -> taken -> (asleep -> taken)* -> empty
 //
-// All state is under the Hall's one lock: each change is a few stores. The clock thread sleeps
-// until the earliest time any seat waits for, and is nudged only by an earlier one.
+// All state but the limits is under the Hall's one lock: each change is a few stores. The clock
+// thread sleeps until the earliest time any seat waits for, and is nudged only by an earlier one.
 #include "server/http/seat.h"
 
 #include <errno.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -20,7 +21,8 @@ struct Seat {
     int descriptor; // -1: empty
     void *asleep;   // the suspended connection, or NULL
     bool is_woken;
-    int64_t wake_ns, limit_ns; // INT64_MAX: none
+    int64_t wake_ns;           // INT64_MAX: none
+    _Atomic(int64_t) limit_ns; // the same; set without the lock, several times a request
 };
 
 struct Hall {
@@ -29,7 +31,7 @@ struct Hall {
     pthread_cond_t nudge;
     pthread_t clock;
     Seat *all, *empty;
-    int64_t next_ns;
+    _Atomic(int64_t) next_ns; // when the clock thread wakes; lowered without the lock as well
     bool is_closing, is_closed;
 };
 
@@ -56,12 +58,15 @@ static int64_t serve_due(Hall *hall, int64_t now) {
     for (Seat *seat = hall->all; seat != NULL; seat = seat->next) {
         if (seat->wake_ns <= now)
             wake_locked(seat);
-        if (seat->limit_ns <= now) {
+        int64_t limit = atomic_load(&seat->limit_ns);
+        if (limit <= now) {
+            // seat_leave, which comes before the descriptor is closed, takes the lock.
             shutdown(seat->descriptor, SHUT_RDWR);
-            seat->limit_ns = INT64_MAX;
+            atomic_compare_exchange_strong(&seat->limit_ns, &limit, INT64_MAX);
+            limit = INT64_MAX;
         }
         next = seat->wake_ns < next ? seat->wake_ns : next;
-        next = seat->limit_ns < next ? seat->limit_ns : next;
+        next = limit < next ? limit : next;
     }
     return next;
 }
@@ -70,13 +75,19 @@ static void *keep_time(void *context) {
     Hall *hall = context;
     pthread_mutex_lock(&hall->lock);
     while (!hall->is_closed) {
-        hall->next_ns = serve_due(hall, clock_monotonic_ns());
-        if (hall->next_ns == INT64_MAX) {
+        // A limit set while the seats are looked at either is seen there or lowers this again.
+        atomic_store(&hall->next_ns, INT64_MAX);
+        const int64_t due = serve_due(hall, clock_monotonic_ns());
+        int64_t next = atomic_load(&hall->next_ns);
+        while (due < next && !atomic_compare_exchange_weak(&hall->next_ns, &next, due))
+            ;
+        next = due < next ? due : next;
+        if (next == INT64_MAX) {
             pthread_cond_wait(&hall->nudge, &hall->lock);
             continue;
         }
-        const struct timespec until = {.tv_sec = (time_t)(hall->next_ns / 1000000000),
-                                       .tv_nsec = (long)(hall->next_ns % 1000000000)};
+        const struct timespec until = {.tv_sec = (time_t)(next / 1000000000),
+                                       .tv_nsec = (long)(next % 1000000000)};
         pthread_cond_timedwait(&hall->nudge, &hall->lock, &until);
     }
     pthread_mutex_unlock(&hall->lock);
@@ -89,7 +100,7 @@ Status hall_open(const HallCalls *calls, Hall **hall, Problem *problem) {
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
     made->calls = *calls;
-    made->next_ns = INT64_MAX;
+    atomic_init(&made->next_ns, INT64_MAX);
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
@@ -155,7 +166,8 @@ Seat *seat_take(Hall *hall, int descriptor) {
         seat->descriptor = descriptor;
         seat->asleep = NULL;
         seat->is_woken = false;
-        seat->wake_ns = seat->limit_ns = INT64_MAX;
+        seat->wake_ns = INT64_MAX;
+        atomic_store(&seat->limit_ns, INT64_MAX);
     }
     pthread_mutex_unlock(&hall->lock);
     return seat;
@@ -166,7 +178,8 @@ void seat_leave(Seat *seat) {
     pthread_mutex_lock(&hall->lock);
     seat->descriptor = -1;
     seat->asleep = NULL;
-    seat->wake_ns = seat->limit_ns = INT64_MAX;
+    seat->wake_ns = INT64_MAX;
+    atomic_store(&seat->limit_ns, INT64_MAX);
     seat->next_empty = hall->empty;
     hall->empty = seat;
     pthread_mutex_unlock(&hall->lock);
@@ -176,18 +189,23 @@ const Waker *seat_waker(const Seat *seat) {
     return &seat->waker;
 }
 
-static void nudge_locked(Hall *hall, int64_t time_ns) {
-    if (time_ns >= hall->next_ns)
-        return;
-    hall->next_ns = time_ns;
-    pthread_cond_signal(&hall->nudge);
+// Whether the clock thread has to wake earlier than it means to.
+static bool is_earlier(Hall *hall, int64_t time_ns) {
+    int64_t next = atomic_load(&hall->next_ns);
+    while (time_ns < next)
+        if (atomic_compare_exchange_weak(&hall->next_ns, &next, time_ns))
+            return true;
+    return false;
 }
 
 void seat_limit(Seat *seat, int64_t most_ms) {
     const int64_t limit_ns = most_ms > 0 ? clock_monotonic_ns() + most_ms * 1000000 : INT64_MAX;
+    atomic_store(&seat->limit_ns, limit_ns);
+    if (!is_earlier(seat->hall, limit_ns))
+        return;
+    // With the lock, so that the signal does not come between the thread's look and its sleep.
     pthread_mutex_lock(&seat->hall->lock);
-    seat->limit_ns = limit_ns;
-    nudge_locked(seat->hall, limit_ns);
+    pthread_cond_signal(&seat->hall->nudge);
     pthread_mutex_unlock(&seat->hall->lock);
 }
 
@@ -207,7 +225,8 @@ bool seat_sleep(Seat *seat, void *connection, int64_t most_ms) {
         seat->asleep = connection;
         seat->wake_ns = wake_ns;
         hall->calls.suspend(connection);
-        nudge_locked(hall, wake_ns);
+        if (is_earlier(hall, wake_ns))
+            pthread_cond_signal(&hall->nudge);
     }
     pthread_mutex_unlock(&hall->lock);
     return sleeps;

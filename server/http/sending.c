@@ -5,6 +5,7 @@
 
 #include "server/http/exchange.h"
 #include "server/http/reply.h"
+#include "server/http/shield.h"
 
 // What a streamed body needs while it is sent.
 typedef struct Sending {
@@ -66,7 +67,7 @@ static const char *vary(const Reply *reply) {
 }
 
 // All headers but those of one request alone.
-static void add_headers(struct MHD_Response *response, const Reply *reply) {
+static void add_headers(struct MHD_Response *response, const Reply *reply, bool has_tls) {
     char retry_after[16] = "";
     if (reply->retry_after >= 0)
         snprintf(retry_after, sizeof retry_after, "%d", reply->retry_after);
@@ -83,8 +84,11 @@ static void add_headers(struct MHD_Response *response, const Reply *reply) {
     add_header(response, MHD_HTTP_HEADER_RETRY_AFTER, retry_after);
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     add_header(response, MHD_HTTP_HEADER_VARY, vary(reply));
-    add_header(response, "X-Content-Type-Options", "nosniff");
-    add_header(response, "Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
+    add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
+    for (const ShieldHeader *header = shield_headers; header->name != NULL; header++)
+        add_header(response, header->name, header->value);
+    if (has_tls)
+        add_header(response, shield_tls.name, shield_tls.value);
 }
 
 // Takes what `reply` owns, also when it fails.
@@ -99,7 +103,7 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        add_headers(response, reply);
+        add_headers(response, reply, exchange->desk->settings.tls_cert != NULL);
     return response;
 }
 
@@ -144,9 +148,6 @@ enum MHD_Result sending_queue(Exchange *exchange, Reply *reply, bool closes) {
     add_header(response, "X-Request-Id", exchange->request.id);
     if (closes)
         add_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
-    if (code >= 500 && code != 501 && code != 503 && code != 505)
-        fprintf(stderr, "impactd: request %s answered %d: %s %.200s\n", exchange->request.id, code,
-                exchange->request.method, exchange->request.path);
     const enum MHD_Result result =
         MHD_queue_response(exchange->connection, (unsigned)code, response);
     if (!is_kept)

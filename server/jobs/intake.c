@@ -287,6 +287,7 @@ static Status dismiss(Intake *intake, Job *job, Problem *problem) {
     intake_detach(job);
     intake_release(job);
     wakers_call(&job->wakers);
+    totals_ended(&intake->totals, JOB_DISMISSED, false);
     pthread_mutex_unlock(&intake->lock);
     // The row is final. Until the store has it, the job is found here.
     TRY(store_job_update(intake->store, &job->row, problem));
@@ -312,6 +313,10 @@ Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *
     }
     *dismissed = job;
     return STATUS_OK;
+}
+
+const Totals *intake_totals(const Intake *intake) {
+    return &intake->totals;
 }
 
 void intake_tally(Intake *intake, IntakeTally *tally) {

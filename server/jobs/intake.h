@@ -79,5 +79,8 @@ typedef struct IntakeTally {
     size_t queued, running, workers, queue_most, cached_outcomes, cached_bytes;
 } IntakeTally;
 void intake_tally(Intake *intake, IntakeTally *tally);
+// What was done since the start; counted on.
+struct Totals;
+const struct Totals *intake_totals(const Intake *intake);
 
 #endif

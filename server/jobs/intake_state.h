@@ -9,6 +9,7 @@
 #include "server/jobs/cache.h"
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
+#include "server/jobs/totals.h"
 
 enum { OUTCOME_FAILURES = 64 };
 
@@ -86,6 +87,7 @@ struct Intake {
     Cache *cache;
     Failure failures[OUTCOME_FAILURES]; // of computations for readers, told once
     size_t next_failure;
+    Totals totals;
 };
 
 bool wakers_add(Wakers *wakers, const Waker *waker); // false without memory

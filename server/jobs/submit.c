@@ -61,7 +61,9 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
     row->is_cached = true;
     row->started_unix_ms = row->finished_unix_ms = clock_unix_ms();
     row->total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    return store_job_add(intake->store, row, problem);
+    TRY(store_job_add(intake->store, row, problem));
+    totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
+    return STATUS_OK;
 }
 
 // Room in the queue, or why there is none; the job counts from here on.

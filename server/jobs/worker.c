@@ -112,7 +112,7 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
 }
 
 static void run(Worker *worker, Computation *computation, Findings *findings, Problem *problem) {
-    const Intake *intake = worker->intake;
+    Intake *intake = worker->intake;
     // Only the scene's own series is ever wanted again.
     const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
     Part part = {computation, 0, has_study ? own_share : 1};
@@ -121,10 +121,16 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
+    const int64_t run_ns = clock_thread_cpu_ns();
     Status status = simulation_run(&computation->inquiry.simulation, limits, &watch,
                                    &worker->workspace, &findings->outcome, problem);
-    if (status == STATUS_OK && has_study)
+    const int64_t study_ns = clock_thread_cpu_ns();
+    if (status == STATUS_OK)
+        totals_run(&intake->totals, findings->outcome, study_ns - run_ns);
+    if (status == STATUS_OK && has_study) {
         status = run_study(worker, computation, findings, problem);
+        totals_study(&intake->totals, clock_thread_cpu_ns() - study_ns);
+    }
     findings->ended_ns = clock_monotonic_ns();
     if (status == STATUS_OK && !computation->is_again) {
         status = describe(computation, findings);
@@ -204,6 +210,7 @@ static void publish(const Findings *findings, Job **jobs, size_t count, Status s
         } else {
             intake_retire(job);
         }
+        totals_ended(&job->intake->totals, job->row.state, false);
         wakers_call(&job->wakers);
         job_drop(job); // close_jobs's hold
     }
@@ -292,6 +299,7 @@ static Computation *take_computation(Worker *worker) {
         job->row.started_unix_ms = now_ms;
         job->started_ns = now_ns;
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
+        histogram_add(&intake->totals.waited, now_ns - job->submitted_ns);
     }
     return computation;
 }

@@ -66,6 +66,10 @@ bool database_is_in_transaction(Database *database) {
     return sqlite3_get_autocommit(database->connection) == 0;
 }
 
+uint64_t database_rows_changed(Database *database) {
+    return (uint64_t)sqlite3_total_changes64(database->connection);
+}
+
 static Status prepare(Database *database, const char *sql, Statement **statement,
                       Problem *problem) {
     for (size_t i = 0; i < database->kept_count; i++)
@@ -231,18 +235,32 @@ static Status migrate_step(Database *database, const EmbeddedFile *file, int64_t
     return status;
 }
 
+static Status read_version(Database *database, const EmbeddedFile *files, int64_t *version,
+                           int64_t *last, Problem *problem) {
+    while (files[*last].path != NULL)
+        ++*last;
+    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", version,
+                    problem));
+    if (*version <= *last)
+        return STATUS_OK;
+    return problem_set(
+        problem, STATUS_CONFLICT,
+        "%s was written by a newer impactd: its schema is %lld, this program knows %lld; "
+        "use the newer program or another folder",
+        sqlite3_db_filename(database->connection, "main"), (long long)*version, (long long)*last);
+}
+
+Status database_is_current(Database *database, const EmbeddedFile *files, bool *is_current,
+                           Problem *problem) {
+    int64_t version = 0, last = 0;
+    TRY(read_version(database, files, &version, &last, problem));
+    *is_current = version == last;
+    return STATUS_OK;
+}
+
 Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem) {
     int64_t version = 0, last = 0;
-    while (files[last].path != NULL)
-        last++;
-    TRY(read_number(database, "SELECT user_version AS number FROM pragma_user_version", &version,
-                    problem));
-    if (version > last)
-        return problem_set(
-            problem, STATUS_CONFLICT,
-            "%s was written by a newer impactd: its schema is %lld, this program knows %lld; "
-            "use the newer program or another folder",
-            sqlite3_db_filename(database->connection, "main"), (long long)version, (long long)last);
+    TRY(read_version(database, files, &version, &last, problem));
     for (; version < last; version++)
         TRY(migrate_step(database, &files[version], version + 1, problem));
     return STATUS_OK;

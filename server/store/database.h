@@ -6,6 +6,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "core/base/status.h"
 #include "server/base/embedded.h"
@@ -28,10 +29,17 @@ void database_close(Database *database);
 // impactd's.
 Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem);
 
+// Whether the schema is at the last of `files` already. STATUS_CONFLICT for a newer one.
+Status database_is_current(Database *database, const EmbeddedFile *files, bool *is_current,
+                           Problem *problem);
+
 // Runs SQL that has neither parameters nor rows; any number of statements.
 Status database_execute(Database *database, const char *sql, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.
 bool database_is_in_transaction(Database *database);
+
+// How many rows this connection has changed, ever.
+uint64_t database_rows_changed(Database *database);
 
 // Runs one statement with the members of `item` bound to its parameters. *changes (may be NULL):
 // rows changed.

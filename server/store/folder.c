@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static Status make(const char *directory, Problem *problem) {
+Status folder_make(const char *directory, Problem *problem) {
     char path[PATH_MAX];
     const size_t length = strlen(directory);
     if (length == 0 || length >= sizeof path - 32)
@@ -46,7 +46,7 @@ static void say_who(const char *directory, int lock, Problem *problem) {
 Status folder_lock(const char *directory, int *lock, Problem *problem) {
     char path[PATH_MAX];
     *lock = -1;
-    TRY(make(directory, problem));
+    TRY(folder_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.lock", directory);
     const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (file < 0)

@@ -5,6 +5,8 @@
 
 #include "core/base/status.h"
 
+// Makes `directory` and what is missing above it, for this user alone.
+Status folder_make(const char *directory, Problem *problem);
 // Makes `directory` and what is missing above it, for this user alone, and locks
 // DIRECTORY/impactd.lock. *lock is to be given to folder_unlock. STATUS_CONFLICT if another process
 // has it.

@@ -27,13 +27,23 @@ struct Store {
     size_t free_count;
 };
 
-static Status open_files(Store *store, const char *directory, Problem *problem) {
+static Status open_files(Store *store, const char *directory, bool is_beside, Problem *problem) {
     char path[PATH_MAX];
-    TRY(folder_lock(directory, &store->lock_file, problem));
+    bool is_current = false;
+    if (!is_beside)
+        TRY(folder_lock(directory, &store->lock_file, problem));
+    else
+        TRY(folder_make(directory, problem));
     snprintf(path, sizeof path, "%s/impactd.db", directory);
     TRY(database_open(path, DATABASE_WRITER, &store->own, problem));
-    TRY(database_migrate(store->own, embedded_sql, problem));
-    TRY(folder_sync(directory, problem));
+    if (is_beside)
+        TRY(database_is_current(store->own, embedded_sql, &is_current, problem));
+    if (is_beside && !is_current)
+        TRY(folder_lock(directory, &store->lock_file, problem));
+    if (!is_current) {
+        TRY(database_migrate(store->own, embedded_sql, problem));
+        TRY(folder_sync(directory, problem));
+    }
     while (store->free_count < READERS) {
         TRY(database_open(path, DATABASE_READER, &store->readers[store->free_count], problem));
         store->free_count++;
@@ -47,7 +57,7 @@ static Status open_memory(Store *store, Problem *problem) {
     return database_migrate(store->readers[0], embedded_sql, problem);
 }
 
-Status store_open(const char *directory, Store **store, Problem *problem) {
+static Status open_store(const char *directory, bool is_beside, Store **store, Problem *problem) {
     *store = NULL;
     Store *made = calloc(1, sizeof *made);
     if (made == NULL)
@@ -55,8 +65,8 @@ Status store_open(const char *directory, Store **store, Problem *problem) {
     made->lock_file = -1;
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
-    Status status =
-        directory != NULL ? open_files(made, directory, problem) : open_memory(made, problem);
+    Status status = directory != NULL ? open_files(made, directory, is_beside, problem)
+                                      : open_memory(made, problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
     if (status != STATUS_OK) {
@@ -65,6 +75,14 @@ Status store_open(const char *directory, Store **store, Problem *problem) {
     }
     *store = made;
     return STATUS_OK;
+}
+
+Status store_open(const char *directory, Store **store, Problem *problem) {
+    return open_store(directory, false, store, problem);
+}
+
+Status store_open_beside(const char *directory, Store **store, Problem *problem) {
+    return open_store(directory, true, store, problem);
 }
 
 void store_close(Store *store) {
@@ -79,6 +97,10 @@ void store_close(Store *store) {
     pthread_cond_destroy(&store->some);
     pthread_mutex_destroy(&store->lock);
     free(store);
+}
+
+const StoreTotals *store_totals(const Store *store) {
+    return writer_totals(store->writer);
 }
 
 Status store_write(Store *store, StoreApply *apply, const void *work, Problem *problem) {

@@ -10,6 +10,7 @@
 
 #include "core/base/field.h"
 #include "core/base/status.h"
+#include "server/base/tally.h"
 
 typedef struct Store Store;
 
@@ -17,7 +18,17 @@ typedef struct Store Store;
 // private database in memory, for `impactd run`. STATUS_CONFLICT if another daemon has the folder,
 // or the database is a newer program's.
 Status store_open(const char *directory, Store **store, Problem *problem);
+// The same folder while a daemon has it, or none: for commands that read or write a few rows. Locks
+// the folder only where the database has to be made or migrated.
+Status store_open_beside(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
+
+// What was written since the start; counted on.
+typedef struct StoreTotals {
+    Counter writes, rows, errors;
+    Histogram commits; // transactions, from their beginning until they are durable
+} StoreTotals;
+const StoreTotals *store_totals(const Store *store);
 
 typedef struct MaterialRevision {
     char *slug, *name, *status, *source;

@@ -11,6 +11,8 @@
 #include <pthread.h>
 #include <stdlib.h>
 
+#include "server/base/clock.h"
+
 // One caller's write; it lies on that caller's stack.
 typedef struct Write {
     struct Write *next;
@@ -30,6 +32,7 @@ struct Writer {
     pthread_cond_t some;
     Write *first, **last;
     bool is_stopping;
+    StoreTotals totals;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
 
@@ -54,12 +57,17 @@ static Status apply_one(Writer *writer, Database *database, Write *write) {
 // writer->problem then says why.
 static bool commit(Writer *writer, Database *database, Write *first, const Write *end) {
     static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
+    const int64_t began_ns = clock_monotonic_ns();
+    const uint64_t rows = database_rows_changed(database);
+    uint64_t writes = 0;
     problem_clear(&writer->problem);
     Status status = database_change(database, begin, NULL, NULL, NULL, &writer->problem);
     for (Write *write = first; status == STATUS_OK && write != end; write = write->next) {
-        (void)apply_one(writer, database, write);
-        if (!database_is_in_transaction(database))
+        writes += apply_one(writer, database, write) == STATUS_OK;
+        if (!database_is_in_transaction(database)) {
+            counter_add(&writer->totals.errors, 1);
             return false;
+        }
     }
     if (status == STATUS_OK) {
         problem_clear(&writer->problem);
@@ -67,6 +75,13 @@ static bool commit(Writer *writer, Database *database, Write *first, const Write
     }
     if (status != STATUS_OK && database_is_in_transaction(database))
         (void)database_change(database, undo, NULL, NULL, NULL, NULL);
+    if (status == STATUS_OK) {
+        histogram_add(&writer->totals.commits, clock_monotonic_ns() - began_ns);
+        counter_add(&writer->totals.writes, writes);
+        counter_add(&writer->totals.rows, database_rows_changed(database) - rows);
+    } else {
+        counter_add(&writer->totals.errors, 1);
+    }
     return status == STATUS_OK;
 }
 
@@ -146,6 +161,10 @@ void writer_stop(Writer *writer) {
     pthread_cond_destroy(&writer->some);
     pthread_mutex_destroy(&writer->lock);
     free(writer);
+}
+
+const StoreTotals *writer_totals(const Writer *writer) {
+    return &writer->totals;
 }
 
 Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *problem) {

@@ -18,4 +18,6 @@ void writer_stop(Writer *writer);
 // As store_write.
 Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem);
 
+const StoreTotals *writer_totals(const Writer *writer);
+
 #endif

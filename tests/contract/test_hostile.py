@@ -76,8 +76,8 @@ def test_ambiguous_heads_are_refused_and_the_connection_closed():
     cases = [
         (400, GET + HOST + HOST),
         (400, GET + HOST + b"Host: example.org\r\n"),
-        (400, GET + b"Host: example.org\r\n"),
-        (400, GET + b"Host: localhost.example.org\r\n"),
+        (421, GET + b"Host: example.org\r\n"),
+        (421, GET + b"Host: localhost.example.org\r\n"),
         (400, GET),
         (400, GET + b"Host : localhost\r\n"),
         (505, b"GET /version HTTP/1.9\r\n" + HOST),

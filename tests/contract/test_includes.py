@@ -16,7 +16,7 @@ FLOORS = {
     "core": [["base", "math"], ["contact", "excite", "result"], ["scene"], ["plan"], ["solve"],
              ["simulation"], ["study"]],
     "server": [["base", "store"], ["codec", "auth", "jobs"], ["encode", "http"], ["api"],
-               ["options", "client", "command", "main"]],
+               ["options", "client", "command", "main", "install"]],
 }
 
 # The C library as the two halves may use it, and the processor's vectors. Not here: files, clocks, threads and
@@ -39,7 +39,7 @@ FOREIGN = {
     "lapacke.h": ["core/math/linear.c"],
     "arkode/": ["core/math/ode.c"],
     "nvector/": ["core/math/ode.c"],
-    "gnutls/": ["server/base/digest.c"],
+    "gnutls/": ["server/base/digest.c", "server/base/certificate.c"],
     "libdeflate.h": ["server/base/deflate.c"],
     "curl/": ["server/client/http.c"],
     "dragonbox/": ["server/base/shortest.cpp"],
@@ -59,7 +59,7 @@ BANNED = {
     r"MHD_\w+": ("libmicrohttpd is the listener's", MHD_FILES),
     r"fftw_\w+": ("FFTW is fourier.c's", ["core/math/fourier.c"]),
     r"LAPACKE_\w+": ("LAPACK is linear.c's", ["core/math/linear.c"]),
-    r"gnutls_\w+": ("GnuTLS is digest.c's", ["server/base/digest.c"]),
+    r"gnutls_\w+": ("GnuTLS is digest.c's and certificate.c's", ["server/base/digest.c", "server/base/certificate.c"]),
     r"libdeflate_\w+": ("libdeflate is deflate.c's", ["server/base/deflate.c"]),
     r"curl_\w+": ("libcurl is client/http.c's", ["server/client/http.c"]),
 }

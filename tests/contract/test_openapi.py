@@ -27,7 +27,7 @@ def routes():
         text = file.read()
     names = {array: set(re.findall(r'"(\w+)"', list_)) for array, list_
              in re.findall(r"static const char \*const (\w+)\[\] = \{([^}]*)\}", text)}
-    rows = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(?:read|submit|materials|admin)",\s*(\w+),', text, re.M)
+    rows = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(?:open|read|submit|materials|admin)",\s*(\w+),', text, re.M)
     return {(method, pattern): names.get(queries, set()) for method, pattern, queries in rows}
 
 
@@ -78,6 +78,17 @@ def test_paths_methods_and_queries_are_those_of_the_routes():
     assert described == routes(), {key: (described.get(key), routes().get(key))
                                    for key in set(described) ^ set(routes())
                                    or {k for k in described if described[k] != routes()[k]}}
+
+
+def test_every_operation_tells_how_it_refuses():
+    """421 for a foreign Host everywhere; 401 and 403 wherever routes.c asks for a scope, and no token where it does not."""
+    with open(os.path.join(program.SOURCE, "server", "api", "routes.c"), encoding="utf-8") as file:
+        scopes = re.findall(r'^\s*\{"([A-Z]+)",\s*"([^"]+)",\s*"(\w+)",', file.read(), re.M)
+    for method, pattern, scope in scopes:
+        operation = operations()[method, pattern]
+        wanted = {"421"} if scope == "open" else {"401", "403", "421"}
+        assert {code for code in operation["responses"] if code in ("401", "403", "421")} == wanted, (method, pattern)
+        assert operation.get("security") == ([] if scope == "open" else None), (method, pattern)
 
 
 def test_the_document_is_whole():
@@ -142,6 +153,11 @@ def test_real_answers_have_the_promised_shapes():
                 call(method, path, target, headers={"Accept": "image/png"})
             if "304" in operation["responses"]:
                 call(method, path, target, headers={"If-None-Match": "*"})
+            if "206" in operation["responses"]:
+                part, kind = ((target.rsplit(".", 1)[0] + ".npy", {}) if formats else
+                              (target, {"Accept": "application/x-npy"}))
+                call(method, path, part, headers={**kind, "Range": "bytes=0-9"})
+                call(method, path, part, headers={**kind, "Range": "bytes=99999999-"})
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
@@ -179,8 +195,6 @@ def test_real_answers_have_the_promised_shapes():
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")
         assert call("GET", "/v1/jobs", "/v1/jobs?limit=1") == {"Link"}
-        call("GET", "/v1/results/{id}/series.{format}", f"/v1/results/{job['result']}/series.npy", headers={"Range": "bytes=0-9"})
-        call("GET", "/v1/results/{id}/series.{format}", f"/v1/results/{job['result']}/series.npy", headers={"Range": "bytes=99999999-"})
     assert called == set(operations()), set(operations()) - called
     assert statuses >= {200, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
 

@@ -3,8 +3,10 @@
     with Daemon("build") as daemon:
         reply = daemon.request("POST", "/v1/jobs", json={...})
 
+With IMPACTD_RECORD=FILE in the environment every request and its answer is one line of JSON in that file.
 Standard library only. Not a client for users. Used by the tests under contract/ and truth/.
 """
+import base64
 import http.client
 import json as json_module
 import os
@@ -27,6 +29,21 @@ class Reply:
 
     def __repr__(self):
         return f"<{self.status} {self.headers.get('content-type')} {self.body[:300]!r}>"
+
+
+def record(method, path, headers, body, reply):
+    """One line for contract/test_traffic.py; bodies that are no text are told by their size."""
+    target = os.environ.get("IMPACTD_RECORD")
+    if not target:
+        return
+    kind = reply.headers.get("content-type", "")
+    is_text = re.search(r"json|text/(plain|html|csv)", kind) and len(reply.body) < 1 << 24
+    line = {"method": method, "path": path, "headers": {k.lower(): v for k, v in headers.items()},
+            "body": base64.b64encode(body).decode() if body is not None and len(body) < 1 << 20 else None,
+            "status": reply.status, "answer_headers": reply.headers, "size": len(reply.body),
+            "answer": base64.b64encode(reply.body).decode() if is_text else None}
+    with open(target, "a", encoding="utf-8") as file:
+        file.write(json_module.dumps(line) + "\n")
 
 
 class Daemon:
@@ -113,7 +130,9 @@ class Daemon:
         try:
             connection.request(method, path, body=body, headers=headers)
             reply = connection.getresponse()
-            return Reply(reply.status, {k.lower(): v for k, v in reply.getheaders()}, reply.read())
+            answer = Reply(reply.status, {k.lower(): v for k, v in reply.getheaders()}, reply.read())
+            record(method, path, headers, body, answer)
+            return answer
         finally:
             connection.close()
 

@@ -51,7 +51,7 @@ static const Route table[] = {
 };
 
 static Reply ask(const char *method, const char *target, const char *range) {
-    Dispatcher dispatcher = {NULL, table, NULL, NULL};
+    Dispatcher dispatcher = {NULL, table, NULL, NULL, NULL};
     Request request = {.method = method, .range = range};
     Reply reply;
     seen[0] = '\0';
@@ -152,7 +152,7 @@ static void parts_are_206_and_parts_outside_416(void **state) {
 
 static void if_range_with_another_tag_gets_the_whole(void **state) {
     (void)state;
-    Dispatcher dispatcher = {NULL, table, NULL, NULL};
+    Dispatcher dispatcher = {NULL, table, NULL, NULL, NULL};
     Request request = {.method = "GET", .range = "bytes=0-1", .if_range = "\"other\""};
     Reply reply;
     reply_default(&reply);

@@ -73,11 +73,11 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
         {"GET", "/v1/../x", "HTTP/1.1", {{"Host", "localhost"}}, 400},
         {"GET", "/", "HTTP/1.1", {{NULL, NULL}}, 400},
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Host", "localhost"}}, 400},
-        {"GET", "/", "HTTP/1.1", {{"Host", "example.org"}}, 400},
-        {"GET", "/", "HTTP/1.1", {{"Host", "localhost.example.org"}}, 400},
-        {"GET", "/", "HTTP/1.1", {{"Host", "localhost:80a"}}, 400},
-        {"GET", "/", "HTTP/1.1", {{"Host", "127.0.0.1:123456"}}, 400},
-        {"GET", "/", "HTTP/1.1", {{"Host", ""}}, 400},
+        {"GET", "/", "HTTP/1.1", {{"Host", "example.org"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost.example.org"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "localhost:80a"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", "127.0.0.1:123456"}}, 421},
+        {"GET", "/", "HTTP/1.1", {{"Host", ""}}, 421},
         {"GET", "/", "HTTP/1.1", {{"Host ", "localhost"}}, 400},
         {"POST",
          "/",
@@ -115,6 +115,52 @@ static void ambiguous_or_foreign_heads_are_refused(void **state) {
                      judge(&heads[i]), heads[i].code);
 }
 
+static void hosts_are_those_that_were_named(void **state) {
+    (void)state;
+    static const char *const names[] = {"sim.example.org", "192.168.1.5", NULL};
+    const GateHosts named = {names, false}, any = {names, true};
+    static const struct {
+        const char *host;
+        bool is_named, is_any;
+    } hosts[] = {
+        {"sim.example.org", true, true},
+        {"SIM.example.org:8080", true, true},
+        {"192.168.1.5:1", true, true},
+        {"sim.example.org.", false, false},
+        {"xsim.example.org", false, false},
+        {"localhost", false, false},
+        {"10.0.0.1:80", false, true},
+        {"[fe80::1]:80", false, true},
+        {"[fe80::1", false, false},
+        {"fe80::1", false, false},
+        {"10.0.0.1.example.org", false, false},
+        {"10.0.0.1:80:80", false, false},
+        {"[sim.example.org]", false, false},
+        {"10.0.0", false, false},
+        {":80", false, false},
+        {"", false, false},
+    };
+    for (size_t i = 0; i < COUNT(hosts); i++) {
+        const size_t size = strlen(hosts[i].host);
+        if (gate_host_is_ours(&named, hosts[i].host, size) != hosts[i].is_named ||
+            gate_host_is_ours(&any, hosts[i].host, size) != hosts[i].is_any)
+            fail_msg("\"%s\" is judged otherwise", hosts[i].host);
+    }
+}
+
+static void a_foreign_host_is_told_the_names_that_are_right(void **state) {
+    (void)state;
+    static const char *const names[] = {"sim.example.org", "localhost", NULL};
+    const GateHosts named = {names, true};
+    Gate gate = {.names = &named};
+    Problem problem;
+    problem_clear(&problem);
+    gate_header(&gate, "Host", 4, "evil", 4);
+    assert_int_equal(gate_judge(&gate, "GET", "/", "HTTP/1.1", &problem), 421);
+    assert_non_null(strstr(problem.detail, "sim.example.org or localhost, or an address"));
+    assert_non_null(strstr(problem.detail, "\"evil\""));
+}
+
 static void a_nul_inside_a_value_is_seen_by_its_size(void **state) {
     (void)state;
     Gate gate = {0};
@@ -142,6 +188,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ordinary_requests_pass),
         cmocka_unit_test(ambiguous_or_foreign_heads_are_refused),
+        cmocka_unit_test(hosts_are_those_that_were_named),
+        cmocka_unit_test(a_foreign_host_is_told_the_names_that_are_right),
         cmocka_unit_test(a_nul_inside_a_value_is_seen_by_its_size),
         cmocka_unit_test(a_target_of_4097_bytes_is_too_long),
     };

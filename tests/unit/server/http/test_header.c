@@ -53,6 +53,21 @@ static void prefer_reads_wait_and_respond_async(void **state) {
     assert_false(header_prefer("foo=\"a, wait=3\"").has_wait);
 }
 
+static void gzip_is_taken_where_it_is_named_or_all_is(void **state) {
+    (void)state;
+    assert_true(header_accepts_gzip("gzip"));
+    assert_true(header_accepts_gzip("deflate, GZIP;q=0.5, br"));
+    assert_true(header_accepts_gzip("x-gzip"));
+    assert_true(header_accepts_gzip("*"));
+    assert_true(header_accepts_gzip("gzip;q=1, *;q=0"));
+    assert_false(header_accepts_gzip("gzip;q=0, *"));
+    assert_false(header_accepts_gzip("*;q=0"));
+    assert_false(header_accepts_gzip("deflate, br"));
+    assert_false(header_accepts_gzip("identity"));
+    assert_false(header_accepts_gzip(""));
+    assert_false(header_accepts_gzip(NULL));
+}
+
 typedef struct RangeCase {
     const char *range;
     RangeKind kind;
@@ -117,6 +132,7 @@ int main(void) {
         cmocka_unit_test(accept_chooses_by_quality_then_by_our_order),
         cmocka_unit_test(a_browser_prefers_html),
         cmocka_unit_test(prefer_reads_wait_and_respond_async),
+        cmocka_unit_test(gzip_is_taken_where_it_is_named_or_all_is),
         cmocka_unit_test(ranges_of_ten_bytes),
         cmocka_unit_test(etags_match_in_lists_weak_or_not),
         cmocka_unit_test(content_types_are_compared_without_parameters),

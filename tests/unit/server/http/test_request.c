@@ -113,24 +113,58 @@ static void addresses_on_loopback_are_read(void **state) {
     }
 }
 
-static void other_addresses_are_refused_with_the_reason(void **state) {
+static void addresses_beyond_loopback_are_read_and_told_apart(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *host;
+        bool is_loopback, is_any;
+    } good[] = {{"0.0.0.0:8080", "0.0.0.0", false, true},
+                {"192.168.1.2:80", "192.168.1.2", false, false},
+                {"[::]:80", "::", false, true},
+                {"[0:0::0]:80", "0:0::0", false, true},
+                {"[fe80::1]:80", "fe80::1", false, false},
+                {"127.8.0.1:80", "127.8.0.1", true, false},
+                {"[::1]:80", "::1", true, false}};
+    for (size_t i = 0; i < COUNT(good); i++) {
+        Address address;
+        assert_int_equal(address_read(good[i].text, &address, NULL), STATUS_OK);
+        assert_string_equal(address.host, good[i].host);
+        assert_int_equal(address_is_loopback(&address), good[i].is_loopback);
+        assert_int_equal(address_is_any(&address), good[i].is_any);
+    }
+}
+
+static void request_ids_are_taken_if_they_are_plain(void **state) {
+    (void)state;
+    static const struct {
+        const char *sent, *kept;
+    } ids[] = {{"a-B.3_z", "a-B.3_z"},
+               {"", ""},
+               {"a b", ""},
+               {"a\"b", ""},
+               {"a\nb", ""},
+               {"\xc3\xa9", ""},
+               {"0123456789012345678901234567890123456789012345678901234567890123",
+                "0123456789012345678901234567890123456789012345678901234567890123"},
+               {"01234567890123456789012345678901234567890123456789012345678901234", ""}};
+    for (size_t i = 0; i < COUNT(ids); i++) {
+        Request request = {0};
+        request_header(&request, "x-request-id", ids[i].sent);
+        assert_string_equal(request.id, ids[i].kept);
+    }
+}
+
+static void what_is_no_address_is_refused_with_the_reason(void **state) {
     (void)state;
     static const struct {
         const char *text;
         Status status;
-    } bad[] = {{"0.0.0.0:8080", STATUS_FORBIDDEN},
-               {"192.168.1.2:80", STATUS_FORBIDDEN},
-               {"[::]:80", STATUS_FORBIDDEN},
-               {"example.org:80", STATUS_FORBIDDEN},
-               {"127.0.0.1", STATUS_USAGE},
-               {"127.0.0.1:65536", STATUS_USAGE},
-               {"::1:80", STATUS_USAGE},
-               {"localhost:http", STATUS_USAGE},
-               {"", STATUS_USAGE},
-               {"127.0.0.1:", STATUS_USAGE},
-               {"127.0.0.1:-1", STATUS_USAGE},
-               {"[::1:80", STATUS_USAGE},
-               {"[]:80", STATUS_USAGE}};
+    } bad[] = {{"example.org:80", STATUS_USAGE},  {"1.2.3:80", STATUS_USAGE},
+               {"[127.0.0.1]:80", STATUS_USAGE},  {"127.0.0.1", STATUS_USAGE},
+               {"127.0.0.1:65536", STATUS_USAGE}, {"::1:80", STATUS_USAGE},
+               {"localhost:http", STATUS_USAGE},  {"", STATUS_USAGE},
+               {"127.0.0.1:", STATUS_USAGE},      {"127.0.0.1:-1", STATUS_USAGE},
+               {"[::1:80", STATUS_USAGE},         {"[]:80", STATUS_USAGE}};
     for (size_t i = 0; i < COUNT(bad); i++) {
         Address address;
         Problem problem;
@@ -149,7 +183,9 @@ int main(void) {
         cmocka_unit_test(numbers_in_queries_have_bounds),
         cmocka_unit_test(headers_are_kept_once_and_preferences_joined),
         cmocka_unit_test(addresses_on_loopback_are_read),
-        cmocka_unit_test(other_addresses_are_refused_with_the_reason),
+        cmocka_unit_test(addresses_beyond_loopback_are_read_and_told_apart),
+        cmocka_unit_test(request_ids_are_taken_if_they_are_plain),
+        cmocka_unit_test(what_is_no_address_is_refused_with_the_reason),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

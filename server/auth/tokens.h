@@ -1,0 +1,34 @@
+// Who asks, and what they may: bearer tokens and their scopes, checked against a table in memory
+// that follows the database within a second. Not HTTP's answers (http/dispatch.h) and not how much
+// anyone may ask for. Used by http/dispatch.c and the commands `serve` and `token`.
+#ifndef SERVER_AUTH_TOKENS_H
+#define SERVER_AUTH_TOKENS_H
+
+#include "server/store/token_rows.h"
+
+typedef struct Tokens Tokens;
+
+extern const char *const scope_names[]; // "read", ..., NULL-terminated; "admin" includes the others
+
+// Reads the table and starts the thread that follows it. With `are_required` a token is asked for
+// even where the database has none; otherwise from the first one on, also if it is revoked. Borrows
+// `store`.
+Status tokens_open(Store *store, bool are_required, Tokens **tokens, Problem *problem);
+void tokens_close(Tokens *tokens);
+
+// How many could be used now.
+size_t tokens_usable(Tokens *tokens);
+
+// Whether a request with this Authorization header (NULL: none) may use what needs `scope`.
+// `client` becomes the token's name, "" where none is asked for. STATUS_UNAUTHORIZED,
+// STATUS_FORBIDDEN. From any thread; no SQL unless the token is unknown, and then seldom.
+Status tokens_check(Tokens *tokens, const char *authorization, const char *scope,
+                    char client[TOKEN_NAME_SIZE], Problem *problem);
+
+enum { TOKEN_SIZE = 73 }; // "impactd_", 64 digits and a NUL
+// Makes a token of 256 random bits and fills the row but for its name. `scopes` is a list with
+// commas; `expires_unix_ms` 0: never. The token is told here and nowhere again.
+Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
+                  char token[TOKEN_SIZE], Problem *problem);
+
+#endif

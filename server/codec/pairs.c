@@ -1,0 +1,126 @@
+#include "server/codec/pairs.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/base/bytes.h"
+#include "server/codec/scan.h"
+
+static const Field pair_fields[] = {
+    FIELD_TEXT(Pair, name, 0, PRESENCE_OPTIONAL, 0, "name"),
+    FIELD_TEXT(Pair, a, 0, PRESENCE_OPTIONAL, 0, "of the first"),
+    FIELD_TEXT(Pair, b, 0, PRESENCE_OPTIONAL, 0, "of the second"),
+    FIELD_TEXT(Pair, rest, 0, PRESENCE_OPTIONAL, 0, "what else is told"),
+    FIELD_END,
+};
+
+void pairs_clear(Pairs *pairs) {
+    for (size_t i = 0; i < pairs->count; i++)
+        fields_clear(pair_fields, &pairs->at[i]);
+    free(pairs->at);
+    *pairs = (Pairs){0};
+}
+
+// A scalar as people read it, a container as JSON; cut to fit.
+static void value_put(char target[PAIRS_TEXT], const json_t *value) {
+    if (json_is_string(value)) {
+        text_fit(target, PAIRS_TEXT, json_string_value(value));
+    } else if (json_is_number(value)) {
+        snprintf(target, PAIRS_TEXT, "%.9g", json_number_value(value));
+    } else {
+        char *text = json_dumps(value, JSON_COMPACT | JSON_ENCODE_ANY | JSON_REAL_PRECISION(9));
+        text_fit(target, PAIRS_TEXT, json_is_null(value) ? "-" : text != NULL ? text : "?");
+        free(text);
+    }
+}
+
+static bool pair_add(Pairs *pairs, const char *name, const json_t *a, const json_t *b,
+                     const char *rest) {
+    char of_a[PAIRS_TEXT], of_b[PAIRS_TEXT];
+    Pair *at = realloc(pairs->at, (pairs->count + 1) * sizeof *at);
+    if (at == NULL)
+        return false;
+    pairs->at = at;
+    value_put(of_a, a);
+    if (b != NULL)
+        value_put(of_b, b);
+    Pair *pair = &at[pairs->count++];
+    *pair = (Pair){strdup(name), strdup(of_a), b != NULL ? strdup(of_b) : NULL, strdup(rest)};
+    return pair->name != NULL && pair->a != NULL && (b == NULL) == (pair->b == NULL) &&
+           pair->rest != NULL;
+}
+
+// All scalars of a row but those that are in it already.
+static void rest_put(Bytes *rest, const json_t *object, const char *named) {
+    const char *key;
+    json_t *value;
+    char text[PAIRS_TEXT];
+    json_object_foreach((json_t *)(uintptr_t)object, key, value) {
+        if (strcmp(key, "a") == 0 || strcmp(key, "b") == 0 || strcmp(key, named) == 0 ||
+            json_is_object(value) || json_is_array(value) || json_is_null(value))
+            continue;
+        value_put(text, value);
+        bytes_format(rest, "%s%.60s %s", rest->count > 0 ? ", " : "", key, text);
+    }
+}
+
+static bool walk(const json_t *value, const char *place, const char *key, Pairs *pairs);
+
+static bool object_walk(const json_t *object, const char *place, const char *key, Pairs *pairs) {
+    const json_t *a = json_object_get(object, "a"), *b = json_object_get(object, "b");
+    const char *name, *named = json_object_get(object, "pointer") != NULL ? "pointer" : "name";
+    const char *own = json_string_value(json_object_get(object, named));
+    json_t *value;
+    if (a != NULL && b != NULL && !json_is_object(a) && !json_is_object(b)) {
+        Bytes rest = {.most = 1000};
+        rest_put(&rest, object, named);
+        const bool is_added =
+            pair_add(pairs, own != NULL ? own : key, a, b, rest.at != NULL ? rest.at : "");
+        bytes_clear(&rest);
+        return is_added;
+    }
+    char inner[256];
+    json_object_foreach((json_t *)(uintptr_t)object, name, value) {
+        pointer_join(inner, sizeof inner, place, name);
+        if (!walk(value, inner, name, pairs))
+            return false;
+    }
+    return true;
+}
+
+static bool walk(const json_t *value, const char *place, const char *key, Pairs *pairs) {
+    if (pairs->count >= PAIRS_MOST)
+        return true;
+    if (json_is_object(value))
+        return object_walk(value, place, key, pairs);
+    if (!json_is_array(value))
+        return pair_add(pairs, place + 1, value, NULL, "");
+    char inner[256];
+    for (size_t i = 0; i < json_array_size(value); i++) {
+        const json_t *element = json_array_get(value, i);
+        pointer_index(inner, sizeof inner, place, i);
+        // Numbers by the thousand are for programs.
+        if ((json_is_object(element) || json_is_string(element)) &&
+            !walk(element, inner, inner + 1, pairs))
+            return false;
+    }
+    return true;
+}
+
+Status pairs_read(const char *text, size_t size, Pairs *pairs, Problem *problem) {
+    size_t position;
+    const char *sentence;
+    *pairs = (Pairs){0};
+    json_t *root = size > 0 && scan_allows(text, size, &position, &sentence)
+                       ? json_loadb(text, size, JSON_REJECT_DUPLICATES, NULL)
+                       : NULL;
+    Status status = STATUS_OK;
+    if (!json_is_object(root))
+        status = problem_set(problem, STATUS_UNREADABLE, "the document is no JSON object");
+    else if (!walk(root, "", "", pairs))
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory");
+    json_decref(root);
+    return status;
+}

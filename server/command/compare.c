@@ -1,0 +1,119 @@
+#include "server/command/compare.h"
+
+#include <string.h>
+
+#include "server/codec/pairs.h"
+#include "server/command/daemon.h"
+
+typedef struct CompareSettings {
+    char *server, *token_file, *ca_file;
+    double wait;
+    bool json;
+} CompareSettings;
+
+// clang-format off
+static const Field compare_fields[] = {
+    DAEMON_ROWS(CompareSettings),
+    FIELD_REAL(CompareSettings, wait, "s", AT_LEAST(0), 60, "wait so long for a busy daemon"),
+    FIELD_FLAG(CompareSettings, json, false, "print what the daemon answers, as JSON"),
+    FIELD_END,
+};
+// clang-format on
+
+static int wider(int width, const char *text) {
+    const int length = text != NULL ? (int)strlen(text) : 0;
+    return length > width ? length : width;
+}
+
+static void table_print(const Pairs *pairs, const char *a, const char *b) {
+    enum { WIDEST = 48 };
+    int names = 4, firsts = 12, seconds = 12;
+    for (size_t i = 0; i < pairs->count; i++) {
+        told_tame(pairs->at[i].name);
+        told_tame(pairs->at[i].a);
+        told_tame(pairs->at[i].rest);
+        if (pairs->at[i].b != NULL) {
+            told_tame(pairs->at[i].b);
+            names = wider(names, pairs->at[i].name);
+            firsts = wider(firsts, pairs->at[i].a);
+            seconds = wider(seconds, pairs->at[i].b);
+        }
+    }
+    names = names < WIDEST ? names : WIDEST;
+    firsts = firsts < WIDEST ? firsts : WIDEST;
+    seconds = seconds < WIDEST ? seconds : WIDEST;
+    printf("%-*s  %*.*s  %*.*s\n", names, "", firsts, firsts, a, seconds, seconds, b);
+    for (size_t i = 0; i < pairs->count; i++)
+        if (pairs->at[i].b != NULL)
+            printf("%-*s  %*s  %*s%s%s\n", names, pairs->at[i].name, firsts, pairs->at[i].a,
+                   seconds, pairs->at[i].b, pairs->at[i].rest[0] != '\0' ? "  " : "",
+                   pairs->at[i].rest);
+    puts("");
+    for (size_t i = 0; i < pairs->count; i++)
+        if (pairs->at[i].b == NULL && strncmp(pairs->at[i].name, "links/", 6) != 0)
+            printf("%s: %s\n", pairs->at[i].name, pairs->at[i].a);
+}
+
+static Status ask_compare(const CompareSettings *settings, Daemon *daemon, const char *a,
+                          const char *b, Problem *problem) {
+    char path[256];
+    HttpAnswer answer = {0};
+    Pairs pairs = {0};
+    snprintf(path, sizeof path, "/v1/compare?a=%s&b=%s", a, b);
+    const HttpAsk ask = {.method = "GET", .path = path};
+    Status status = daemon_ask(daemon, &ask, &answer, problem);
+    if (status == STATUS_OK && settings->json) {
+        (void)fwrite(answer.body.at, 1, answer.body.count, stdout);
+    } else if (status == STATUS_OK) {
+        status = pairs_read(answer.body.at, answer.body.count, &pairs, NULL) == STATUS_OK
+                     ? STATUS_OK
+                     : problem_set(problem, STATUS_UNREACHABLE,
+                                   "the answer is no comparison: what answers there is no impactd");
+        if (status == STATUS_OK)
+            table_print(&pairs, a, b);
+    }
+    pairs_clear(&pairs);
+    http_answer_clear(&answer);
+    return status;
+}
+
+static int compare(void *of, const Options *options, Problem *problem) {
+    const CompareSettings *settings = of;
+    if (options->operand_count != 2 || !daemon_is_id(options->operands[0]) ||
+        !daemon_is_id(options->operands[1])) {
+        (void)problem_set(problem, STATUS_USAGE, "takes the ids of two results, like r-91c0");
+        return command_refuse("compare", problem);
+    }
+    const char *ids[2] = {options->operands[0], options->operands[1]};
+    char results[2][96];
+    const char *about = ids[0];
+    Daemon daemon;
+    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
+                                settings->wait, &daemon, problem);
+    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
+        about = ids[i];
+        status = daemon_result(&daemon, ids[i], results[i], problem);
+    }
+    if (status == STATUS_OK)
+        status = ask_compare(settings, &daemon, results[0], results[1], problem);
+    daemon_close(&daemon);
+    return status == STATUS_OK ? COMMAND_OK : daemon_refuse("compare", about, status, problem);
+}
+
+static int compare_run(int argc, char *const *argv) {
+    CompareSettings settings;
+    return command_with_options("compare", compare_fields, &settings, argc, argv, compare);
+}
+
+const Command command_compare = {
+    .name = "compare",
+    .operands = "A B",
+    .summary = "set two results of a daemon side by side",
+    .help =
+        "  impactd compare r-91c0 r-02ab           metrics of both, and the inputs that differ\n"
+        "  impactd compare j-7f3a j-81dd --json    by their jobs; as the daemon answers\n"
+        "\n"
+        "Exit code 4 if one of them is not there.\n",
+    .options = compare_fields,
+    .run = compare_run,
+};

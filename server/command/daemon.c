@@ -1,0 +1,207 @@
+#include "server/command/daemon.h"
+
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "server/base/clock.h"
+#include "server/client/token.h"
+#include "server/command/bar.h"
+#include "server/command/command.h"
+#include "server/command/output.h"
+#include "server/command/scene_file.h"
+
+static const char usual_server[] = "http://127.0.0.1:8080";
+static const double forever = 1e9;                      // [s]
+static const double bar_poll = 0.5, lines_poll = 2;     // [s] between two looks at a job
+static const int64_t restart_ns = (int64_t)10000000000; // a daemon may take that long to start
+
+static const char *setting(const char *given, const char *name, const char *usual) {
+    const char *found = given != NULL ? given : getenv(name);
+    return found != NULL && found[0] != '\0' ? found : usual;
+}
+
+Status daemon_open(const char *server, const char *token_file, const char *ca_file, double wait,
+                   Daemon *daemon, Problem *problem) {
+    char token[TOKEN_MOST + 1];
+    *daemon = (Daemon){.until_ns = clock_monotonic_ns() +
+                                   (int64_t)(1e9 * (wait < forever ? wait : forever))};
+    TRY(token_read(setting(token_file, "IMPACTD_TOKEN_FILE", NULL), token, problem));
+    const HttpServer at = {.url = setting(server, "IMPACTD_SERVER", usual_server),
+                           .token = token[0] != '\0' ? token : NULL,
+                           .ca_file = setting(ca_file, "IMPACTD_CA_FILE", NULL)};
+    TRY(http_open(&at, &daemon->http, problem));
+    if (http_exposes_token(daemon->http))
+        fprintf(stderr, "impactd: warning: the token travels unencrypted to %s\n", at.url);
+    return STATUS_OK;
+}
+
+void daemon_close(Daemon *daemon) {
+    http_close(daemon->http);
+    daemon->http = NULL;
+}
+
+double daemon_left(const Daemon *daemon) {
+    const double left = 1e-9 * (double)(daemon->until_ns - clock_monotonic_ns());
+    return left > 0 ? left : 0;
+}
+
+static void pause_for(double seconds) {
+    (void)poll(NULL, 0, (int)(1000 * seconds));
+}
+
+Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
+    for (;;) {
+        TRY(http_ask(daemon->http, ask, answer, problem));
+        if (answer->code == 200 || answer->code == 202)
+            return STATUS_OK;
+        const double pause = answer->retry_after > 0 ? answer->retry_after : 1;
+        const bool is_busy = answer->code == 503 || answer->code == 429;
+        if (!is_busy || pause > daemon_left(daemon))
+            return problem_told_read(answer, problem);
+        http_answer_clear(answer);
+        pause_for(pause);
+    }
+}
+
+bool daemon_is_id(const char *text) {
+    const size_t length = strlen(text);
+    return length > 0 && length <= 80 &&
+           strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
+               length;
+}
+
+Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answer, JobTold *job,
+                  Problem *problem) {
+    char path[160];
+    snprintf(path, sizeof path, "/v1/jobs/%s?wait=%.3f", id, wait);
+    const HttpAsk ask = {.method = "GET", .path = path};
+    TRY(daemon_ask(daemon, &ask, answer, problem));
+    return job_told_read(answer, job, problem);
+}
+
+Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem) {
+    snprintf(result, 96, "%s", id);
+    if (strncmp(id, "j-", 2) != 0)
+        return STATUS_OK;
+    HttpAnswer answer = {0};
+    JobTold job = {0};
+    const double left = daemon_left(daemon);
+    Status status = daemon_job(daemon, id, left < 20 ? left : 20, &answer, &job, problem);
+    while (status == STATUS_OK && !job_told_is_final(&job) && daemon_left(daemon) > 0) {
+        job_told_clear(&job);
+        http_answer_clear(&answer);
+        const double rest = daemon_left(daemon);
+        status = daemon_job(daemon, id, rest < 20 ? rest : 20, &answer, &job, problem);
+    }
+    if (status == STATUS_OK && !job_told_is_final(&job))
+        status = problem_set(problem, STATUS_TIMEOUT,
+                             "is still %s; \"impactd watch %s\" follows it, --wait S waits",
+                             job.status, id);
+    else if (status == STATUS_OK && strcmp(job.status, "failed") == 0) {
+        problem_told_put(&job.problem, STATUS_INTERNAL, problem);
+        status = STATUS_INTERNAL;
+    } else if (status == STATUS_OK && (job.result == NULL || !daemon_is_id(job.result)))
+        status = problem_set(problem, STATUS_INTERNAL, "was %s and has no result", job.status);
+    if (status == STATUS_OK)
+        snprintf(result, 96, "%s", job.result);
+    job_told_clear(&job);
+    http_answer_clear(&answer);
+    return status;
+}
+
+// A bar, or a line whenever the state changes or ten more percent are done.
+typedef struct Show {
+    Bar bar;
+    FILE *lines;
+    char status[48];
+    double progress;
+} Show;
+
+static void show_job(Show *show, const JobTold *job) {
+    const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
+    if (show->bar.is_terminal) {
+        const Watch watch = bar_watch(&show->bar);
+        (void)watch_advance(&watch, progress / 100);
+        return;
+    }
+    if (show->lines == NULL ||
+        (strcmp(show->status, job->status) == 0 && progress < show->progress + 10))
+        return;
+    snprintf(show->status, sizeof show->status, "%s", job->status);
+    show->progress = progress;
+    fprintf(show->lines, "%s %s %.0f %%\n", job->id, job->status, progress);
+    fflush(show->lines);
+}
+
+// One look. Where nothing answers any more, again each second until a new daemon had its time.
+static Status look(Daemon *daemon, const char *id, double wait, bool was_there, HttpAnswer *answer,
+                   JobTold *job, Problem *problem) {
+    const int64_t until_ns = clock_monotonic_ns() + restart_ns;
+    for (;;) {
+        const Status status = daemon_job(daemon, id, wait, answer, job, problem);
+        if (status != STATUS_UNREACHABLE || !was_there || clock_monotonic_ns() > until_ns ||
+            daemon_left(daemon) < 1)
+            return status;
+        job_told_clear(job);
+        http_answer_clear(answer);
+        problem_clear(problem);
+        pause_for(1);
+    }
+}
+
+Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobTold *job,
+                     Problem *problem) {
+    char farewell[256];
+    Show show = {.lines = lines};
+    snprintf(farewell, sizeof farewell,
+             "%s goes on; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
+             id, id);
+    output_guard();
+    output_farewell(farewell);
+    bar_start(&show.bar);
+    Status status = STATUS_OK;
+    for (bool was_there = false;; was_there = true) {
+        const double poll = show.bar.is_terminal ? bar_poll : lines_poll;
+        const double left = daemon_left(daemon);
+        status = look(daemon, id, left < poll ? left : poll, was_there, answer, job, problem);
+        if (status != STATUS_OK)
+            break;
+        show_job(&show, job);
+        if (job_told_is_final(job))
+            break;
+        if (daemon_left(daemon) <= 0) {
+            status = problem_set(problem, STATUS_TIMEOUT, "is still %s after the time given; %.*s",
+                                 job->status, (int)strlen(farewell) - 1, farewell);
+            break;
+        }
+        job_told_clear(job);
+        http_answer_clear(answer);
+    }
+    bar_stop(&show.bar);
+    output_farewell(NULL);
+    return status;
+}
+
+int daemon_verdict(const JobTold *job, Problem *problem) {
+    if (strcmp(job->status, "successful") == 0)
+        return COMMAND_OK;
+    if (strcmp(job->status, "failed") == 0) {
+        problem_told_put(&job->problem, STATUS_INTERNAL, problem);
+        scene_file_refuse(job->id, problem);
+    } else {
+        fprintf(stderr, "%s: was %s\n", job->id, job->status);
+    }
+    return COMMAND_FAILED;
+}
+
+int daemon_refuse(const char *command, const char *name, Status status, const Problem *problem) {
+    // Faults of flags have them as their place.
+    if (status == STATUS_USAGE && problem->count > 0 &&
+        strchr("-I", problem->faults[0].pointer[0]) != NULL &&
+        problem->faults[0].pointer[0] != '\0')
+        return command_refuse(command, problem);
+    scene_file_refuse(name, problem);
+    return command_exit(status);
+}

@@ -1,0 +1,34 @@
+// Who can reach the daemon and under which names: Host names, base URL, TLS files, and whether
+// tokens are a must. Settings into what the listener takes. Used by serve.c.
+#ifndef SERVER_COMMAND_REACH_H
+#define SERVER_COMMAND_REACH_H
+
+#include "core/base/field.h"
+#include "server/http/address.h"
+#include "server/http/base_url.h"
+#include "server/http/gate.h"
+
+typedef struct ReachSettings {
+    Texts host;
+    const char *base_url, *tls_cert, *tls_key; // NULL: none; the last two are files
+    bool require_tokens;
+} ReachSettings;
+
+typedef struct Reach {
+    BaseUrl url; // empty: none
+    GateHosts hosts;
+    char **names; // of hosts
+    size_t name_count;
+    char *tls_cert, *tls_key; // PEM; NULL: no TLS
+    bool needs_tokens;
+} Reach;
+
+// Adds all faults (STATUS_USAGE). `reach` is cleared by reach_clear in any case.
+Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
+                  Problem *problem);
+void reach_clear(Reach *reach);
+
+// STATUS_FORBIDDEN where tokens are a must and none can be used; says how to make one.
+Status reach_check(const Reach *reach, const Address *address, size_t tokens, Problem *problem);
+
+#endif

@@ -1,0 +1,13 @@
+// Headers that every answer carries, whatever it is: what browsers must not do with it. No
+// Access-Control-* among them: pages of other sites get nothing. Used by sending.c.
+#ifndef SERVER_HTTP_SHIELD_H
+#define SERVER_HTTP_SHIELD_H
+
+typedef struct ShieldHeader {
+    const char *name, *value;
+} ShieldHeader;
+
+extern const ShieldHeader shield_headers[]; // ends with name == NULL
+extern const ShieldHeader shield_tls;       // under TLS as well
+
+#endif

@@ -1,0 +1,30 @@
+# cmake --install build [--prefix X], with DESTDIR for packages: the program, its manual, completions, unit, contract.
+include(GNUInstallDirs)
+file(GLOB PAGES_SOURCES CONFIGURE_DEPENDS server/install/*.c)
+add_executable(print_pages ${PAGES_SOURCES})
+target_link_libraries(print_pages PRIVATE impactd_server)
+set_target_properties(print_pages PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
+set(PAGES ${CMAKE_BINARY_DIR}/install)
+add_custom_command(
+    OUTPUT ${PAGES}/impactd.1 ${PAGES}/impactd-scene.5 ${PAGES}/impactd.bash ${PAGES}/_impactd ${PAGES}/impactd.fish
+    COMMAND print_pages ${PAGES} VERBATIM)
+add_custom_target(pages ALL DEPENDS ${PAGES}/impactd.1)
+
+install(TARGETS impactd RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(FILES ${PAGES}/impactd.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+install(FILES ${PAGES}/impactd-scene.5 DESTINATION ${CMAKE_INSTALL_MANDIR}/man5)
+install(FILES server/install/impactd.service.8 DESTINATION ${CMAKE_INSTALL_MANDIR}/man8)
+install(FILES ${PAGES}/impactd.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME impactd)
+install(FILES ${PAGES}/_impactd DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES ${PAGES}/impactd.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+file(GLOB INSTALLED_SCHEMAS CONFIGURE_DEPENDS schema/*.json)
+file(GLOB INSTALLED_EXAMPLES CONFIGURE_DEPENDS schema/examples/*.json)
+install(FILES ${INSTALLED_SCHEMAS} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/schema)
+install(FILES ${INSTALLED_EXAMPLES} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/examples)
+install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# The unit names the program where this very installation puts it.
+install(CODE "
+    get_filename_component(prefix \"\${CMAKE_INSTALL_PREFIX}\" ABSOLUTE)
+    set(IMPACTD_BINARY \"\${prefix}/${CMAKE_INSTALL_BINDIR}/impactd\")
+    configure_file(\"${PROJECT_SOURCE_DIR}/server/install/impactd.service.in\" \"${PAGES}/impactd.service\" @ONLY)
+    file(INSTALL DESTINATION \"\${CMAKE_INSTALL_PREFIX}/lib/systemd/system\" TYPE FILE FILES \"${PAGES}/impactd.service\")")

@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+"""What `cmake --install` puts where: the program, its manual, completions and unit, each used from there."""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+MANUALS = ("man1/impactd.1", "man5/impactd-scene.5", "man8/impactd.service.8")
+OPTION = re.compile(r"^  (?:-\w, |    )(--[\w-]+)", re.M)
+
+
+@contextlib.contextmanager
+def installed(prefix="/opt/x"):
+    """The folder that stands for / of an installation under `prefix`."""
+    with tempfile.TemporaryDirectory() as root:
+        subprocess.run(["cmake", "--install", program.build, "--prefix", prefix], check=True, capture_output=True,
+                       env={**os.environ, "DESTDIR": root})
+        yield root
+
+
+def listed(root):
+    return {os.path.relpath(os.path.join(folder, file), root) for folder, _, files in os.walk(root) for file in files}
+
+
+def commands():
+    """Every command with its options, as help lists them."""
+    text = program.run("--help")[1]
+    names = re.findall(r"^  (\w+) +\S", text[text.rindex('"sample_rate"'):], re.M)
+    return {name: OPTION.findall(program.run("help", name)[1]) for name in names}
+
+
+def need(*tools):
+    for tool in tools:
+        if shutil.which(tool) is None:
+            raise program.Skipped(f"{tool} is not here")
+
+
+def test_everything_is_installed_under_its_prefix():
+    """Program, manual, completions, unit, contract, examples and licence stand under the prefix, and nothing elsewhere."""
+    with installed() as root:
+        files = listed(root)
+        assert all(file.startswith("opt/x/") for file in files), files
+        wanted = {"bin/impactd", "lib/systemd/system/impactd.service", "share/bash-completion/completions/impactd",
+                  "share/zsh/site-functions/_impactd", "share/fish/vendor_completions.d/impactd.fish",
+                  "share/impactd/schema/openapi.json", "share/impactd/schema/scene.schema.json",
+                  "share/impactd/examples/paper_free_sponge.json", "share/doc/impactd/LICENSE",
+                  *("share/man/" + manual for manual in MANUALS)}
+        assert wanted <= {file[len("opt/x/"):] for file in files}, wanted - {file[len("opt/x/"):] for file in files}
+        assert os.access(os.path.join(root, "opt/x/bin/impactd"), os.X_OK)
+
+
+def test_the_installed_program_runs_from_there():
+    """The installed program runs an installed example without anything of the source tree."""
+    with installed() as root, tempfile.TemporaryDirectory() as elsewhere:
+        done = subprocess.run([os.path.join(root, "opt/x/bin/impactd"), "run",
+                               os.path.join(root, "opt/x/share/impactd/examples/paper_free_sponge.json")],
+                              capture_output=True, text=True, check=True, cwd=elsewhere, env={"PATH": "/usr/bin:/bin"})
+        assert json.loads(done.stdout)["status"] == "successful"
+
+
+def test_the_manual_is_well_formed_and_whole():
+    """mandoc finds no fault in any page, man shows them, and every command and option stands in the first."""
+    need("mandoc", "man")
+    with installed() as root:
+        pages = [os.path.join(root, "opt/x/share/man", manual) for manual in MANUALS]
+        done = subprocess.run(["mandoc", "-Tlint", "-Wwarning", *pages], capture_output=True, text=True, check=False)
+        faults = [line for line in done.stdout.splitlines()
+                  if "WARNING" in line and "missing date" not in line or "ERROR" in line]
+        assert not faults, faults
+        for page in pages:
+            shown = subprocess.run(["man", "-l", page], capture_output=True, text=True, check=False,
+                                   env={**os.environ, "MANPAGER": "cat", "MANWIDTH": "200", "LC_ALL": "C.UTF-8"})
+            assert shown.returncode == 0 and len(shown.stdout) > 500, (page, shown)
+        text = subprocess.run(["mandoc", "-Tascii", "-Owidth=200", pages[0]], capture_output=True, text=True, check=True).stdout
+        text = re.sub(r".\x08", "", text)
+        for name, options in commands().items():
+            assert re.search(rf"^ *impactd {name}\b", text, re.M), name
+            for option in options:
+                assert option in text, (name, option)
+        scene = subprocess.run(["mandoc", "-Tascii", pages[1]], capture_output=True, text=True, check=True).stdout
+        scene = re.sub(r".\x08", "", scene)
+        for member in ("structure", "dampers[]", "contact", "excitation", "duration", "sample_rate"):
+            assert member in scene, member
+
+
+def complete(script, *words):
+    """What bash offers for the last of the words."""
+    program_text = f'source "{script}"; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _impactd; printf "%s\\n" "${{COMPREPLY[@]}}"'
+    done = subprocess.run(["bash", "-c", program_text, "bash", "impactd", *words], capture_output=True, text=True, check=True)
+    assert done.stderr == "", done.stderr
+    return done.stdout.split()
+
+
+def test_bash_completes_commands_options_and_values():
+    """bash offers every command, every option of each, the values that are known, and leaves files to itself."""
+    with installed() as root:
+        script = os.path.join(root, "opt/x/share/bash-completion/completions/impactd")
+        known = commands()
+        assert len(known) >= 12 and set(complete(script, "")) == {*known, "--help", "--version"}
+        for name, options in known.items():
+            assert set(complete(script, name, "-")) == {"--help", *options}, name
+        assert complete(script, "sub") == ["submit"]
+        assert complete(script, "tradeoff", "--metric", "imp") == ["impacts"]
+        assert complete(script, "get", "r-1", "imp") == ["impacts"]
+        assert complete(script, "run", "--output", "") == [] and complete(script, "run", "") == []
+        assert set(complete(script, "help", "")) == set(known)
+        bound = subprocess.run(["bash", "-c", f'source "{script}"; complete -p impactd'], capture_output=True, text=True, check=True)
+        assert "-o default" in bound.stdout and "_impactd" in bound.stdout, bound
+
+
+def test_other_shells_can_read_their_completions():
+    """zsh and fish find no fault in theirs, where they are here."""
+    need("zsh", "fish")
+    with installed() as root:
+        for shell, path in (("zsh", "zsh/site-functions/_impactd"), ("fish", "fish/vendor_completions.d/impactd.fish")):
+            done = subprocess.run([shell, "-n", os.path.join(root, "opt/x/share", path)], capture_output=True, text=True, check=False)
+            assert done.returncode == 0 and done.stderr == "", (shell, done)
+
+
+def test_the_unit_is_well_formed_and_shut_off():
+    """The unit names the installed program, systemd finds no fault in it, and its exposure is below 2 of 10."""
+    with installed() as root:
+        unit = os.path.join(root, "opt/x/lib/systemd/system/impactd.service")
+        with open(unit, encoding="utf-8") as file:
+            text = file.read()
+        assert "ExecStart=/opt/x/bin/impactd serve\n" in text and "@" not in re.sub(r"@[a-z-]+", "", text), text
+        need("systemd-analyze")
+        here = os.path.join(root, "impactd.service")
+        with open(here, "w", encoding="utf-8") as file:  # as if it were installed in /
+            file.write(text.replace("/opt/x", root + "/opt/x"))
+        done = subprocess.run(["systemd-analyze", "verify", "--man=no", here], capture_output=True, text=True, check=False)
+        assert done.returncode == 0 and "impactd" not in done.stderr, done
+        done = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", here],
+                              capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-300:] + done.stderr
+
+
+if __name__ == "__main__":
+    program.main(globals())

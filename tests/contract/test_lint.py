@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""A linter of OpenAPI 3.1 finds no error in schema/openapi.json.
+
+@redocly/cli is installed by npm into the build folder, once; without npm or its network the test is skipped."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+LINTER = "@redocly/cli@1.34.5"
+
+# Warnings that are meant to be there: rule -> why.
+MEANT = {
+    "no-ambiguous-paths": "{slug}@{revision} and {slug}: a slug holds no @",
+    "operation-4xx-response": "examples, health and version take nothing that could be wrong",
+}
+
+
+def linter():
+    folder = os.path.join(program.build, "node")
+    path = os.path.join(folder, "node_modules", ".bin", "redocly")
+    if os.path.exists(path):
+        return path
+    if shutil.which("npm") is None:
+        raise program.Skipped("npm is not here (Debian packages nodejs and npm)")
+    os.makedirs(folder, exist_ok=True)
+    done = subprocess.run(["npm", "install", "--no-save", "--no-package-lock", "--no-audit", "--no-fund",
+                           "--omit-lockfile-registry-resolved", "--loglevel=error", LINTER],
+                          cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    if done.returncode != 0:
+        raise program.Skipped(f"npm cannot install {LINTER}: {done.stderr.strip().splitlines()[-1:]}")
+    return path
+
+
+def lint(document):
+    """The linter's findings as (severity, rule, message), with the schemas that the daemon serves beside the document."""
+    folder = os.path.join(program.build, "node", "document")
+    os.makedirs(folder, exist_ok=True)
+    text = json.dumps(document)
+    for name in os.listdir(os.path.join(program.SOURCE, "schema")):
+        if name.endswith(".schema.json"):
+            shutil.copy(os.path.join(program.SOURCE, "schema", name), folder)
+            text = text.replace(f'"/schemas/{name.split(".")[0]}"', f'"./{name}"')
+    with open(os.path.join(folder, "openapi.json"), "w", encoding="utf-8") as file:
+        file.write(text)
+    done = subprocess.run([linter(), "lint", "--format=json", "--extends=recommended", "--max-problems=1000", "openapi.json"],
+                          cwd=folder, capture_output=True, text=True, timeout=200, check=False,
+                          env={**os.environ, "REDOCLY_TELEMETRY": "off", "CI": "1"})
+    assert done.stdout.startswith("{"), done
+    return [(one["severity"], one["ruleId"], one["message"]) for one in json.loads(done.stdout)["problems"]]
+
+
+def document():
+    with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def test_the_linter_finds_no_error():
+    """No error, and no warning but those that are meant to be there."""
+    linter()
+    found = [one for one in lint(document()) if one[0] == "error" or one[1] not in MEANT]
+    assert not found, "\n".join(map(str, found))
+
+
+def test_the_linter_finds_planted_faults():
+    """A reference that leads nowhere, an operation id used twice and a path without its parameter are found."""
+    linter()
+    broken = document()
+    broken["paths"]["/v1/jobs"]["get"]["operationId"] = broken["paths"]["/version"]["get"]["operationId"]
+    broken["paths"]["/v1/jobs/{id}"]["get"]["parameters"] = []
+    broken["paths"]["/version"]["get"]["responses"]["200"]["content"]["application/json"]["schema"]["$ref"] += "x"
+    rules = {rule for severity, rule, _ in lint(broken) if severity == "error"}
+    assert rules >= {"operation-operationId-unique", "path-parameters-defined", "no-unresolved-refs"}, rules
+
+
+if __name__ == "__main__":
+    program.main(globals())

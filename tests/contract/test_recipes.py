@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""The README's recipes for scripts run as they stand there, against a daemon."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import numpy
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+USUAL = "http://127.0.0.1:8080"
+
+
+def recipe(language):
+    """The one fenced block of that language in the README."""
+    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
+        found = re.findall(rf"^```{language}\n(.*?)^```$", file.read(), re.M | re.S)
+    assert len(found) == 1, (language, len(found))
+    return found[0]
+
+
+def cook(language, *command, ending):
+    """Runs a recipe in a folder with the scene in it; its output, and the numbers of the files it leaves."""
+    if shutil.which(command[0]) is None:
+        raise program.Skipped(f"{command[0]} is not here")
+    with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
+        shutil.copy(os.path.join(program.EXAMPLES, "paper_free_sponge.json"), os.path.join(folder, "scene.json"))
+        path = os.path.join(folder, "recipe" + ending)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(recipe(language).replace(USUAL, daemon.url))
+        done = subprocess.run([*command, path], cwd=folder, capture_output=True, text=True, timeout=200, check=False,
+                              env={**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder,
+                                   "PATH": program.build + os.pathsep + os.environ["PATH"]})
+        assert done.returncode == 0, done
+        tables = {name: numpy.loadtxt(os.path.join(folder, name), delimiter=",", skiprows=1)
+                  for name in os.listdir(folder) if name.endswith(".csv")}
+        result = program.finished(daemon, program.scene("paper_free_sponge"))["result"]
+        whole = numpy.loadtxt(daemon.get(f"/v1/results/{result}/series.csv").body.decode().splitlines(),
+                              delimiter=",", skiprows=1)
+        psd = numpy.loadtxt(daemon.get(f"/v1/results/{result}/psd.csv").body.decode().splitlines(),
+                            delimiter=",", skiprows=1)
+    return done.stdout, tables, whole, psd
+
+
+def test_curl():
+    """The recipe for curl brings series, spectra and the largest force."""
+    out, tables, whole, psd = cook("sh", "sh", "-eu", ending=".sh")
+    assert tables["motion.csv"].shape == (2001, 3) and numpy.array_equal(tables["motion.csv"][:, 1], whole[:2001, 1])
+    assert numpy.array_equal(tables["psd.csv"], psd)
+    assert 5 < float(out.split()[-1]) < 6, out
+
+
+def test_python():
+    """The recipe for Python needs requests and numpy alone and brings series, spectra and five clearances."""
+    out, _, whole, psd = cook("python", "/usr/bin/python3", ending=".py")
+    lines = out.splitlines()
+    assert lines[0] == f"{len(whole)} samples, peak {abs(whole[:, 1]).max()} m", out
+    assert lines[1] == f"most power at {psd[numpy.argmax(psd[:, 1]), 0]} Hz", out
+    assert len(lines) == 7 and len({line.split()[1] for line in lines[2:]}) == 5, out
+    used = set(re.findall(r"^(?:import|from) (\w+)", recipe("python"), re.M))
+    assert used == {"io", "numpy", "requests"}, used
+
+
+def test_octave():
+    """The recipe for Octave and MATLAB brings the same series and spectra as arrays."""
+    out, tables, whole, psd = cook("octave", "octave-cli", "--no-init-file", "--quiet", ending=".m")
+    assert numpy.array_equal(tables["motion.csv"][:, 1], whole[:, 1]) and numpy.array_equal(tables["psd.csv"], psd)
+    assert out.splitlines() == [f"{len(whole)} samples, peak {abs(whole[:, 1]).max():g} m, 22 impacts",
+                                f"most power at {psd[numpy.argmax(psd[:, 1]), 0]:g} Hz"], out
+
+
+if __name__ == "__main__":
+    program.main(globals())

@@ -1,0 +1,204 @@
+#!/usr/bin/env python3
+"""Recorded traffic is what schema/openapi.json says, and all that it says was seen.
+
+Reads the record that IMPACTD_RECORD names; without one it makes its own by running the tests that ask the most."""
+
+import base64
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import urllib.parse
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
+    DOCUMENT = json.load(openapi)
+
+# Tests that together see every operation.
+SOURCES = ("test_openapi.py", "test_http.py")
+
+# On every answer, so that no operation names them.
+EVERYWHERE = {"content-type", "content-length", "date", "connection", "cache-control", "vary", "accept-ranges",
+              "transfer-encoding", "content-encoding", "keep-alive", "x-request-id", "x-content-type-options",
+              "content-security-policy", "referrer-policy", "cross-origin-resource-policy", "x-frame-options",
+              "cross-origin-opener-policy", "permissions-policy", "strict-transport-security", "www-authenticate"}
+
+# What the document promises and no test can bring about at will: (method, path, status) -> why. A path of None is
+# any path.
+UNSEEN = {
+    (None, "503"): "a queue, memory or connections that are full; tested where they are made small",
+    (None, "410"): "results of another engine version; tested below the HTTP interface",
+    (None, "507"): "a full disk; tested where a small one can be mounted",
+    (None, "500"): "a fault of the daemon",
+}
+
+
+def exchanges():
+    """Every line of the record, once."""
+    if not hasattr(exchanges, "kept"):
+        given = os.environ.get("IMPACTD_RECORD")
+        with tempfile.TemporaryDirectory() as folder:
+            path = given if given and os.path.exists(given) else os.path.join(folder, "record")
+            for name in SOURCES if path != given else ():
+                done = subprocess.run([sys.executable, os.path.join(HERE, name), "--build", program.build],
+                                      capture_output=True, text=True, check=False,
+                                      env={**os.environ, "IMPACTD_RECORD": path})
+                assert done.returncode == 0, done.stdout[-3000:]
+            with open(path, encoding="utf-8") as file:
+                exchanges.kept = [json.loads(line) for line in file]
+    return exchanges.kept
+
+
+def validator():
+    """Judges a value by a schema of the document: a function that returns the faults."""
+    try:
+        import jsonschema
+    except ImportError as error:
+        raise program.Skipped(f"python3-jsonschema is not here: {error}") from None
+    store = {}
+    for name in os.listdir(os.path.join(program.SOURCE, "schema")):
+        if name.endswith(".schema.json"):
+            with open(os.path.join(program.SOURCE, "schema", name), encoding="utf-8") as file:
+                schema = json.load(file)
+            jsonschema.Draft202012Validator.check_schema(schema)
+            store[schema["$id"]] = store["/schemas/" + name.split(".")[0]] = schema
+    resolver = jsonschema.RefResolver("", DOCUMENT, store=store)
+
+    def judge(schema, value):
+        found = jsonschema.Draft202012Validator(schema, resolver=resolver).iter_errors(value)
+        return [f"/{'/'.join(map(str, fault.path))}: {fault.message[:300]}" for fault in list(found)[:3]]
+    return judge
+
+
+def operation_of(method, path):
+    """(path template, operation) that answers; of two that fit the more literal one. None if there is none."""
+    path = urllib.parse.unquote(urllib.parse.urlsplit(path).path)
+    fitting = []
+    for template, item in DOCUMENT["paths"].items():
+        parts = re.split(r"(\{\w+\})", template)
+        names = {p["name"]: p["schema"].get("enum") for one in item.values() for p in one.get("parameters", [])
+                 if p["in"] == "path"}
+        pattern = "".join(
+            (f"(?:{'|'.join(map(re.escape, names[part[1:-1]]))})" if names.get(part[1:-1]) else "[^/]+?")
+            if part.startswith("{") else re.escape(part) for part in parts)
+        if re.fullmatch(pattern, path):
+            fitting.append((sum(len(part) for part in parts if not part.startswith("{")), template))
+    if not fitting:
+        return None
+    template = max(fitting)[1]
+    operation = DOCUMENT["paths"][template].get({"HEAD": "get"}.get(method, method.lower()))
+    return (template, operation) if operation else None
+
+
+def media(headers, name="content-type"):
+    return headers.get(name, "").split(";")[0].strip().lower()
+
+
+def tell(found):
+    assert not found, f"{len(found)} faults\n" + "\n".join(sorted(set(found))[:40])
+
+
+def test_every_answer_is_declared():
+    """Status, content type and headers of every recorded answer stand in the document."""
+    found = []
+    assert len(exchanges()) > 100, len(exchanges())
+    for one in exchanges():
+        name = f"{one['method']} {one['path'][:100]} -> {one['status']}"
+        match = operation_of(one["method"], one["path"])
+        kind = media(one["answer_headers"])
+        if match is None:
+            if one["status"] < 400 or kind not in ("application/problem+json", "") or one["status"] >= 500 and \
+                    one["status"] not in (501, 505):
+                found.append(f"{name}: answered, and not in the document")
+            continue
+        answer = match[1]["responses"].get(str(one["status"]))
+        if answer is None:
+            found.append(f"{name}: the status is not declared for {match[0]}")
+            continue
+        content = answer.get("content", {})
+        if (kind not in content if content else one["size"] > 0):
+            found.append(f"{name}: {kind or 'no type'} is not declared for {match[0]}")
+        # A 304 and a 206 have what their 200 would have had (RFC 9110, 15.3.7 and 15.4.5).
+        kin = match[1]["responses"].get("200", {}) if one["status"] in (206, 304) else {}
+        declared = {header.lower() for header in [*answer.get("headers", {}), *kin.get("headers", {})]}
+        found += [f"{name}: the header {header} is not declared for {match[0]}"
+                  for header in one["answer_headers"] if header not in declared | EVERYWHERE]
+    tell(found)
+
+
+def test_every_json_body_fits_its_schema():
+    """Every recorded answer of JSON is valid by the schema of its status, as JSON Schema 2020-12."""
+    judge, found, count = validator(), [], 0
+    for one in exchanges():
+        match = operation_of(one["method"], one["path"])
+        kind = media(one["answer_headers"])
+        if match is None or "json" not in kind or one["method"] == "HEAD" or one["answer"] is None:
+            continue
+        content = match[1]["responses"].get(str(one["status"]), {}).get("content", {})
+        if kind in content:
+            count += 1
+            value = json.loads(base64.b64decode(one["answer"]))
+            found += [f"{one['method']} {one['path'][:100]} -> {one['status']}: {fault}"
+                      for fault in judge(content[kind]["schema"], value)]
+    assert count > 100, count
+    tell(found)
+
+
+def test_bodies_that_were_taken_fit_their_schema():
+    """Every recorded request that was taken is of a type that is declared and valid by that type's schema."""
+    judge, found, count = validator(), [], 0
+    for one in exchanges():
+        match = operation_of(one["method"], one["path"])
+        if match is None or one["body"] is None or one["status"] not in (200, 201, 202):
+            continue
+        content = match[1].get("requestBody", {}).get("content", {})
+        kind = media(one["headers"])
+        if kind not in content:
+            found.append(f"{one['method']} {one['path'][:100]}: a body of {kind} was taken")
+            continue
+        if "json" not in kind:
+            continue
+        count += 1
+        found += [f"{one['method']} {one['path'][:100]}: {fault}"
+                  for fault in judge(content[kind]["schema"], json.loads(base64.b64decode(one["body"])))]
+    assert count > 10, count
+    tell(found)
+
+
+def test_parameters_that_were_taken_are_declared():
+    """Every query of a request that was answered well is declared, and valid where it has a schema."""
+    found = []
+    for one in exchanges():
+        match = operation_of(one["method"], one["path"])
+        if match is None or one["status"] >= 400:
+            continue
+        declared = {p["name"] for p in match[1].get("parameters", []) if p["in"] == "query"}
+        given = urllib.parse.parse_qs(urllib.parse.urlsplit(one["path"]).query, keep_blank_values=True)
+        found += [f"{one['method']} {one['path'][:100]}: the query {name} is not declared" for name in given
+                  if name not in declared]
+    tell(found)
+
+
+def test_all_that_is_declared_was_seen():
+    """Each operation was asked, and each status it declares seen, but for the few that have a reason not to be."""
+    seen = set()
+    for one in exchanges():
+        match = operation_of(one["method"], one["path"])
+        if match is not None:
+            seen.add(({"HEAD": "GET"}.get(one["method"], one["method"]), match[0], str(one["status"])))
+    missing = []
+    for path, item in DOCUMENT["paths"].items():
+        for method, operation in item.items():
+            missing += [f"{method.upper()} {path} {status}" for status in operation["responses"]
+                        if (method.upper(), path, status) not in seen and (None, status) not in UNSEEN
+                        and (method.upper(), path, status) not in UNSEEN]
+    tell(missing)
+
+
+if __name__ == "__main__":
+    program.main(globals())

@@ -1,0 +1,289 @@
+// Tokens over a database in memory and one in a folder: who comes in, who does not, what another
+// process changed.
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "server/auth/tokens.h"
+#include "server/base/clock.h"
+
+static Status add(Store *store, const char *name, const char *scopes, int64_t expires_unix_ms,
+                  char header[128]) {
+    TokenRow row = {0};
+    char token[TOKEN_SIZE];
+    TRY(token_make(scopes, expires_unix_ms, &row, token, NULL));
+    snprintf(row.name, sizeof row.name, "%s", name);
+    snprintf(header, 128, "Bearer %s", token);
+    return store_token_add(store, &row, NULL);
+}
+
+static Status check(Tokens *tokens, const char *authorization, const char *scope,
+                    char client[TOKEN_NAME_SIZE]) {
+    return tokens_check(tokens, authorization, scope, client, NULL);
+}
+
+static void pause_ms(long ms) {
+    const struct timespec pause = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000};
+    nanosleep(&pause, NULL);
+}
+
+// What a look will find sooner or later; a loaded machine takes longer.
+static void until(Tokens *tokens, const char *authorization, Status wanted) {
+    char client[TOKEN_NAME_SIZE];
+    for (int i = 0; i < 1000; i++) {
+        if (check(tokens, authorization, "read", client) == wanted)
+            return;
+        pause_ms(10);
+    }
+    fail_msg("it never becomes %s", status_title(wanted));
+}
+
+static void without_tokens_the_door_is_open(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char client[TOKEN_NAME_SIZE] = "x";
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(check(tokens, NULL, "admin", client), STATUS_OK);
+    assert_string_equal(client, "");
+    assert_int_equal(check(tokens, "Bearer anything", "read", client), STATUS_OK);
+    assert_string_equal(client, "");
+    assert_int_equal(tokens_usable(tokens), 0);
+    tokens_close(tokens);
+    assert_int_equal(tokens_open(store, true, &tokens, NULL), STATUS_OK);
+    assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
+    tokens_close(tokens);
+    store_close(store);
+}
+
+static void a_token_opens_what_its_scopes_say(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char reader[128], worker[128], chief[128], other[128], client[TOKEN_NAME_SIZE];
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(add(store, "reader", "read", 0, reader), STATUS_OK);
+    assert_int_equal(add(store, "worker", "submit,materials", 0, worker), STATUS_OK);
+    assert_int_equal(add(store, "chief", "admin", 0, chief), STATUS_OK);
+    assert_int_equal(add(store, "chief", "admin", 0, other), STATUS_CONFLICT);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(tokens_usable(tokens), 3);
+    assert_int_equal(check(tokens, reader, "read", client), STATUS_OK);
+    assert_string_equal(client, "reader");
+    assert_int_equal(check(tokens, reader, "submit", client), STATUS_FORBIDDEN);
+    assert_int_equal(check(tokens, worker, "submit", client), STATUS_OK);
+    assert_int_equal(check(tokens, worker, "materials", client), STATUS_OK);
+    assert_int_equal(check(tokens, worker, "read", client), STATUS_FORBIDDEN);
+    for (size_t i = 0; scope_names[i] != NULL; i++)
+        assert_int_equal(check(tokens, chief, scope_names[i], client), STATUS_OK);
+    assert_string_equal(client, "chief");
+
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(tokens_check(tokens, reader, "admin", client, &problem), STATUS_FORBIDDEN);
+    assert_non_null(strstr(problem.detail, "\"admin\""));
+    tokens_close(tokens);
+    store_close(store);
+}
+
+static void what_is_no_token_of_ours_stays_out(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char good[128], text[160], client[TOKEN_NAME_SIZE];
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(add(store, "a", "read", 0, good), STATUS_OK);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    const char *token = good + strlen("Bearer ");
+    assert_int_equal(strlen(token), TOKEN_SIZE - 1);
+    static const char *const wrong[] = {
+        "%s",         "Basic %s",     "Bearer%s",  "Bearer", "Bearer ",       "Bearer x%s",
+        "Bearer %sx", "Bearer %s %s", "Token: %s", "",       "Bearer\t%.10s", "Bearer %.72s0"};
+    for (size_t i = 0; i < COUNT(wrong); i++) {
+        char spelt[400];
+        // Each holds the token at most twice.
+        const char *at = wrong[i];
+        size_t used = 0;
+        for (; *at != '\0' && used + 100 < sizeof spelt; at++) {
+            if (*at != '%') {
+                spelt[used++] = *at;
+                continue;
+            }
+            const int digits = at[1] == '.' ? (at[2] == '1' ? 10 : 71) : 100;
+            used += (size_t)snprintf(spelt + used, sizeof spelt - used, "%.*s", digits, token);
+            at = strchr(at, 's');
+        }
+        spelt[used] = '\0';
+        if (check(tokens, spelt, "read", client) != STATUS_UNAUTHORIZED)
+            fail_msg("\"%s\" lets in", spelt);
+        assert_string_equal(client, "");
+    }
+    snprintf(text, sizeof text, "bEARER   %s  ", token);
+    assert_int_equal(check(tokens, text, "read", client), STATUS_OK);
+    assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
+    tokens_close(tokens);
+    store_close(store);
+}
+
+static void tokens_made_and_revoked_elsewhere_are_followed(void **state) {
+    (void)state;
+    char folder[] = "/tmp/impactd-tokens-XXXXXX", first[128], second[128], client[TOKEN_NAME_SIZE];
+    assert_non_null(mkdtemp(folder));
+    Store *daemon, *beside;
+    Tokens *tokens;
+    assert_int_equal(store_open(folder, &daemon, NULL), STATUS_OK);
+    assert_int_equal(store_open(folder, &beside, NULL), STATUS_CONFLICT);
+    assert_int_equal(store_open_beside(folder, &beside, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(daemon, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(add(beside, "first", "read", 0, first), STATUS_OK);
+    until(tokens, NULL, STATUS_UNAUTHORIZED);
+    assert_int_equal(check(tokens, first, "read", client), STATUS_OK);
+    assert_int_equal(add(beside, "second", "read", 0, second), STATUS_OK);
+    until(tokens, second, STATUS_OK);
+    TokenRow row = {.name = "first", .revoked_unix_ms = clock_unix_ms()};
+    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_CONFLICT);
+    assert_int_equal(store_token_revoke(beside, &row, NULL), STATUS_OK);
+    assert_int_equal(store_token_revoke(beside, &row, NULL), STATUS_CONFLICT);
+    until(tokens, first, STATUS_UNAUTHORIZED);
+    assert_int_equal(check(tokens, second, "read", client), STATUS_OK);
+    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_OK);
+    assert_int_equal(store_token_forget(beside, &row, NULL), STATUS_NOT_FOUND);
+
+    // The last use is written at the latest when the daemon ends.
+    tokens_close(tokens);
+    TokenRows rows;
+    assert_int_equal(store_tokens(beside, &rows, NULL), STATUS_OK);
+    assert_int_equal(rows.count, 1);
+    assert_string_equal(rows.at[0].name, "second");
+    assert_true(rows.at[0].used_unix_ms > 0);
+    // Nothing of the token itself is kept.
+    assert_null(strstr(second, rows.at[0].digest));
+    free(rows.at);
+    store_close(beside);
+    store_close(daemon);
+    char command[64];
+    static const char *const files[] = {"impactd.db", "impactd.lock", "impactd.db-wal",
+                                        "impactd.db-shm"};
+    for (size_t i = 0; i < COUNT(files); i++) {
+        snprintf(command, sizeof command, "%s/%s", folder, files[i]);
+        (void)unlink(command);
+    }
+    assert_int_equal(rmdir(folder), 0);
+}
+
+static void the_last_revoked_token_leaves_the_door_shut(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char header[128], client[TOKEN_NAME_SIZE];
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
+    TokenRow row = {.name = "a", .revoked_unix_ms = 1};
+    assert_int_equal(store_token_revoke(store, &row, NULL), STATUS_OK);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    assert_int_equal(tokens_usable(tokens), 0);
+    assert_int_equal(check(tokens, NULL, "read", client), STATUS_UNAUTHORIZED);
+    assert_int_equal(check(tokens, header, "read", client), STATUS_UNAUTHORIZED);
+    tokens_close(tokens);
+    store_close(store);
+}
+
+static void an_expired_token_says_so(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char old[128], fresh[128], client[TOKEN_NAME_SIZE];
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(add(store, "old", "read", clock_unix_ms() - 1, old), STATUS_OK);
+    assert_int_equal(add(store, "fresh", "read", clock_unix_ms() + 3600000, fresh), STATUS_OK);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(tokens_check(tokens, old, "read", client, &problem), STATUS_UNAUTHORIZED);
+    assert_non_null(strstr(problem.detail, "expired"));
+    assert_int_equal(check(tokens, fresh, "read", client), STATUS_OK);
+    assert_int_equal(tokens_usable(tokens), 1);
+    tokens_close(tokens);
+    store_close(store);
+}
+
+static void scopes_are_a_list_of_known_names(void **state) {
+    (void)state;
+    static const char *const bad[] = {"",     ",",           "read,", ",read", "read,,submit",
+                                      "Read", "read submit", "write"};
+    TokenRow row;
+    char token[TOKEN_SIZE], other[TOKEN_SIZE];
+    for (size_t i = 0; i < COUNT(bad); i++)
+        if (token_make(bad[i], 0, &row, token, NULL) != STATUS_USAGE)
+            fail_msg("\"%s\" is taken", bad[i]);
+    assert_int_equal(token_make("read,submit,materials,admin", 0, &row, token, NULL), STATUS_OK);
+    assert_int_equal(token_make("read", 0, &row, other, NULL), STATUS_OK);
+    assert_string_not_equal(token, other);
+}
+
+typedef struct Asker {
+    Tokens *tokens;
+    const char *header;
+    size_t refused;
+} Asker;
+
+static void *ask(void *context) {
+    Asker *asker = context;
+    char client[TOKEN_NAME_SIZE];
+    for (int i = 0; i < 20000; i++)
+        asker->refused += check(asker->tokens, asker->header, "read", client) != STATUS_OK ||
+                          strcmp(client, "a") != 0;
+    return NULL;
+}
+
+static void many_threads_ask_while_the_table_changes(void **state) {
+    (void)state;
+    Store *store;
+    Tokens *tokens;
+    char header[128], other[128], name[16], client[TOKEN_NAME_SIZE];
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    assert_int_equal(add(store, "a", "read", 0, header), STATUS_OK);
+    assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
+    Asker askers[4];
+    pthread_t threads[4];
+    for (size_t i = 0; i < COUNT(askers); i++) {
+        askers[i] = (Asker){tokens, header, 0};
+        assert_int_equal(pthread_create(&threads[i], NULL, ask, &askers[i]), 0);
+    }
+    for (int i = 0; i < 20; i++) {
+        snprintf(name, sizeof name, "b%d", i);
+        assert_int_equal(add(store, name, "read", 0, other), STATUS_OK);
+        (void)check(tokens, "Bearer nobody", "read", client);
+        pause_ms(5);
+    }
+    for (size_t i = 0; i < COUNT(askers); i++) {
+        pthread_join(threads[i], NULL);
+        assert_int_equal(askers[i].refused, 0);
+    }
+    tokens_close(tokens);
+    store_close(store);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_tokens_the_door_is_open),
+        cmocka_unit_test(a_token_opens_what_its_scopes_say),
+        cmocka_unit_test(what_is_no_token_of_ours_stays_out),
+        cmocka_unit_test(tokens_made_and_revoked_elsewhere_are_followed),
+        cmocka_unit_test(the_last_revoked_token_leaves_the_door_shut),
+        cmocka_unit_test(an_expired_token_says_so),
+        cmocka_unit_test(scopes_are_a_list_of_known_names),
+        cmocka_unit_test(many_threads_ask_while_the_table_changes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

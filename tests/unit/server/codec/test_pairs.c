@@ -1,0 +1,69 @@
+// What a document says of two things.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/base/bytes.h"
+#include "server/codec/pairs.h"
+
+static void every_object_with_both_sides_is_a_row(void **state) {
+    (void)state;
+    static const char text[] =
+        "{\"a\": \"r-1\", \"metrics\": {\"peak\": {\"a\": 1, \"b\": 2.5, \"unit\": \"m\", "
+        "\"none\": null}}, \"inputs\": [{\"pointer\": \"/x\", \"a\": null, \"b\": [1, 2]}], "
+        "\"psd\": {\"distance\": 3, \"values\": [1, 2]}}";
+    Pairs pairs;
+    assert_int_equal(pairs_read(text, sizeof text - 1, &pairs, NULL), STATUS_OK);
+    assert_int_equal(pairs.count, 4);
+    assert_string_equal(pairs.at[0].name, "a");
+    assert_null(pairs.at[0].b);
+    assert_string_equal(pairs.at[1].name, "peak");
+    assert_string_equal(pairs.at[1].a, "1");
+    assert_string_equal(pairs.at[1].b, "2.5");
+    assert_string_equal(pairs.at[1].rest, "unit m");
+    assert_string_equal(pairs.at[2].name, "/x");
+    assert_string_equal(pairs.at[2].a, "-");
+    assert_string_equal(pairs.at[2].b, "[1,2]");
+    assert_string_equal(pairs.at[3].name, "psd/distance");
+    pairs_clear(&pairs);
+    assert_int_equal(pairs.count, 0);
+}
+
+static void what_is_no_object_is_refused(void **state) {
+    (void)state;
+    static const char *const texts[] = {"", "[1]", "{", "1", "{\"a\": 1, \"a\": 2}"};
+    Pairs pairs;
+    for (size_t i = 0; i < COUNT(texts); i++) {
+        assert_int_equal(pairs_read(texts[i], strlen(texts[i]), &pairs, NULL), STATUS_UNREADABLE);
+        pairs_clear(&pairs);
+    }
+}
+
+static void rows_are_bounded_and_long_texts_cut(void **state) {
+    (void)state;
+    Bytes text = {0};
+    bytes_text(&text, "{\"rows\": [");
+    for (int i = 0; i < 3 * PAIRS_MOST; i++)
+        bytes_format(&text, "%s{\"a\": \"%01000d\", \"b\": %d}", i > 0 ? "," : "", i, i);
+    bytes_text(&text, "]}");
+    Pairs pairs;
+    assert_int_equal(pairs_read(text.at, text.count, &pairs, NULL), STATUS_OK);
+    assert_int_equal(pairs.count, PAIRS_MOST);
+    assert_true(strlen(pairs.at[7].a) < PAIRS_TEXT);
+    pairs_clear(&pairs);
+    bytes_clear(&text);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_object_with_both_sides_is_a_row),
+        cmocka_unit_test(what_is_no_object_is_refused),
+        cmocka_unit_test(rows_are_bounded_and_long_texts_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,74 @@
+// Base URLs taken apart, and those that are none.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/http/base_url.h"
+
+static void urls_are_taken_apart(void **state) {
+    (void)state;
+    static const struct {
+        const char *given, *text, *host, *path;
+    } good[] = {
+        {"http://a", "http://a", "a", ""},
+        {"https://a.example.org/", "https://a.example.org", "a.example.org", ""},
+        {"https://a:8443/sim", "https://a:8443/sim", "a", "/sim"},
+        {"https://[::1]:80/sim/x_1~/", "https://[::1]:80/sim/x_1~", "[::1]", "/sim/x_1~"},
+        {"https://a/v1x", "https://a/v1x", "a", "/v1x"},
+    };
+    for (size_t i = 0; i < COUNT(good); i++) {
+        BaseUrl url;
+        assert_int_equal(base_url_read(good[i].given, &url, NULL), STATUS_OK);
+        assert_string_equal(url.text, good[i].text);
+        assert_string_equal(url.host, good[i].host);
+        assert_string_equal(url.path, good[i].path);
+    }
+}
+
+static void what_is_no_base_url_is_refused_with_what_would_be(void **state) {
+    (void)state;
+    static const char *const bad[] = {
+        "",
+        "sim.example.org/impactd",
+        "ftp://a",
+        "http://",
+        "http:///sim",
+        "http://a?b",
+        "http://a/b?c",
+        "http://a/b#c",
+        "http://a:b/",
+        "http://a:/x",
+        "http://a b",
+        "http://a/b c",
+        "http://a/\"x\"",
+        "http://a//b",
+        "http://a/../b",
+        "http://a/.",
+        "http://u:p@a/",
+        "http://[::1/sim",
+        "http://a/v1",
+        "http://a/v1/x/",
+        "http://a/%2e",
+        "http://a/0123456789012345678901234567890123456789012345678901234567890123",
+    };
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        BaseUrl url;
+        Problem problem;
+        problem_clear(&problem);
+        if (base_url_read(bad[i], &url, &problem) != STATUS_USAGE)
+            fail_msg("\"%s\" is taken", bad[i]);
+        assert_non_null(strstr(problem.detail, "https://sim.example.org/impactd"));
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(urls_are_taken_apart),
+        cmocka_unit_test(what_is_no_base_url_is_refused_with_what_would_be),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
