@@ -252,23 +252,23 @@ static Status finish(Session *session, const Way *way, double estimated, Problem
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
 }
 
-Status aim_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-               Workspace *workspace, Outcome **outcome, Problem *problem) {
+// *outcome is of the way told by `way`.
+static Status reach(const Simulation *simulation, const SimulationLimits *limits,
+                    const Watch *watch, Workspace *workspace, Way *way, Outcome **outcome,
+                    Problem *problem) {
     Session session = {.limits = limits, .watch = watch, .workspace = workspace};
     double estimated = 1;
     Status status = aim_make(&session.aim, simulation, problem);
-    Way way = {0};
     if (status == STATUS_OK) {
-        way = aim_choose(&session.aim, session.aim.asked->target);
-        status = run_way(&session, &way, &estimated, problem);
+        *way = aim_choose(&session.aim, session.aim.asked->target);
+        status = run_way(&session, way, &estimated, problem);
     }
-    while (status == STATUS_OK && !way_is_whole(&way) &&
-           !(estimated <= session.aim.asked->target)) {
-        way = tighten(&session, &way, estimated);
-        status = run_way(&session, &way, &estimated, problem);
+    while (status == STATUS_OK && !way_is_whole(way) && !(estimated <= session.aim.asked->target)) {
+        *way = tighten(&session, way, estimated);
+        status = run_way(&session, way, &estimated, problem);
     }
     if (status == STATUS_OK)
-        status = finish(&session, &way, estimated, problem);
+        status = finish(&session, way, estimated, problem);
     if (status == STATUS_OK)
         *outcome = session.outcome;
     else
@@ -277,4 +277,20 @@ Status aim_run(const Simulation *simulation, const SimulationLimits *limits, con
     fields_clear(target_fields, &none);
     aim_clear(&session.aim);
     return status;
+}
+
+Status aim_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
+               Workspace *workspace, Outcome **outcome, Problem *problem) {
+    Way way = {0};
+    return reach(simulation, limits, watch, workspace, &way, outcome, problem);
+}
+
+Status aim_settle(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
+                  Workspace *workspace, Simulation *settled, Problem *problem) {
+    Way way = {0};
+    Outcome *outcome = NULL;
+    memset(settled, 0, sizeof *settled);
+    TRY(reach(simulation, limits, watch, workspace, &way, &outcome, problem));
+    outcome_drop(outcome);
+    return way_apply(simulation, &way, settled, problem);
 }

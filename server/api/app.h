@@ -7,17 +7,19 @@
 #include <stdint.h>
 
 #include "server/http/route.h"
+#include "server/jobs/aside.h"
 #include "server/jobs/intake.h"
 #include "server/store/store.h"
 
 struct App {
     Store *store;
     Intake *intake;
+    Asides *asides; // for readers of what takes a run
     const struct Meter *meter;
     struct Hot *hot;
-    struct Listener *listener; // NULL until it is open
-    size_t reply_most;         // bytes of one answer
-    char base_url[256];        // as clients see us, without a slash at its end; "": by their Host
+    _Atomic(struct Listener *) listener; // NULL until it is open
+    size_t reply_most;                   // bytes of one answer
+    char base_url[256]; // as clients see us, without a slash at its end; "": by their Host
     bool has_tls;
     int64_t started_unix_ms;
     atomic_bool is_stopping;
@@ -29,7 +31,7 @@ extern const char program_build[];   // the compiler
 // The handlers, by file; routes.c lists them with their patterns.
 Handler jobs_create, jobs_list, jobs_show, jobs_dismiss;
 Handler results_show, results_manifest, results_series, results_psd, results_impacts,
-    results_energy, results_tradeoff, results_ensemble;
+    results_energy, results_force, results_bundle, results_tradeoff, results_ensemble;
 Handler sweeps_table, sweeps_point, sweeps_scene, sweeps_retry;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;

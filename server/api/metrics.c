@@ -72,9 +72,10 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
     bytes_format(&bytes, "impactd_build_info{version=\"%s\"} 1\n", program_version);
     if (app->meter != NULL)
         meter_write(app->meter, &bytes);
-    if (app->listener != NULL)
+    const Listener *listener = atomic_load(&app->listener);
+    if (listener != NULL)
         tally_gauge(&bytes, "impactd_http_connections", "Clients connected.",
-                    (double)listener_connections(app->listener));
+                    (double)listener_connections(listener));
     if (app->hot != NULL)
         write_hot(&bytes, app->hot);
     write_queue(&bytes, app->intake);

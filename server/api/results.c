@@ -1,5 +1,5 @@
 // Results as documents: the summary, the manifest, and what was saved as JSON when the result was
-// made. Numbers in columns are series.c's.
+// made. Numbers in columns are series.c's and ledgers.c's.
 #include "server/api/results.h"
 
 #include <stdio.h>
@@ -65,8 +65,10 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
 }
 
 static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer) {
-    static const char *const ways[] = {"manifest", "series.json",  "series.csv", "series.npy",
-                                       "psd.json", "impacts.json", "energy.json"};
+    static const char *const ways[] = {
+        "manifest",    "series.json", "series.csv",  "series.npy", "series.npz",   "series.mat",
+        "psd.json",    "psd.csv",     "psd.npz",     "psd.mat",    "impacts.json", "impacts.csv",
+        "impacts.npz", "impacts.mat", "energy.json", "energy.csv", "bundle.zip"};
     bytes_format(bytes, "{\"self\": \"%s/v1/results/%s\"", link_base(), id);
     for (size_t i = 0; i < COUNT(ways); i++) {
         // "series" is the JSON one; the other formats are named in full.
@@ -125,22 +127,29 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_text(bytes, "}\n");
 }
 
-Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    ResultRow row = {0};
+Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
     Inquiry inquiry = {0};
     StudyAnswer answer = {NULL};
+    Status status = read_scene(row, &inquiry, problem);
+    if (status == STATUS_OK && row->study != NULL)
+        status = study_read(row, &answer, problem);
+    if (status == STATUS_OK)
+        write_result(bytes, row, &inquiry.simulation, &answer);
+    inquiry_clear(&inquiry);
+    fields_clear(study_answer_fields, &answer);
+    return status;
+}
+
+Status results_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK && !reply_immutable(reply, request, row.id)) {
-        status = read_scene(&row, &inquiry, problem);
-        if (status == STATUS_OK && row.study != NULL)
-            status = study_read(&row, &answer, problem);
-        if (status == STATUS_OK) {
-            write_result(&bytes, &row, &inquiry.simulation, &answer);
+        status = results_put(&row, &bytes, problem);
+        if (status == STATUS_OK)
             status = reply_bytes(reply, 200, type_json, &bytes, problem);
-        }
-        inquiry_clear(&inquiry);
-        fields_clear(study_answer_fields, &answer);
+        else
+            bytes_clear(&bytes);
     }
     result_row_clear(&row);
     return status;
@@ -190,29 +199,25 @@ static void write_materials(App *app, Bytes *bytes, const Simulation *simulation
     bytes_text(bytes, "]");
 }
 
-Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
-    ResultRow row = {0};
+Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem) {
     Inquiry inquiry = {0};
-    Bytes bytes = {.most = app->reply_most};
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
-    if (status == STATUS_OK)
-        status = read_scene(&row, &inquiry, problem);
+    const Status status = read_scene(row, &inquiry, problem);
     if (status == STATUS_OK) {
         char created[32];
-        clock_rfc3339(row.created_unix_ms, created);
-        bytes_format(&bytes, "{\"id\": \"%s\", \"engine\": ", row.id);
-        bytes_json_string(&bytes, row.engine);
-        bytes_format(&bytes,
+        clock_rfc3339(row->created_unix_ms, created);
+        bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
+        bytes_json_string(bytes, row->engine);
+        bytes_format(bytes,
                      ", \"created\": \"%s\", \"program\": {\"name\": \"impactd\", \"version\": "
                      "\"%s\", \"build\": ",
                      created, program_version);
-        bytes_json_string(&bytes, program_build);
-        bytes_text(&bytes, "}, \"scene\": ");
-        bytes_text(&bytes, json_or(row.scene, "null"));
-        bytes_text(&bytes, ", \"materials\": ");
-        write_materials(app, &bytes, &inquiry.simulation);
+        bytes_json_string(bytes, program_build);
+        bytes_text(bytes, "}, \"scene\": ");
+        bytes_text(bytes, json_or(row->scene, "null"));
+        bytes_text(bytes, ", \"materials\": ");
+        write_materials(app, bytes, &inquiry.simulation);
         bytes_format(
-            &bytes,
+            bytes,
             ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", \"content_type\": "
             "\"application/json\", \"body\": \"the member scene of this document\", "
             "\"why\": \"the same "
@@ -220,12 +225,24 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
             link_base());
         // It is measured once and then kept; elsewhere it comes out a little differently.
         if (inquiry.study != NULL && study_kind(inquiry.study)->is_measured)
-            bytes_text(&bytes, ", but for the CPU time that a study measures and what follows of "
-                               "it");
-        bytes_text(&bytes, "\"}}\n");
-        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+            bytes_text(bytes, ", but for the CPU time that a study measures and what follows of "
+                              "it");
+        bytes_text(bytes, "\"}}\n");
     }
     inquiry_clear(&inquiry);
+    return status;
+}
+
+Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
+    ResultRow row = {0};
+    Bytes bytes = {.most = app->reply_most};
+    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK)
+        status = manifest_put(app, &row, &bytes, problem);
+    if (status == STATUS_OK)
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    else
+        bytes_clear(&bytes);
     result_row_clear(&row);
     return status;
 }
@@ -257,8 +274,4 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     }
     result_row_clear(&row);
     return answered;
-}
-
-Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
-    return results_document(app, request, reply, DOCUMENT_ENERGY, problem);
 }

@@ -1,15 +1,20 @@
 // The documents saved with a result, for the handlers that offer them beside other formats.
-// Used by results.c and series.c.
+// Used by results.c, ledgers.c and bundle.c.
 #ifndef SERVER_API_RESULTS_H
 #define SERVER_API_RESULTS_H
 
 #include "server/api/app.h"
+#include "server/base/bytes.h"
 
 typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Document;
 
 // The JSON as it was saved, of the result in the request's first parameter; immutable.
 Status results_document(App *app, const Request *request, Reply *reply, Document document,
                         Problem *problem);
+
+// Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
+Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);
+Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem);
 
 // Why a result has no ledger.
 extern const char no_impacts[];

@@ -5,7 +5,8 @@
 static const char *const of_submit[] = {"dry_run", NULL};
 static const char *const of_jobs[] = {"limit", "before", NULL};
 static const char *const of_job[] = {"wait", NULL};
-static const char *const of_series[] = {"channels", "from", "to", NULL};
+static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
+static const char *const of_force[] = {"points", NULL};
 static const char *const of_materials[] = {"q", NULL};
 
 // clang-format off
@@ -23,14 +24,17 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/points/{index}",       "read",   NULL,         "One point: its values, metrics and scene", sweeps_point},
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
-    {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv or npy", results_series},
+    {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", results_series},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
-    {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv or npy", results_psd},
+    {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv, npy, npz or mat", results_psd},
     {"GET",    "/v1/results/{id}/psd",                  "read",   NULL,         "Power spectral densities, format by Accept", results_psd},
-    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json or csv", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json, csv, npy, npz or mat", results_impacts},
     {"GET",    "/v1/results/{id}/impacts",              "read",   NULL,         "The ledger of impacts, format by Accept", results_impacts},
-    {"GET",    "/v1/results/{id}/energy.json",          "read",   NULL,         "The energy ledger", results_energy},
-    {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger", results_energy},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force.{format}", "read", of_force, "One impact in detail, as json, csv, npy, npz or mat", results_force},
+    {"GET",    "/v1/results/{id}/impacts/{number}/force", "read", of_force,     "One impact in detail, format by Accept", results_force},
+    {"GET",    "/v1/results/{id}/bundle.zip",           "read",   NULL,         "All of a result in one archive", results_bundle},
+    {"GET",    "/v1/results/{id}/energy.{format}",      "read",   NULL,         "The energy ledger as json, csv, npy, npz or mat", results_energy},
+    {"GET",    "/v1/results/{id}/energy",               "read",   NULL,         "The energy ledger, format by Accept", results_energy},
     {"GET",    "/v1/results/{id}/tradeoff.{format}",    "read",   NULL,         "The study's table as json, or its chart as svg", results_tradeoff},
     {"GET",    "/v1/results/{id}/tradeoff",             "read",   NULL,         "The study's table or chart, format by Accept", results_tradeoff},
     {"GET",    "/v1/results/{id}/ensemble.{format}",    "read",   NULL,         "The study's statistics as json, its runs as csv, or its chart as svg", results_ensemble},

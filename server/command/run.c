@@ -12,7 +12,7 @@
 #include "server/command/bar.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
-#include "server/encode/encoder.h"
+#include "server/encode/encoding.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
 #include "server/options.h"
@@ -30,7 +30,8 @@ static const Field run_fields[] = {
 };
 
 // The series as the encoders take it. The caller frees *chosen.
-static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes) {
+static Status series_write(const Response *response, const Encoder *encoder, Bytes *bytes,
+                           Problem *problem) {
     const Column **chosen = calloc(response->series.count + 1, sizeof *chosen);
     if (chosen == NULL)
         return STATUS_NO_MEMORY;
@@ -42,17 +43,18 @@ static Status series_write(const Response *response, const Encoder *encoder, Byt
                          .count = response->count,
                          .columns = chosen,
                          .column_count = response->series.count};
-    encoder->write(&table, bytes);
+    const Status status = encoding_write(encoder, &table, bytes, problem);
     free(chosen);
-    return STATUS_OK;
+    return status;
 }
 
 // {job, series, impacts, psd}, each as the daemon answers it.
-static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes) {
+static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes,
+                          Problem *problem) {
     bytes_text(bytes, "{\"job\": ");
     bytes_put(bytes, job->at, job->count);
     bytes_text(bytes, ",\n\"series\": ");
-    TRY(series_write(&outcome->response, encoder_find("json"), bytes));
+    TRY(series_write(&outcome->response, encoder_find("json"), bytes, problem));
     bytes_text(bytes, ",\n\"impacts\": ");
     document_impacts(bytes, &outcome->response);
     bytes_text(bytes, ",\n\"psd\": ");
@@ -120,8 +122,8 @@ static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings
         (void)fwrite(job.at, 1, job.count, stdout);
     } else if (status == STATUS_OK) {
         status = strcmp(encoder->extension, "json") == 0
-                     ? whole_write(outcome, &job, &bytes)
-                     : series_write(&outcome->response, encoder, &bytes);
+                     ? whole_write(outcome, &job, &bytes, problem)
+                     : series_write(&outcome->response, encoder, &bytes, problem);
         if (status == STATUS_OK && bytes.is_failed)
             status = STATUS_NO_MEMORY;
         if (status == STATUS_OK)
@@ -219,7 +221,8 @@ const Command command_run = {
     .help =
         "  impactd run scene.json                 print the finished job\n"
         "  impactd run scene.json -o out.csv      write the time series, as a table\n"
-        "  impactd run scene.json -o out.npy      the same for numpy.load\n"
+        "  impactd run scene.json -o out.npy      the same for numpy.load; .npz by names\n"
+        "  impactd run scene.json -o out.mat      the same for MATLAB and Octave\n"
         "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
         "  impactd run - < scene.json             from standard input\n"
         "\n"

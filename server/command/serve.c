@@ -32,7 +32,7 @@ typedef struct ServeSettings {
     bool require_tokens, print_config;
 } ServeSettings;
 
-enum { GRACE_MS = 1500 };
+enum { GRACE_MS = 1500, ASIDES = 2 }; // ASIDES: runs for readers at once
 
 #define MIB ((double)(1 << 20))
 
@@ -133,8 +133,10 @@ static void let_signals_kill(const sigset_t *stops) {
     pthread_sigmask(SIG_UNBLOCK, stops, NULL);
 }
 
-static void run_until_stopped(App *app, const ServeSettings *settings, const sigset_t *stops) {
-    greet(app->listener, settings, app);
+static void run_until_stopped(App *app, Listener *listener, const ServeSettings *settings,
+                              const sigset_t *stops) {
+    atomic_store(&app->listener, listener);
+    greet(listener, settings, app);
     notify_send("READY=1");
     const int signal = wait_for_end(stops);
     notify_send("STOPPING=1");
@@ -166,6 +168,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  settings->tls_key, settings->require_tokens};
     Reach ready = {0};
     Meter *meter = NULL;
+    Listener *listener = NULL;
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
@@ -183,6 +186,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
         status = reach_check(&ready, &door.address, tokens_usable(doorman.tokens), problem);
     if (status == STATUS_OK)
         status = intake_open(app.store, &work, &app.intake, problem);
+    if (status == STATUS_OK)
+        status = asides_open(ASIDES, &app.asides, problem);
     if (status == STATUS_OK) {
         link_base_set(ready.url.path);
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
@@ -192,14 +197,15 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
         door.hosts = &ready.hosts;
         door.tls_cert = ready.tls_cert;
         door.tls_key = ready.tls_key;
-        status = listener_open(&door, &app.listener, problem);
+        status = listener_open(&door, &listener, problem);
     }
     if (status == STATUS_OK)
-        run_until_stopped(&app, settings, stops);
-    listener_stop(app.listener, GRACE_MS);
+        run_until_stopped(&app, listener, settings, stops);
+    listener_stop(listener, GRACE_MS);
+    asides_close(app.asides);
     if (app.intake != NULL)
         intake_close(app.intake);
-    listener_free(app.listener);
+    listener_free(listener);
     hot_free(dispatcher.hot);
     tokens_close(doorman.tokens);
     store_close(app.store);

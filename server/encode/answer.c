@@ -8,6 +8,7 @@
 #include "server/encode/chart_sweep.h"
 #include "server/encode/ensemble_csv.h"
 #include "server/encode/svg.h"
+#include "server/encode/sweep_npz.h"
 #include "server/encode/sweep_table.h"
 #include "server/jobs/documents.h"
 
@@ -30,6 +31,10 @@ static void ensemble_table(const Variant *answer, Bytes *bytes) {
 
 static void sweep_whole(const Variant *answer, Bytes *bytes) {
     sweep_json((const Sweep *)(const void *)answer, NULL, bytes);
+}
+
+static void sweep_archive(const Variant *answer, Bytes *bytes) {
+    sweep_npz((const Sweep *)(const void *)answer, bytes);
 }
 
 static void sweep_chart(const Variant *answer, Bytes *bytes) {
@@ -56,6 +61,7 @@ static const struct {
     {&study_sweep,
      {{"json", "application/json", sweep_whole},
       {"csv", "text/csv; charset=utf-8", sweep_table},
+      {"npz", "application/x-npz", sweep_archive},
       {"svg", svg_type, sweep_chart},
       {NULL, NULL, NULL}}},
 };

@@ -6,8 +6,6 @@
 
 #include "server/base/shortest.h"
 
-enum { CHUNK = 4096 }; // numbers that room is made for at once
-
 static char *put_real(char *at, double value) {
     if (isfinite(value))
         return at + shortest_write(at, value);
@@ -17,37 +15,54 @@ static char *put_real(char *at, double value) {
     return at + length;
 }
 
-static void csv_write(const Table *table, Bytes *bytes) {
-    bytes_format(bytes, "%s [%s]", table->axis_name, table->axis_unit);
-    for (size_t c = 0; c < table->column_count; c++)
-        bytes_format(bytes, ",%s [%s]", table->columns[c]->name, table->columns[c]->unit);
-    bytes_text(bytes, "\n");
+static void put_name(Bytes *bytes, const char *name, const char *unit) {
+    bytes_text(bytes, name);
+    if (unit[0] != '\0')
+        bytes_format(bytes, " [%s]", unit);
+}
 
-    const size_t end = table->first + table->count;
-    const size_t rows = CHUNK / (1 + table->column_count) + 1;
-    for (size_t chunk = table->first; chunk < end; chunk += rows) {
-        const size_t chunk_end = end - chunk < rows ? end : chunk + rows;
-        if (!bytes_reserve(bytes,
-                           (chunk_end - chunk) * (1 + table->column_count) * (SHORTEST_SIZE + 1)))
-            return;
-        char *at = bytes->at + bytes->count;
-        for (size_t i = chunk; i < chunk_end; i++) {
-            // A division, so that row 50 at 1000 Hz reads 0.05.
-            at = put_real(at, table->axis != NULL ? table->axis[i] : (double)i / table->axis_rate);
-            for (size_t c = 0; c < table->column_count; c++) {
-                *at++ = ',';
-                at = put_real(at, table->columns[c]->values[i]);
-            }
-            *at++ = '\n';
-        }
-        *at = '\0';
-        bytes->count = (size_t)(at - bytes->at);
+static void put_names(const Table *table, Bytes *bytes) {
+    if (table->axis_name != NULL)
+        put_name(bytes, table->axis_name, table->axis_unit);
+    for (size_t c = 0; c < table->column_count; c++) {
+        if (c > 0 || table->axis_name != NULL)
+            bytes_text(bytes, ",");
+        put_name(bytes, table->columns[c]->name, table->columns[c]->unit);
     }
+    bytes_text(bytes, "\n");
+}
+
+static bool csv_next(const Table *table, TextPlace *place, Bytes *bytes) {
+    if (place->part == 0) {
+        put_names(table, bytes);
+        place->part = 1;
+        return table->count > 0;
+    }
+    const size_t width = 1 + table->column_count, rows = ENCODER_PIECE_NUMBERS / width + 1;
+    const size_t end = table->count - place->row < rows ? table->count : place->row + rows;
+    if (!bytes_reserve(bytes, (end - place->row) * width * (SHORTEST_SIZE + 1)))
+        return false;
+    const size_t first = table->bucket > 0 ? 0 : table->first;
+    char *at = bytes->at + bytes->count;
+    for (size_t i = place->row; i < end; i++) {
+        if (table->axis_name != NULL)
+            at = put_real(at, table->axis != NULL ? table->axis[first + i] : table_time(table, i));
+        for (size_t c = 0; c < table->column_count; c++) {
+            if (c > 0 || table->axis_name != NULL)
+                *at++ = ',';
+            at = put_real(at, table->columns[c]->values[first + i]);
+        }
+        *at++ = '\n';
+    }
+    *at = '\0';
+    bytes->count = (size_t)(at - bytes->at);
+    place->row = end;
+    return end < table->count;
 }
 
 const Encoder encoder_csv = {
     .extension = "csv",
     .content_type = "text/csv; charset=utf-8",
     .is_binary = false,
-    .write = csv_write,
+    .next = csv_next,
 };

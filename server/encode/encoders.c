@@ -3,13 +3,12 @@
 #include "server/encode/csv.h"
 #include "server/encode/encoder.h"
 #include "server/encode/json.h"
+#include "server/encode/mat.h"
 #include "server/encode/npy.h"
+#include "server/encode/npz.h"
 
 const Encoder *const encoders[] = {
-    &encoder_json,
-    &encoder_csv,
-    &encoder_npy,
-    NULL,
+    &encoder_json, &encoder_csv, &encoder_npy, &encoder_npz, &encoder_mat, NULL,
 };
 
 const Encoder *encoder_find(const char *extension) {

@@ -122,21 +122,28 @@ bool reply_tagged(Reply *reply, const Request *request, const char *text) {
 }
 
 Status reply_range(Reply *reply, const Request *request, Problem *problem) {
-    if (!reply->accepts_ranges || reply->stream.next != NULL || reply->code != 200 ||
-        strcmp(request->method, "GET") != 0)
+    if (!reply->accepts_ranges || reply->code != 200 || strcmp(request->method, "GET") != 0)
         return STATUS_OK;
     // If-Range: a part only of what the client already has the other parts of.
     if (request->if_range != NULL && strcmp(request->if_range, reply->etag) != 0)
         return STATUS_OK;
+    Stream *stream = &reply->stream;
+    if (stream->next != NULL && (stream->cut == NULL || stream->size == UINT64_MAX))
+        return STATUS_OK;
     size_t first = 0, last = 0;
-    const size_t size = reply->body_size;
+    const size_t size = stream->next != NULL ? (size_t)stream->size : reply->body_size;
     switch (header_range(request->range, size, &first, &last)) {
     case RANGE_WHOLE:
         return STATUS_OK;
     case RANGE_PART:
         reply->code = 206;
-        reply->body = (const char *)reply->body + first;
-        reply->body_size = last - first + 1;
+        if (stream->next != NULL) {
+            stream->size = last - first + 1;
+            stream->cut(reply->context, first, stream->size);
+        } else {
+            reply->body = (const char *)reply->body + first;
+            reply->body_size = last - first + 1;
+        }
         snprintf(reply->content_range, sizeof reply->content_range, "bytes %zu-%zu/%zu", first,
                  last, size);
         return STATUS_OK;

@@ -84,6 +84,9 @@ typedef struct Stream {
     ptrdiff_t (*next)(void *context, char *target, size_t size);
     uint64_t size; // of the whole body; UINT64_MAX: not known
     int wait_ms;
+    // Only bytes first ... first + size - 1 from now on; called before `next`. NULL: all or
+    // nothing.
+    void (*cut)(void *context, uint64_t first, uint64_t size);
 } Stream;
 
 typedef struct Reply {

@@ -5,7 +5,7 @@
 
 #include "core/solve/solvers.h"
 
-void totals_ended(Totals *totals, JobState state, bool is_known) {
+void totals_ended(Totals *totals, int state, bool is_known) {
     counter_add(&totals->ended[state], 1);
     if (is_known)
         counter_add(&totals->known, 1);

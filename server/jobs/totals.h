@@ -23,7 +23,8 @@ typedef struct Totals {
     Counter study_runs, study_cpu_ns;     // the scenes' studies, whatever ran in them
 } Totals;
 
-void totals_ended(Totals *totals, JobState state, bool is_known);
+// `state` is a JobState, a final one.
+void totals_ended(Totals *totals, int state, bool is_known);
 void totals_run(Totals *totals, const Outcome *outcome, int64_t cpu_ns);
 void totals_study(Totals *totals, int64_t cpu_ns);
 // In the Prometheus text format.

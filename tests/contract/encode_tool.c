@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/encode/encoder.h"
+#include "server/encode/encoding.h"
 #include "tests/support/doubles.h"
 
 enum { COLUMNS_MOST = 16 };
@@ -43,8 +43,8 @@ int main(int count, char **arguments) {
     if (table.first > rows || table.count > rows - table.first)
         return 2;
     Bytes bytes = {0};
-    encoder->write(&table, &bytes);
-    const bool is_written = !bytes.is_failed &&
+    const Status status = encoding_write(encoder, &table, &bytes, NULL);
+    const bool is_written = status == STATUS_OK && !bytes.is_failed &&
                             fwrite(bytes.at, 1, bytes.count, stdout) == bytes.count &&
                             fflush(stdout) == 0;
     bytes_clear(&bytes);

@@ -377,6 +377,24 @@ def test_the_end_answers_those_who_wait_and_takes_no_new_jobs():
         assert daemon.get(f"/v1/jobs/{job['id']}").json()["status"] in ("accepted", "running")
 
 
+def test_a_job_that_comes_while_it_stops_is_refused_with_when_to_come_again():
+    """A POST whose body arrives after SIGTERM gets 503 with Retry-After, and leaves no job behind."""
+    with Daemon(program.build) as daemon:
+        body = json.dumps(SCENE).encode()
+        with socket.create_connection(("127.0.0.1", daemon.port), 20) as client:
+            client.sendall(b"POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                           b"Content-Length: %d\r\n\r\n" % len(body) + body[:10])
+            time.sleep(0.3)
+            daemon.process.send_signal(signal.SIGTERM)
+            assert until(lambda: "stopping" in daemon.stderr())
+            client.sendall(body[10:])
+            answer = client.recv(10000)
+            assert answer.startswith(b"HTTP/1.1 503 ") and b"\r\nRetry-After: " in answer, answer
+        daemon.stop()
+        daemon.start()
+        assert daemon.get("/v1/jobs").json()["jobs"] == []
+
+
 def test_a_second_signal_ends_it_at_once():
     """While an answer is being waited for at the end, another SIGTERM kills; what was accepted is there again."""
     with Daemon(program.build) as daemon:

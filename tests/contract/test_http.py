@@ -189,7 +189,7 @@ def test_series_by_channel_window_and_format():
         document = problem(daemon.get(f"{base}/series.json?channels=displacement,penetration"), 404)
         assert "penetration" in document["detail"] and "contact_force" in document["detail"], document
         for query in ("channels=", "channels=velocity,velocity", "from=-1", "from=x", "from=nan", "from=11",
-                      "from=2&to=1", "to=1&to=2", "from=0.0001&to=0.0002", "chanels=velocity", "points=100"):
+                      "from=2&to=1", "to=1&to=2", "from=0.0001&to=0.0002", "chanels=velocity", "points=0", "points=1.5"):
             reply = daemon.get(f"{base}/series.json?{query}")
             problem(reply, 404 if query == "channels=" else 400)
         assert "did you mean" in daemon.get(f"{base}/series.json?chanels=velocity").json()["detail"]

@@ -119,6 +119,8 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/jobs/{id}/table.{format}": {"id": swept["id"]}, "/v1/jobs/{id}/table": {"id": swept["id"]},
                   "/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
                   "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
+                  "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
+                  "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}

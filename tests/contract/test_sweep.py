@@ -207,7 +207,7 @@ def test_failed_points_are_rows_with_a_reason_and_can_be_made_again():
 
 
 def test_the_table_reads_the_same_in_every_format():
-    """CSV and JSON have the same numbers to the bit; formats go by extension or Accept."""
+    """CSV, NPZ and JSON have the same numbers to the bit; formats go by extension or Accept."""
     with Daemon(program.build) as daemon:
         job = made(daemon, sweep(CLEARANCES, MATERIALS))
         document = table(daemon, job)
@@ -218,6 +218,11 @@ def test_the_table_reads_the_same_in_every_format():
         for k, name in enumerate(document["columns"]):
             for row, value in zip(rows[1:], column(document, name)):
                 assert row[k] == value if isinstance(value, str) else float(row[k]) == value
+        arrays = numpy.load(io.BytesIO(daemon.get(f"/v1/results/{job['result']}/table.npz").body))
+        assert sorted(arrays) == sorted(name.lstrip("/") for name in document["columns"])
+        for name in document["columns"]:
+            read = arrays[name.lstrip("/")].tolist()
+            assert [one.decode() if isinstance(one, bytes) else one for one in read] == column(document, name), name
         assert daemon.get(f"/v1/results/{job['result']}/table.xml").status == 404
         by_job = daemon.get(f"/v1/jobs/{job['id']}/table.csv")
         assert by_job.body == text.body

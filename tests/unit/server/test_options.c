@@ -183,6 +183,23 @@ static void what_is_printed_can_be_read_as_a_file(void **state) {
     assert_string_equal(settings.listen, "a:1");
 }
 
+static void help_has_its_headings_above_their_rows(void **state) {
+    (void)state;
+    static const OptionGroup groups[] = {{"rate", "Speed"}, {"quiet", "Manner"}, {NULL, NULL}};
+    char text[2000] = "";
+    FILE *file = tmpfile();
+    assert_non_null(file);
+    options_help_grouped(fields, groups, file);
+    rewind(file);
+    const size_t size = fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    assert_true(size > 0);
+    assert_memory_equal(text, "Speed\n  -r, --rate X", 20);
+    const char *manner = strstr(text, "\nManner\n");
+    assert_non_null(manner);
+    assert_true(strstr(text, "--config") < manner && strstr(text, "--quiet") > manner);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(texts_grow_with_each_flag_and_a_stronger_source_begins_anew,
@@ -197,6 +214,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(faults_are_seen_without_a_problem_to_tell_them, start,
                                         stop),
         cmocka_unit_test_setup_teardown(what_is_printed_can_be_read_as_a_file, start, stop),
+        cmocka_unit_test(help_has_its_headings_above_their_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

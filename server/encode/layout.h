@@ -1,0 +1,41 @@
+// A document whose every byte has a place before the first one is written: headers, and numbers as
+// they lie in memory or as they are counted up. Any part of it can be read alone. Not a format:
+// npy.c, npz.c, mat.c and zip.c lay out what they are. Used by those and by encoding.c.
+#ifndef SERVER_ENCODE_LAYOUT_H
+#define SERVER_ENCODE_LAYOUT_H
+
+#include <stdint.h>
+
+#include "server/base/bytes.h"
+
+typedef struct Segment {
+    uint64_t start, size;     // in the document
+    const double *values;     // borrowed; NULL: text, or counted
+    size_t text;              // where it begins in the layout's text
+    double first, step, rate; // counted: number i is (first + i step) / rate; rate 0: it is text
+} Segment;
+
+// All zero is empty. Once it failed (memory) it stays so, like Bytes.
+typedef struct Layout {
+    Segment *at;
+    size_t count, room;
+    uint64_t size;
+    Bytes text;
+    bool is_failed;
+} Layout;
+
+void layout_clear(Layout *layout);
+void layout_put(Layout *layout, const void *data, size_t size); // copied
+void layout_number(Layout *layout, uint64_t value,
+                   size_t size); // its `size` lowest bytes, lowest first
+void layout_fill(Layout *layout, char with, size_t count);
+void layout_values(Layout *layout, const double *values, size_t count); // borrowed
+// (first + i step) / rate for i = 0 ... count - 1.
+void layout_counted(Layout *layout, size_t first, size_t step, double rate, size_t count);
+void layout_join(Layout *layout, const Layout *other); // behind; borrows what `other` borrows
+
+// Copies `size` bytes from `start` on; both within the document.
+void layout_read(const Layout *layout, uint64_t start, void *target, size_t size);
+uint32_t layout_crc32(const Layout *layout); // of the whole
+
+#endif
