@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/sweep_plan.h"
+#include "core/study/sweep_judge.h"
 #include "core/study/sweep_run.h"
 
 // Points that are judged while whoever submits them waits.

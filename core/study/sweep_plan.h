@@ -1,5 +1,6 @@
 // The points of a sweep made ready: point i's scene is computed from i alone. Shared by threads,
-// never changes. Not runs: sweep_run.h. Used by sweep.c and server/jobs.
+// never changes. Not their judging (sweep_judge.h) and not runs (sweep_run.h). Used by those and
+// server/jobs.
 #ifndef CORE_STUDY_SWEEP_PLAN_H
 #define CORE_STUDY_SWEEP_PLAN_H
 
@@ -29,22 +30,18 @@ typedef struct SweepPlan {
 Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
                       const SimulationLimits *limits, SweepPlan **plan, Problem *problem);
 void sweep_plan_free(SweepPlan *plan);
+// The same, but where only pointers are faulty the plan is made all the same, beside
+// STATUS_INVALID: those axes then change nothing.
+Status sweep_plan_make(const SweepStudy *study, const Simulation *simulation,
+                       const SimulationLimits *limits, SweepPlan **plan, Problem *problem);
+
+// Which of an axis's values a point has.
+size_t sweep_plan_index(const SweepPlan *plan, size_t axis, size_t point);
 
 // The completed scene of a point: as the sweep's own, with this point's values. `is_bare`: nothing
 // sampled, as a row needs it. Cleared by simulation_clear in any case. Faults are the scene's.
 Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
                    const SimulationLimits *limits, Simulation *target, Problem *problem);
-
-// Judges every point, or (`is_sample`) those where one axis alone leaves its first value, and the
-// last one. Each fault stands at the value it comes of and says which point it is of. `watch` may
-// stop it.
-Status sweep_check(const SweepPlan *plan, bool is_sample, const SimulationLimits *limits,
-                   const Watch *watch, Problem *problem);
-
-// Judges axes and points, all points where they are at most `at_once`, else the sample of them;
-// `limits` NULL: the axes alone.
-Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t at_once,
-                   const SimulationLimits *limits, Problem *problem);
 
 // Solver steps foretold for all, from some points spread over them.
 double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits);

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/sweep_judge.h"
+
 static const double check_share = 0.02; // of the way, to judge all points
 
 size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/sweep_judge.h"
 #include "server/base/clock.h"
 
 enum { PILOT = 16, CHUNKS_PER_SLOT = 4, REASONS = 1000, REASON = 160 };

@@ -11,6 +11,7 @@
 #include <time.h>
 
 #include "core/math/fourier.h"
+#include "core/study/sweep_judge.h"
 #include "server/base/clock.h"
 #include "server/jobs/sweep.h"
 
