@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 POINTS, KILLS = 6000, 6
-SECONDS = 20  # that it takes one worker, about, however fast this machine is
+DURATION = 20  # of a scene [s]: the sweep is some seconds of CPU, in some twenty chunks
 
 
 def scene(duration):
@@ -21,14 +21,6 @@ def scene(duration):
             "study": {"kind": "sweep", "axes": [
                 {"pointer": "/dampers/0/buffer", "values": ["sponge", "hard_rubber", "aluminium"]},
                 {"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.03, "count": POINTS // 3}]}}
-
-
-def fitting_duration():
-    """How long the scenes are so that the sweep takes SECONDS of CPU here."""
-    with program.daemon("--workers", "1") as daemon:
-        job = daemon.finished(daemon.submit({**scene(20), "study": {"kind": "sweep", "axes": [
-            {"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.03, "count": 100}]}}).json()["id"])
-    return round(20 * SECONDS / (job["timing"]["run"] * POINTS / 100), 1)
 
 
 def stored(folder):
@@ -54,7 +46,7 @@ def tables(daemon, job):
 
 def test_a_sweep_survives_being_killed_again_and_again():
     """Killed at random times, when some rows had come: the table is to the byte that of a run that nobody disturbed."""
-    asked = scene(fitting_duration())
+    asked = scene(DURATION)
     with program.daemon("--workers", "2") as daemon:
         whole = daemon.finished(daemon.submit(asked, headers={"Prefer": "respond-async"}).json()["id"], 300)
         undisturbed = tables(daemon, whole)
@@ -90,7 +82,7 @@ def test_a_sweep_survives_being_killed_again_and_again():
 
 def test_a_full_disk_pauses_a_sweep_until_there_is_room():
     """Rows that cannot be written wait; when there is room again the sweep goes on, without a restart, to the same end."""
-    asked = scene(fitting_duration() / 4)
+    asked = scene(DURATION / 3)
     with program.daemon("--workers", "2") as daemon:
         whole = daemon.finished(daemon.submit(asked, headers={"Prefer": "respond-async"}).json()["id"], 300)
         undisturbed = tables(daemon, whole)
