@@ -77,9 +77,12 @@ ask() {
     fi
 }
 
+# What they say to daemons is recorded for contract/test_traffic.py, which comes after most of them.
+record=$(mktemp)
 for file in tests/contract/test_*.py tests/truth/test_*.py; do
-    ask "$file" release
+    IMPACTD_RECORD=$record ask "$file" release
 done
+rm -f "$record"
 # What faces hostile input is asked once more of the instrumented program.
 if [[ " ${presets[*]} " == *" debug "* ]]; then
     while read -r file; do ask "$file" debug; done < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)

@@ -3,9 +3,11 @@
 // the coarser series has.
 #include "core/simulation/compare.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/result/distance.h"
+#include "core/simulation/request_channels.h"
 
 // clang-format off
 const Field error_fields[] = {
@@ -36,9 +38,6 @@ double errors_by(const Errors *errors, int metric) {
                                  errors->psd,          errors->rms_displacement};
     return all[metric];
 }
-
-// The part of a spectrum's power that its band holds.
-static const double band_power = 0.999;
 
 static double ratio(double difference, double whole) {
     if (whole > 0)
@@ -135,47 +134,10 @@ static Within ledger_within(const Impacts *impacts, double horizon) {
     return within;
 }
 
-// The bins, from 1 on, that hold all but a thousandth of the power.
-static size_t band_end(const double *density, size_t rows) {
-    double all = 0, sum = 0;
-    for (size_t k = 1; k < rows; k++)
-        all += density[k];
-    if (!(all > 0))
-        return 0;
-    size_t end = 1;
-    while (end < rows && sum < band_power * all)
-        sum += density[end++];
-    return end;
-}
-
-// The density at a frequency, on the line between the bins beside it. NAN beyond the last one.
-static double density_at(const Spectrum *spectrum, const double *density, double frequency) {
-    const size_t last = spectrum->densities.rows - 1;
-    if (last < 1 || frequency > spectrum->frequency[last] * (1 + 1e-12))
-        return (double)NAN;
-    const double index = frequency / spectrum->frequency[1];
-    if (index <= 1)
-        return density[1]; // the mean is taken off: bin 0 says nothing of what is beside it
-    const size_t at = index * (1 + 1e-12) >= (double)last ? last : (size_t)(index * (1 + 1e-12));
-    const double part = index - (double)at;
-    return at == last || part < 1e-9 ? density[at]
-                                     : density[at] + part * (density[at + 1] - density[at]);
-}
-
 static double channel_distance(const Spectrum *reference, const double *wanted,
                                const Spectrum *point, const double *density) {
-    const size_t end = band_end(wanted, reference->densities.rows);
-    double squares = 0;
-    size_t count = 0;
-    for (size_t k = 1; k < end; k++) {
-        if (!(wanted[k] > 0))
-            continue;
-        const double level =
-            10 * log10(density_at(point, density, reference->frequency[k]) / wanted[k]);
-        squares += level * level;
-        count++;
-    }
-    return count > 0 && isfinite(squares) ? sqrt(squares / (double)count) : (double)NAN;
+    const size_t end = distance_band_end(wanted, reference->densities.rows);
+    return distance_level(reference, wanted, point, density, 1, end);
 }
 
 // Of the channel that is farthest off.
@@ -204,7 +166,8 @@ Yardstick yardstick_make(const Compared *reference) {
                       .psd_to = (double)NAN};
     const Spectrum *spectrum = &outcome->spectrum;
     for (size_t i = 0; i < spectrum->densities.count; i++) {
-        const size_t end = band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
+        const size_t end =
+            distance_band_end(spectrum->densities.at[i].values, spectrum->densities.rows);
         if (end < 2)
             continue;
         told.psd_from = spectrum->frequency[1];
@@ -244,17 +207,12 @@ Errors errors_measure(const Compared *reference, const Compared *point) {
 
 Status compare_watch(Simulation *simulation, Problem *problem) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    const bool are_numbered = storeys > 1 || simulation->scene.dampers.count > 1;
     static const ChannelId wanted[] = {CHANNEL_DISPLACEMENT, CHANNEL_MEAN_ACCELERATION};
     Texts names = {calloc(COUNT(wanted) * storeys, sizeof *names.at), 0};
     bool is_whole = names.at != NULL;
     for (size_t i = 0; i < COUNT(wanted) * storeys && is_whole; i++) {
-        char name[64];
-        if (are_numbered)
-            snprintf(name, sizeof name, "%s_%zu", channels[wanted[i / storeys]].name,
-                     i % storeys + 1);
-        else
-            snprintf(name, sizeof name, "%s", channels[wanted[i / storeys]].name);
+        char name[CHANNEL_NAME];
+        request_channel_name(&simulation->scene, wanted[i / storeys], i % storeys + 1, name);
         names.at[i] = strdup(name);
         is_whole = names.at[i] != NULL;
         names.count += is_whole;

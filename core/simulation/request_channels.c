@@ -6,10 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/result/channel.h"
-
-enum { NAME_SIZE = 64 };
-
 static const ChannelId usual[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
                                   CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_CONTACT_FORCE};
 
@@ -26,16 +22,16 @@ static size_t owners_count(const Owners *owners, const Channel *channel) {
 }
 
 // The channel's one name; `number` is from 1.
-static void put_name(char target[NAME_SIZE], const Owners *owners, const Channel *channel,
+static void put_name(char target[CHANNEL_NAME], const Owners *owners, const Channel *channel,
                      size_t number) {
     if (owners->are_numbered && channel->owner != CHANNEL_OF_BASE)
-        snprintf(target, NAME_SIZE, "%s_%zu", channel->name, number);
+        snprintf(target, CHANNEL_NAME, "%s_%zu", channel->name, number);
     else
-        snprintf(target, NAME_SIZE, "%s", channel->name);
+        snprintf(target, CHANNEL_NAME, "%s", channel->name);
 }
 
 static Status add_name(Texts *names, const Owners *owners, const Channel *channel, size_t number) {
-    char name[NAME_SIZE];
+    char name[CHANNEL_NAME];
     put_name(name, owners, channel, number);
     char *text = strdup(name);
     if (text == NULL)
@@ -61,6 +57,17 @@ static Status add_usual(Texts *names, const Owners *owners, bool is_spectrum) {
             TRY(add_name(names, owners, channel, number));
     }
     return STATUS_OK;
+}
+
+static Owners owners_of(const Scene *scene) {
+    const size_t storeys = structure_storeys(scene_structure(scene));
+    return (Owners){storeys, scene->dampers.count, storeys > 1 || scene->dampers.count > 1};
+}
+
+void request_channel_name(const Scene *scene, ChannelId channel, size_t number,
+                          char target[CHANNEL_NAME]) {
+    const Owners owners = owners_of(scene);
+    put_name(target, &owners, &channels[channel], number);
 }
 
 static void clear(Texts *names) {
@@ -148,7 +155,7 @@ static Status refuse_name(const char *name, const Owners *owners, const char *po
                            "%s needs a damper, the scene has none", name);
     const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
     const size_t most = owners_count(owners, channel);
-    char meant[NAME_SIZE], last[NAME_SIZE], names[160], detail[sizeof((Fault){0}.detail)];
+    char meant[CHANNEL_NAME], last[CHANNEL_NAME], names[160], detail[sizeof((Fault){0}.detail)];
     put_name(meant, owners, channel,
              number > most || channel->owner == CHANNEL_OF_STOREY ? most : 1);
     put_name(last, owners, channel, most);

@@ -3,7 +3,14 @@
 #ifndef CORE_SIMULATION_REQUEST_CHANNELS_H
 #define CORE_SIMULATION_REQUEST_CHANNELS_H
 
+#include "core/result/channel.h"
 #include "core/scene/scene.h"
+
+enum { CHANNEL_NAME = 64 };
+
+// The one name that a channel has in a completed scene, of storey or damper `number`, from 1.
+void request_channel_name(const Scene *scene, ChannelId channel, size_t number,
+                          char target[CHANNEL_NAME]);
 
 // Puts the names of the usual channels, or of the usual spectrum's one, in place of CHANNEL_USUAL;
 // then judges all names, below `pointer`. Says nothing of numbers where a fault leaves the storeys

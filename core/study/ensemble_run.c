@@ -10,6 +10,7 @@
 #include "core/study/ensemble_rule.h"
 #include "core/study/ensemble_spectra.h"
 #include "core/study/ensemble_statistics.h"
+#include "core/study/member.h"
 #include "core/study/tradeoff_ladder.h"
 
 // What a study has at hand while it runs.
@@ -29,14 +30,8 @@ typedef struct Session {
 
 Status ensemble_member(const Simulation *simulation, uint64_t seed, Simulation *target,
                        Problem *problem) {
-    if (fields_copy(simulation_fields, simulation, target) != STATUS_OK)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
+    TRY(member_copy(simulation, target, problem));
     ((ExcitationRandom *)(void *)target->scene.excitation)->seed = seed;
-    Texts *sampled = &target->output.channels;
-    for (size_t i = 0; i < sampled->count; i++)
-        free(sampled->at[i]);
-    free(sampled->at);
-    *sampled = (Texts){NULL, 0};
     return STATUS_OK;
 }
 

@@ -19,7 +19,7 @@ EnsembleStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric
     return all[metric];
 }
 
-static double value_of(const Summary *summary, int metric) {
+double statistics_value(const Summary *summary, int metric) {
     const double all[] = {
         summary->peak_displacement,
         summary->rms_displacement,
@@ -32,7 +32,7 @@ static double value_of(const Summary *summary, int metric) {
 }
 
 static bool is_known(const EnsembleRun *run, int metric) {
-    return run->why == NULL && !isnan(value_of(&run->summary, metric));
+    return run->why == NULL && !isnan(statistics_value(&run->summary, metric));
 }
 
 // What is known of a statistic, in the order of the seeds.
@@ -77,7 +77,7 @@ static Status values_take(const EnsembleRuns *table, int metric, Values *values,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's statistics");
     for (size_t i = 0; i < table->count; i++)
         if (is_known(&table->at[i], metric))
-            values->at[values->count++] = value_of(&table->at[i].summary, metric);
+            values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
     if (values->count > 0)
         values_measure(values);
     return STATUS_OK;
@@ -88,18 +88,18 @@ static int by_size(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-static double quantile(const Values *sorted, double share) {
-    const double place = share * (double)(sorted->count - 1);
+double statistics_quantile(const double *sorted, size_t count, double share) {
+    const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
-    const double from = sorted->at[below];
-    const double to = below + 1 < sorted->count ? sorted->at[below + 1] : from;
+    const double from = sorted[below], to = below + 1 < count ? sorted[below + 1] : from;
     return from + (place - (double)below) * (to - from);
 }
 
 // The first run that has this number.
 static uint64_t seed_of(const EnsembleRuns *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)
-        if (is_known(&table->at[i], metric) && value_of(&table->at[i].summary, metric) == value)
+        if (is_known(&table->at[i], metric) &&
+            statistics_value(&table->at[i].summary, metric) == value)
             return table->at[i].seed;
     return COUNT_ABSENT;
 }
@@ -120,11 +120,11 @@ static void statistic_fill(const EnsembleRuns *table, int metric, Values *values
     }
     qsort(values->at, values->count, sizeof *values->at, by_size);
     statistic->minimum = values->at[0];
-    statistic->q05 = quantile(values, 0.05);
-    statistic->q25 = quantile(values, 0.25);
-    statistic->median = quantile(values, 0.5);
-    statistic->q75 = quantile(values, 0.75);
-    statistic->q95 = quantile(values, 0.95);
+    statistic->q05 = statistics_quantile(values->at, values->count, 0.05);
+    statistic->q25 = statistics_quantile(values->at, values->count, 0.25);
+    statistic->median = statistics_quantile(values->at, values->count, 0.5);
+    statistic->q75 = statistics_quantile(values->at, values->count, 0.75);
+    statistic->q95 = statistics_quantile(values->at, values->count, 0.95);
     statistic->maximum = values->at[values->count - 1];
     statistic->minimum_seed = seed_of(table, metric, statistic->minimum);
     statistic->maximum_seed = seed_of(table, metric, statistic->maximum);

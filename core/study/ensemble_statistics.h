@@ -1,5 +1,5 @@
 // The statistics of an ensemble's runs, over those that came to an end. Not of their spectra:
-// ensemble_spectra.h. Used by ensemble_run.c and the tests.
+// ensemble_spectra.h. Used by ensemble_run.c, by the study sensitivity and the tests.
 #ifndef CORE_STUDY_ENSEMBLE_STATISTICS_H
 #define CORE_STUDY_ENSEMBLE_STATISTICS_H
 
@@ -7,6 +7,12 @@
 #include "core/study/ensemble_rule.h"
 
 #define ENSEMBLE_INTERVAL 0.95 // confidence of the intervals of means
+
+// The number that a statistic is of; NAN: not known.
+double statistics_value(const Summary *summary, int metric);
+
+// Below it lies that share of so many sorted numbers, at least one, as NumPy's.
+double statistics_quantile(const double *sorted, size_t count, double share);
 
 // Fills what the table has of one statistic.
 Status statistics_fold(const EnsembleRuns *table, int metric, EnsembleStatistic *statistic,

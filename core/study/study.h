@@ -40,7 +40,8 @@ typedef struct StudyKind {
 
 extern const StudyKind *const studies[]; // NULL-terminated
 extern const KindTable study_kinds, study_answer_kinds;
-extern const StudyKind study_tradeoff, study_ensemble, study_sweep;
+extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity,
+    study_sweep;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;

@@ -7,6 +7,7 @@ static const char *const of_jobs[] = {"limit", "before", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_force[] = {"points", NULL};
+static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_materials[] = {"q", NULL};
 
 // clang-format off
@@ -39,6 +40,12 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/tradeoff",             "read",   NULL,         "The study's table or chart, format by Accept", results_tradeoff},
     {"GET",    "/v1/results/{id}/ensemble.{format}",    "read",   NULL,         "The study's statistics as json, its runs as csv, or its chart as svg", results_ensemble},
     {"GET",    "/v1/results/{id}/ensemble",             "read",   NULL,         "The study's statistics, runs or chart, format by Accept", results_ensemble},
+    {"GET",    "/v1/results/{id}/compare.{format}",     "read",   NULL,         "The study's variants as json or csv, or their chart as svg", results_compare},
+    {"GET",    "/v1/results/{id}/compare",              "read",   NULL,         "The study's variants or chart, format by Accept", results_compare},
+    {"GET",    "/v1/results/{id}/sensitivity.{format}", "read",   NULL,         "The study's slopes and bands as json, the slopes as csv, or its chart as svg", results_sensitivity},
+    {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_sensitivity},
+    {"GET",    "/v1/compare",                           "read",   of_compare,   "Two results side by side, and the inputs that differ", compare_results},
+    {"POST",   "/v1/compare",                           "read",   NULL,         "A result beside a measured motion", compare_measured},
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
@@ -56,4 +63,9 @@ const Route routes[] = {
 };
 // clang-format on
 
-Handler *const quick_handlers[] = {health_live, health_ready, version_show, NULL};
+const QuickHandler quick_handlers[] = {
+    {health_live, health_live},
+    {health_ready, health_ready},
+    {version_show, version_show},
+    {NULL, NULL},
+};

@@ -97,3 +97,11 @@ Status results_tradeoff(App *app, const Request *request, Reply *reply, Problem 
 Status results_ensemble(App *app, const Request *request, Reply *reply, Problem *problem) {
     return show(app, request, &study_ensemble, reply, problem);
 }
+
+Status results_compare(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return show(app, request, &study_compare, reply, problem);
+}
+
+Status results_sensitivity(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return show(app, request, &study_sensitivity, reply, problem);
+}

@@ -17,7 +17,11 @@
 #include "server/base/clock.h"
 #include "server/base/digest.h"
 
-enum { FOLLOW_MS = 500, UNKNOWN_MS = 50, USED_MS = 60000 };
+enum {
+    FOLLOW_MS = 500,
+    UNKNOWN_MOST = 16, // looks in that time for tokens that are not in the table
+    USED_MS = 60000,
+};
 
 const char *const scope_names[] = {"read", "submit", "materials", "admin", NULL};
 
@@ -36,8 +40,8 @@ struct Tokens {
     pthread_mutex_t lock; // of entries and count, held for a look-up
     Entry *entries;
     size_t count;
-    int64_t now_unix_ms; // as of the last look; under the lock
-    atomic_int_fast64_t looked_ns;
+    int64_t now_unix_ms;     // as of the last look; under the lock
+    atomic_int looks_left;   // until the thread looks next
     pthread_mutex_t looking; // one at a time
     pthread_mutex_t ending;
     pthread_cond_t end;
@@ -125,7 +129,6 @@ static void entry_fill(const Tokens *tokens, Entry *entry, const TokenRow *row) 
 // With `looking` held. What is there stays where the database cannot be read.
 static Status look(Tokens *tokens, Problem *problem) {
     TokenRows rows = {0};
-    atomic_store(&tokens->looked_ns, clock_monotonic_ns());
     TRY(store_tokens(tokens->store, &rows, problem));
     Entry *entries = calloc(rows.count + 1, sizeof *entries);
     if (entries == NULL) {
@@ -184,6 +187,7 @@ static void *follow(void *context) {
         pthread_mutex_lock(&tokens->looking);
         (void)look(tokens, NULL);
         pthread_mutex_unlock(&tokens->looking);
+        atomic_store(&tokens->looks_left, UNKNOWN_MOST);
         pthread_mutex_lock(&tokens->ending);
     }
     pthread_mutex_unlock(&tokens->ending);
@@ -197,6 +201,7 @@ Status tokens_open(Store *store, bool are_required, Tokens **tokens, Problem *pr
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
     made->store = store;
     made->are_required = are_required;
+    atomic_init(&made->looks_left, UNKNOWN_MOST);
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
@@ -287,9 +292,9 @@ static Judgement judge(Tokens *tokens, const unsigned char *digest, char client[
 
 // A token may have been made a moment ago, but whoever tries many must not cost a query each.
 static bool look_again(Tokens *tokens) {
-    const int64_t age_ns = clock_monotonic_ns() - atomic_load(&tokens->looked_ns);
-    if (age_ns < (int64_t)UNKNOWN_MS * 1000000 || pthread_mutex_trylock(&tokens->looking) != 0)
+    if (atomic_load(&tokens->looks_left) <= 0 || atomic_fetch_sub(&tokens->looks_left, 1) <= 0)
         return false;
+    pthread_mutex_lock(&tokens->looking);
     const bool has_looked = look(tokens, NULL) == STATUS_OK;
     pthread_mutex_unlock(&tokens->looking);
     return has_looked;

@@ -36,18 +36,14 @@ static void value_put(char target[PAIRS_TEXT], const json_t *value) {
     }
 }
 
-static bool pair_add(Pairs *pairs, const char *name, const json_t *a, const json_t *b,
+static bool pair_add(Pairs *pairs, const char *name, const char *a, const char *b,
                      const char *rest) {
-    char of_a[PAIRS_TEXT], of_b[PAIRS_TEXT];
     Pair *at = realloc(pairs->at, (pairs->count + 1) * sizeof *at);
     if (at == NULL)
         return false;
     pairs->at = at;
-    value_put(of_a, a);
-    if (b != NULL)
-        value_put(of_b, b);
     Pair *pair = &at[pairs->count++];
-    *pair = (Pair){strdup(name), strdup(of_a), b != NULL ? strdup(of_b) : NULL, strdup(rest)};
+    *pair = (Pair){strdup(name), strdup(a), b != NULL ? strdup(b) : NULL, strdup(rest)};
     return pair->name != NULL && pair->a != NULL && (b == NULL) == (pair->b == NULL) &&
            pair->rest != NULL;
 }
@@ -68,21 +64,29 @@ static void rest_put(Bytes *rest, const json_t *object, const char *named) {
 
 static bool walk(const json_t *value, const char *place, const char *key, Pairs *pairs);
 
+static bool row_add(const json_t *object, const char *name, const char *named, Pairs *pairs) {
+    char a[PAIRS_TEXT], b[PAIRS_TEXT];
+    Bytes rest = {.most = 1000};
+    value_put(a, json_object_get(object, "a"));
+    value_put(b, json_object_get(object, "b"));
+    rest_put(&rest, object, named);
+    const bool is_added = pair_add(pairs, name, a, b, rest.at != NULL ? rest.at : "");
+    bytes_clear(&rest);
+    return is_added;
+}
+
 static bool object_walk(const json_t *object, const char *place, const char *key, Pairs *pairs) {
     const json_t *a = json_object_get(object, "a"), *b = json_object_get(object, "b");
     const char *name, *named = json_object_get(object, "pointer") != NULL ? "pointer" : "name";
     const char *own = json_string_value(json_object_get(object, named));
     json_t *value;
-    if (a != NULL && b != NULL && !json_is_object(a) && !json_is_object(b)) {
-        Bytes rest = {.most = 1000};
-        rest_put(&rest, object, named);
-        const bool is_added =
-            pair_add(pairs, own != NULL ? own : key, a, b, rest.at != NULL ? rest.at : "");
-        bytes_clear(&rest);
-        return is_added;
-    }
+    // Beside a name both sides may be anything; without one, two objects are two things with parts.
+    if (a != NULL && b != NULL && (own != NULL || (!json_is_object(a) && !json_is_object(b))))
+        return row_add(object, own != NULL ? own : key, named, pairs);
     char inner[256];
     json_object_foreach((json_t *)(uintptr_t)object, name, value) {
+        if (strcmp(name, "links") == 0)
+            continue;
         pointer_join(inner, sizeof inner, place, name);
         if (!walk(value, inner, name, pairs))
             return false;
@@ -90,20 +94,33 @@ static bool object_walk(const json_t *object, const char *place, const char *key
     return true;
 }
 
+// One of a list: a row, or a line with all that it says.
+static bool element_walk(const json_t *element, const char *place, Pairs *pairs) {
+    if (json_is_string(element) || json_object_get(element, "a") != NULL)
+        return walk(element, place, place + 1, pairs);
+    // Numbers by the thousand are for programs.
+    if (!json_is_object(element) || pairs->count >= PAIRS_MOST)
+        return true;
+    Bytes rest = {.most = 1000};
+    rest_put(&rest, element, "");
+    const bool is_added = rest.at == NULL || pair_add(pairs, place + 1, rest.at, NULL, "");
+    bytes_clear(&rest);
+    return is_added;
+}
+
 static bool walk(const json_t *value, const char *place, const char *key, Pairs *pairs) {
+    char text[PAIRS_TEXT], inner[256];
     if (pairs->count >= PAIRS_MOST)
         return true;
     if (json_is_object(value))
         return object_walk(value, place, key, pairs);
-    if (!json_is_array(value))
-        return pair_add(pairs, place + 1, value, NULL, "");
-    char inner[256];
+    if (!json_is_array(value)) {
+        value_put(text, value);
+        return pair_add(pairs, place + 1, text, NULL, "");
+    }
     for (size_t i = 0; i < json_array_size(value); i++) {
-        const json_t *element = json_array_get(value, i);
         pointer_index(inner, sizeof inner, place, i);
-        // Numbers by the thousand are for programs.
-        if ((json_is_object(element) || json_is_string(element)) &&
-            !walk(element, inner, inner + 1, pairs))
+        if (!element_walk(json_array_get(value, i), inner, pairs))
             return false;
     }
     return true;

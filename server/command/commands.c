@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
+#include "server/command/any_study.h"
 #include "server/command/cancel.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
@@ -38,10 +39,10 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,   &command_check,   &command_tradeoff,
-    &command_ensemble, &command_sweep, &command_import,  &command_token,
-    &command_submit,   &command_watch, &command_get,     &command_cancel,
-    &command_compare,  &command_help,  &command_version, NULL,
+    &command_serve,   &command_run,   &command_check,  &command_tradeoff, &command_ensemble,
+    &command_study,   &command_sweep, &command_import, &command_token,    &command_submit,
+    &command_watch,   &command_get,   &command_cancel, &command_compare,  &command_help,
+    &command_version, NULL,
 };
 
 static const char overview[] =
@@ -53,6 +54,7 @@ static const char overview[] =
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
+    "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
     "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd token create --name lab      let a client in who has this token\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"

@@ -50,7 +50,7 @@ static void table_print(const Pairs *pairs, const char *a, const char *b) {
                    pairs->at[i].rest);
     puts("");
     for (size_t i = 0; i < pairs->count; i++)
-        if (pairs->at[i].b == NULL && strncmp(pairs->at[i].name, "links/", 6) != 0)
+        if (pairs->at[i].b == NULL)
             printf("%s: %s\n", pairs->at[i].name, pairs->at[i].a);
 }
 
@@ -81,7 +81,8 @@ static int compare(void *of, const Options *options, Problem *problem) {
     const CompareSettings *settings = of;
     if (options->operand_count != 2 || !daemon_is_id(options->operands[0]) ||
         !daemon_is_id(options->operands[1])) {
-        (void)problem_set(problem, STATUS_USAGE, "takes the ids of two results, like r-91c0");
+        (void)problem_set(problem, STATUS_USAGE,
+                          "takes the ids of two results or jobs, like r-91c0");
         return command_refuse("compare", problem);
     }
     const char *ids[2] = {options->operands[0], options->operands[1]};

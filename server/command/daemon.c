@@ -25,6 +25,7 @@ static const char *setting(const char *given, const char *name, const char *usua
 Status daemon_open(const char *server, const char *token_file, const char *ca_file, double wait,
                    Daemon *daemon, Problem *problem) {
     char token[TOKEN_MOST + 1];
+    output_guard();
     *daemon = (Daemon){.until_ns = clock_monotonic_ns() +
                                    (int64_t)(1e9 * (wait < forever ? wait : forever))};
     TRY(token_read(setting(token_file, "IMPACTD_TOKEN_FILE", NULL), token, problem));
@@ -158,7 +159,6 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
     snprintf(farewell, sizeof farewell,
              "%s goes on; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
              id, id);
-    output_guard();
     output_farewell(farewell);
     bar_start(&show.bar);
     Status status = STATUS_OK;
@@ -181,6 +181,8 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
     }
     bar_stop(&show.bar);
     output_farewell(NULL);
+    if (status == STATUS_OK && show.bar.is_terminal && lines != NULL)
+        fprintf(lines, "%s %s\n", job->id, job->status);
     return status;
 }
 

@@ -22,7 +22,8 @@ typedef struct Daemon {
     int64_t until_ns; // monotonic; patience ends then
 } Daemon;
 
-// `wait` [s]: how long a busy daemon and an unfinished job are waited for.
+// `wait` [s]: how long a busy daemon and an unfinished job are waited for. From here on Ctrl-C ends
+// the program with 130.
 Status daemon_open(const char *server, const char *token_file, const char *ca_file, double wait,
                    Daemon *daemon, Problem *problem);
 void daemon_close(Daemon *daemon);

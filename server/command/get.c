@@ -180,7 +180,6 @@ static int get(void *of, const Options *options, Problem *problem) {
         return command_refuse("get", problem);
     const char *id = options->operands[0];
     Daemon daemon;
-    output_guard();
     status = daemon_open(settings->server, settings->token_file, settings->ca_file, settings->wait,
                          &daemon, problem);
     if (status == STATUS_OK)

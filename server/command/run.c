@@ -151,10 +151,10 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text,
         intake_prepare(store, text->at, text->count, &limits, &inquiry, &warnings, problem);
     store_close(store);
     if (status == STATUS_OK && inquiry.study != NULL)
-        status = problem_add(problem, STATUS_INVALID, "/study",
-                             "is not for `run`, which runs the scene alone: `impactd %s` makes the "
-                             "study, or the daemon",
-                             inquiry.study->kind->name);
+        status =
+            problem_add(problem, STATUS_INVALID, "/study",
+                        "is not for `run`, which runs the scene alone: `impactd study` makes it, "
+                        "or the daemon; `impactd tradeoff` and `impactd ensemble` print theirs");
     if (status == STATUS_OK) {
         scene_file_warn(path, &warnings);
         // Before the run, so that a wrong folder is told now and not after it.

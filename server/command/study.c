@@ -72,7 +72,7 @@ static Status study_make(const StudyCommand *command, const Inquiry *inquiry, co
     Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &answer, problem);
     bar_stop(&bar);
     workspace_clear(&workspace);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && (command->choose != NULL || outputs->count == 0))
         command->print(answer);
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
         status = file_write(command, outputs->at[i], answer, problem);
@@ -83,6 +83,12 @@ static Status study_make(const StudyCommand *command, const Inquiry *inquiry, co
 // The document's own study, or a new one, with what the flags say.
 static Status study_choose(const StudyCommand *command, Inquiry *inquiry, void *settings,
                            Problem *problem) {
+    if (inquiry->study == NULL && command->kind == NULL)
+        return problem_add(problem, STATUS_INVALID, "/study",
+                           "is required: what is to be found out, like {\"kind\": \"%s\"}",
+                           studies[0]->kind.name);
+    if (command->kind == NULL)
+        return STATUS_OK;
     if (inquiry->study != NULL && inquiry->study->kind != &command->kind->kind) {
         variant_free(inquiry->study);
         inquiry->study = NULL;
@@ -91,7 +97,8 @@ static Status study_choose(const StudyCommand *command, Inquiry *inquiry, void *
         inquiry->study = variant_new(&command->kind->kind);
     if (inquiry->study == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
-    command->choose((Study *)(void *)inquiry->study, settings);
+    if (command->choose != NULL)
+        command->choose((Study *)(void *)inquiry->study, settings);
     return STATUS_OK;
 }
 
@@ -112,13 +119,18 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
         status = study_choose(command, &inquiry, settings, problem);
     if (status == STATUS_OK)
         status = inquiry_complete(&inquiry, &limits, NULL, problem);
+    StudyCommand own = *command;
+    if (status == STATUS_OK && own.kind == NULL) {
+        own.kind = study_kind(inquiry.study);
+        status = check_outputs(&own, outputs, problem);
+    }
     // Before the runs, so that a wrong folder is told now and not after them.
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++) {
         status = output_open(outputs->at[i], problem);
         output_drop();
     }
     if (status == STATUS_OK)
-        status = study_make(command, &inquiry, outputs, &limits, problem);
+        status = study_make(&own, &inquiry, outputs, &limits, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
@@ -126,7 +138,7 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
 
 int study_command_run(const StudyCommand *command, const Texts *outputs, double cpu_seconds,
                       void *settings, const Options *options, Problem *problem) {
-    Status status = check_outputs(command, outputs, problem);
+    Status status = command->kind != NULL ? check_outputs(command, outputs, problem) : STATUS_OK;
     if (status == STATUS_OK && options->operand_count != 1)
         status = problem_set(problem, STATUS_USAGE, "takes one scene, is given %zu",
                              options->operand_count);

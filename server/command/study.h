@@ -9,10 +9,11 @@
 enum { STUDY_OUTPUTS = 8 }; // files of one command
 
 typedef struct StudyCommand {
-    const char *name; // of the command
-    const StudyKind *kind;
+    const char *name;      // of the command
+    const StudyKind *kind; // NULL: the document's own study, whatever it is; it must have one
     // Puts what the flags say into the document's own study of this kind, or into a new one; may
-    // take what `settings` own.
+    // take what `settings` own. NULL: the document alone counts, and nothing is printed where files
+    // are written.
     void (*choose)(Study *study, void *settings);
     void (*print)(const Variant *answer); // on standard output, for people
 } StudyCommand;

@@ -142,6 +142,8 @@ const Command command_submit = {
         "  impactd submit scene.json --title 'sponge, 15 mm' --label batch=7\n"
         "  impactd submit - --server https://sim.example < scene.json\n"
         "\n"
+        "A scene whose answer was lost can be sent again with the same --idempotency-key: it is "
+        "one job.\n"
         "A daemon that is busy is asked again as it says, until --wait is over. Ctrl-C ends the\n"
         "waiting alone: the job goes on, \"impactd cancel\" stops it. Exit code 3 if the scene "
         "has\n"

@@ -4,9 +4,13 @@
 #include <string.h>
 
 #include "server/encode/chart.h"
+#include "server/encode/chart_compare.h"
 #include "server/encode/chart_ensemble.h"
+#include "server/encode/chart_sensitivity.h"
 #include "server/encode/chart_sweep.h"
+#include "server/encode/compare_csv.h"
 #include "server/encode/ensemble_csv.h"
+#include "server/encode/sensitivity_csv.h"
 #include "server/encode/svg.h"
 #include "server/encode/sweep_npz.h"
 #include "server/encode/sweep_table.h"
@@ -45,6 +49,24 @@ static void sweep_table(const Variant *answer, Bytes *bytes) {
     sweep_csv((const Sweep *)(const void *)answer, bytes);
 }
 
+static void compare_chart(const Variant *answer, Bytes *bytes) {
+    chart_compare((const Comparison *)(const void *)answer, bytes);
+}
+
+static void compare_table(const Variant *answer, Bytes *bytes) {
+    compare_csv((const Comparison *)(const void *)answer, bytes);
+}
+
+static void sensitivity_chart(const Variant *answer, Bytes *bytes) {
+    chart_sensitivity((const Sensitivity *)(const void *)answer, bytes);
+}
+
+static void sensitivity_table(const Variant *answer, Bytes *bytes) {
+    sensitivity_csv((const Sensitivity *)(const void *)answer, bytes);
+}
+
+static const char csv_type[] = "text/csv; charset=utf-8";
+
 static const struct {
     const StudyKind *study;
     AnswerFormat formats[ANSWER_FORMATS];
@@ -55,14 +77,24 @@ static const struct {
       {NULL, NULL, NULL}}},
     {&study_ensemble,
      {{"json", "application/json", json_write},
-      {"csv", "text/csv; charset=utf-8", ensemble_table},
+      {"csv", csv_type, ensemble_table},
       {"svg", svg_type, ensemble_chart},
       {NULL, NULL, NULL}}},
     {&study_sweep,
      {{"json", "application/json", sweep_whole},
-      {"csv", "text/csv; charset=utf-8", sweep_table},
+      {"csv", csv_type, sweep_table},
       {"npz", "application/x-npz", sweep_archive},
       {"svg", svg_type, sweep_chart},
+      {NULL, NULL, NULL}}},
+    {&study_compare,
+     {{"json", "application/json", json_write},
+      {"csv", csv_type, compare_table},
+      {"svg", svg_type, compare_chart},
+      {NULL, NULL, NULL}}},
+    {&study_sensitivity,
+     {{"json", "application/json", json_write},
+      {"csv", csv_type, sensitivity_table},
+      {"svg", svg_type, sensitivity_chart},
       {NULL, NULL, NULL}}},
 };
 

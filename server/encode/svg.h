@@ -1,5 +1,5 @@
-// What charts share: escaped text and powers of ten. Not a chart. Used by chart.c and
-// chart_ensemble.c.
+// What charts share: escaped text and powers of ten. Not a chart. Used by chart.c,
+// the other chart_*.c and plot.c.
 #ifndef SERVER_ENCODE_SVG_H
 #define SERVER_ENCODE_SVG_H
 

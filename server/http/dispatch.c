@@ -69,14 +69,15 @@ static Status finish(const Dispatcher *dispatcher, const Route *route, const Req
     return reply_range(reply, request, problem);
 }
 
-static Status answer(const Dispatcher *dispatcher, const Route *route, const RouteSpan *spans,
-                     size_t count, Request *request, Reply *reply, Problem *problem) {
+static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *handle,
+                     const RouteSpan *spans, size_t count, Request *request, Reply *reply,
+                     Problem *problem) {
     char scratch[512];
     TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
-    TRY(route->handle(dispatcher->app, request, reply, problem));
-    if (reply->wait_ms > 0)
+    TRY(handle(dispatcher->app, request, reply, problem));
+    if (reply->wait_ms > 0 || reply->code == 0)
         return STATUS_OK;
     link_apply(reply->location, sizeof reply->location);
     link_apply(reply->link, sizeof reply->link);
@@ -130,9 +131,9 @@ void dispatch(void *context, Request *request, Reply *reply) {
     Problem problem;
     problem_clear(&problem);
     const Route *route = find(dispatcher, request, spans, &count, allow);
-    const Status status = route != NULL
-                              ? answer(dispatcher, route, spans, count, request, reply, &problem)
-                              : refuse(dispatcher, request, allow, reply, &problem);
+    const Status status = route != NULL ? answer(dispatcher, route, route->handle, spans, count,
+                                                 request, reply, &problem)
+                                        : refuse(dispatcher, request, allow, reply, &problem);
     close_up(dispatcher, request, status, &problem, reply);
 }
 
@@ -177,11 +178,11 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
     return true;
 }
 
-static bool is_quick(const Dispatcher *dispatcher, const Route *route) {
-    Handler *const *quick = dispatcher->quick;
-    while (quick != NULL && *quick != NULL && *quick != route->handle)
+static Handler *find_quick(const Dispatcher *dispatcher, const Route *route) {
+    const QuickHandler *quick = dispatcher->quick;
+    while (quick != NULL && quick->of != NULL && quick->of != route->handle)
         quick++;
-    return quick != NULL && *quick != NULL;
+    return quick != NULL ? quick->quick : NULL;
 }
 
 bool dispatch_at_once(void *context, Request *request, Reply *reply) {
@@ -193,11 +194,14 @@ bool dispatch_at_once(void *context, Request *request, Reply *reply) {
     size_t count = 0;
     char allow[64];
     const Route *route = find(dispatcher, request, spans, &count, allow);
-    if (route == NULL || !is_quick(dispatcher, route) || request->body_size > QUICK_BYTES)
+    Handler *const handle = route != NULL ? find_quick(dispatcher, route) : NULL;
+    if (handle == NULL || request->body_size > QUICK_BYTES)
         return false;
     Problem problem;
     problem_clear(&problem);
-    const Status status = answer(dispatcher, route, spans, count, request, reply, &problem);
+    const Status status = answer(dispatcher, route, handle, spans, count, request, reply, &problem);
+    if (status == STATUS_OK && reply->code == 0 && reply->wait_ms == 0)
+        return false;
     close_up(dispatcher, request, status, &problem, reply);
     return true;
 }

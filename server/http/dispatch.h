@@ -11,9 +11,9 @@
 typedef struct Dispatcher {
     App *app;
     const Route *table;
-    Handler *const *quick;  // of the table's; may be NULL
-    Hot *hot;               // whole answers that never change; may be NULL
-    const Doorman *doorman; // NULL: whoever comes, nothing counted
+    const QuickHandler *quick; // of the table's; may be NULL
+    Hot *hot;                  // whole answers that never change; may be NULL
+    const Doorman *doorman;    // NULL: whoever comes, nothing counted
 } Dispatcher;
 
 // Fills `reply` in any case; reply->wait_ms > 0 asks to be called again. `context` is a Dispatcher.

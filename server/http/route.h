@@ -19,9 +19,12 @@ typedef struct Route {
     Handler *handle;
 } Route;
 
-// Handlers that take a moment at most and wait for nothing: answered on the event loop. Ends with
-// NULL.
-extern Handler *const quick_handlers[];
+// A handler's answer on the event loop: what takes a moment at most and waits for nothing. It may
+// decline by leaving the reply's code 0, and `of` is asked on a thread.
+typedef struct QuickHandler {
+    Handler *of, *quick;
+} QuickHandler;
+extern const QuickHandler quick_handlers[]; // ends with NULL
 
 extern const Route routes[]; // ends with method == NULL; of two patterns that fit, the first counts
 

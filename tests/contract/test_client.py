@@ -164,6 +164,28 @@ def test_interrupts_end_the_watching_alone():
             assert client(daemon.url, "cancel", job)[0] == 0
 
 
+def test_watch_draws_a_bar_on_a_terminal():
+    """On a terminal watch shows a bar that does not go back, and in the end one line of the job's state."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("IMPACTD_")}
+    try:
+        master, slave = pty.openpty()
+    except OSError as error:
+        raise program.Skipped(f"no terminal can be made here: {error}") from None
+    with program.daemon() as daemon:
+        job = client(daemon.url, "submit", "-", text=endless())[1].strip()
+        with subprocess.Popen([program.impactd(), "watch", job, "--server", daemon.url], stdout=subprocess.PIPE,
+                              stderr=slave, text=True, env=kept) as process:
+            os.close(slave)
+            shown = b""
+            while shown.count(b"%") < 3:
+                shown += os.read(master, 4096)
+            assert client(daemon.url, "cancel", job)[0] == 0
+            assert process.stdout.read() == job + " dismissed\n" and process.wait(20) == 1
+    os.close(master)
+    percents = [int(part.split("%")[0].split("]")[1]) for part in shown.decode().split("\r") if "%" in part]
+    assert percents == sorted(percents) and percents[-1] <= 100, shown
+
+
 def test_a_daemon_started_anew_is_found_again():
     """watch survives a restart of the daemon and sees the job's end."""
     with tempfile.TemporaryDirectory() as data, program.daemon(data=data) as daemon:
@@ -209,7 +231,7 @@ def test_wrong_words_are_usage():
                                  (("get", "r-1", "--token", "x"), "--token is no option"),
                                  (("submit", SPONGE, "--label", "x"), "KEY=VALUE"),
                                  (("submit", SPONGE, "--idempotency-key", "a\nb"), "printable"),
-                                 (("compare", "r-1"), "two results"), (("watch",), "job's id"),
+                                 (("compare", "r-1"), "ids of two results"), (("watch",), "job's id"),
                                  (("cancel", "a/b"), "job's id")):
             code, out, errors = client("http://127.0.0.1:1", *arguments)
             assert code == 2 and out == "" and words in errors and "secret" not in errors, (arguments, code, errors)

@@ -114,10 +114,14 @@ def test_real_answers_have_the_promised_shapes():
         ensemble = {"id": many["result"]}
         swept = program.finished(daemon, program.scene("sweep_frequency"))
         sweep = {"id": swept["result"], "index": "7"}
+        studies = {}
+        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity")):
+            studies[kind] = {"id": program.finished(daemon, program.scene(name))["result"]}
         values = {"/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
                   "/v1/results/{id}/points/{index}": sweep, "/v1/results/{id}/points/{index}/scene": sweep,
                   "/v1/jobs/{id}/table.{format}": {"id": swept["id"]}, "/v1/jobs/{id}/table": {"id": swept["id"]},
-                  "/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
+                  **{f"/v1/results/{{id}}/{kind}{ending}": value for kind, value in studies.items()
+                     for ending in ("", ".{format}")}, "/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
                   "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
                   "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
@@ -146,9 +150,10 @@ def test_real_answers_have_the_promised_shapes():
             formats = [p["schema"]["enum"] for p in operation.get("parameters", []) if p["name"] == "format"]
             for extension in formats[0] if formats else [None]:
                 target = path.format(**{"id": job["result"], "format": extension, **values.get(path, {})})
+                target += f"?a={job['result']}&b={studies['compare']['id']}" if path == "/v1/compare" else ""
                 call(method, path, target)
                 if "400" in operation["responses"]:
-                    call(method, path, target + "?unknown=1")
+                    call(method, path, target.split("?")[0] + "?unknown=1")
             if "404" in operation["responses"] and "{" in path:
                 call(method, path, re.sub(r"\{\w+\}", "0", path).replace(".0", ".json"))
             if "406" in operation["responses"]:
@@ -180,6 +185,15 @@ def test_real_answers_have_the_promised_shapes():
             call("GET", "/v1/jobs/{id}/table.{format}", f"/v1/jobs/{running}/table.json")
         call("GET", "/v1/jobs", "/v1/jobs")
         daemon.request("DELETE", f"/v1/jobs/{running}")
+        for value in studies.values():
+            call("GET", "/v1/results/{id}", f"/v1/results/{value['id']}")
+        call("GET", "/v1/compare", "/v1/compare?a=r-0&b=r-0")
+        measured = {"a": job["id"], "measured": {"samples": [0.1 * i for i in range(40)], "interval": 0.01}}
+        call("POST", "/v1/compare", "/v1/compare", json=measured)
+        call("POST", "/v1/compare", "/v1/compare", json={**measured, "a": "j-0"})
+        call("POST", "/v1/compare", "/v1/compare", json={"a": job["id"]})
+        call("POST", "/v1/compare", "/v1/compare", body="{", headers={"Content-Type": "application/json"})
+        call("POST", "/v1/compare", "/v1/compare", body="{}")
         scene = program.scene("paper_random_sponge")
         slow = program.scene("paper_sine_aluminium")
         slow.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
@@ -193,6 +207,7 @@ def test_real_answers_have_the_promised_shapes():
             "Location", "Retry-After", "Preference-Applied"}
         running = daemon.get("/v1/jobs").json()["jobs"][0]["id"]
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}")
+        call("GET", "/v1/compare", f"/v1/compare?a={running}&b={job['id']}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")

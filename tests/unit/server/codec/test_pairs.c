@@ -14,13 +14,17 @@
 static void every_object_with_both_sides_is_a_row(void **state) {
     (void)state;
     static const char text[] =
-        "{\"a\": \"r-1\", \"metrics\": {\"peak\": {\"a\": 1, \"b\": 2.5, \"unit\": \"m\", "
+        "{\"a\": {\"id\": \"r-1\", \"links\": {\"self\": \"/x\"}}, \"b\": {}, \"metrics\": "
+        "{\"peak\": {\"a\": 1, \"b\": 2.5, \"unit\": \"m\", "
         "\"none\": null}}, \"inputs\": [{\"pointer\": \"/x\", \"a\": null, \"b\": [1, 2]}], "
-        "\"psd\": {\"distance\": 3, \"values\": [1, 2]}}";
+        "\"psd\": {\"distance\": 3, \"values\": [1, 2]}, \"channels\": [{\"channel\": "
+        "\"velocity\", "
+        "\"rms\": 0.5, \"peak\": null}], \"more\": [{\"name\": \"buffer\", \"a\": {\"e\": 0.5}, "
+        "\"b\": 1}]}";
     Pairs pairs;
     assert_int_equal(pairs_read(text, sizeof text - 1, &pairs, NULL), STATUS_OK);
-    assert_int_equal(pairs.count, 4);
-    assert_string_equal(pairs.at[0].name, "a");
+    assert_int_equal(pairs.count, 6);
+    assert_string_equal(pairs.at[0].name, "a/id");
     assert_null(pairs.at[0].b);
     assert_string_equal(pairs.at[1].name, "peak");
     assert_string_equal(pairs.at[1].a, "1");
@@ -30,6 +34,10 @@ static void every_object_with_both_sides_is_a_row(void **state) {
     assert_string_equal(pairs.at[2].a, "-");
     assert_string_equal(pairs.at[2].b, "[1,2]");
     assert_string_equal(pairs.at[3].name, "psd/distance");
+    assert_string_equal(pairs.at[4].name, "channels/0");
+    assert_string_equal(pairs.at[4].a, "channel velocity, rms 0.5");
+    assert_string_equal(pairs.at[5].name, "buffer");
+    assert_string_equal(pairs.at[5].a, "{\"e\":0.5}");
     pairs_clear(&pairs);
     assert_int_equal(pairs.count, 0);
 }

@@ -1,0 +1,40 @@
+#include "core/study/member.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/aim.h"
+#include "core/solve/solvers.h"
+
+Status member_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
+    if (fields_copy(simulation_fields, simulation, target) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
+    Texts *sampled = &target->output.channels;
+    for (size_t i = 0; i < sampled->count; i++)
+        free(sampled->at[i]);
+    free(sampled->at);
+    *sampled = (Texts){NULL, 0};
+    return STATUS_OK;
+}
+
+Status member_settle(Simulation *target, Problem *problem) {
+    if (!aim_is_asked(target))
+        return STATUS_OK;
+    Variant *accuracy = variant_new(solver_kinds.at(0));
+    if (accuracy == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
+    variant_free(target->accuracy);
+    target->accuracy = accuracy;
+    ((AccuracyAuto *)(void *)accuracy)->metric = CHOICE_ABSENT; // as a completed scene has it
+    return STATUS_OK;
+}
+
+char *member_why(const Problem *fault) {
+    char text[sizeof(Fault)];
+    if (fault->count > 0)
+        snprintf(text, sizeof text, "%s: %s", fault->faults[0].pointer, fault->faults[0].detail);
+    else
+        snprintf(text, sizeof text, "%s", fault->detail);
+    return strdup(text);
+}

@@ -1,0 +1,24 @@
+// One run of a study: the completed scene with something changed and nothing sampled that nobody
+// looks at. Not the study. Used by the studies whose runs are scenes.
+#ifndef CORE_STUDY_MEMBER_H
+#define CORE_STUDY_MEMBER_H
+
+#include "core/simulation/simulation.h"
+
+// The scene without sampled channels; spectra and ledger as there. `target` is cleared by
+// simulation_clear in any case.
+Status member_copy(const Simulation *simulation, Simulation *target, Problem *problem);
+
+// Where an error is aimed at, each run could take another way to it, and runs would differ by their
+// ways: takes the solver that is chosen without a target.
+Status member_settle(Simulation *target, Problem *problem);
+
+// Whether a fault of one run ends the whole study.
+static inline bool member_ends_all(Status status) {
+    return status == STATUS_CANCELLED || status == STATUS_NO_MEMORY;
+}
+
+// What a fault says, with its place, as a text of the caller's. NULL without memory.
+char *member_why(const Problem *fault);
+
+#endif

@@ -1,0 +1,127 @@
+// GET /v1/compare: two results side by side. Statistics and inputs come from what was stored,
+// motions and spectra from the outcomes, which a worker may have to compute anew. Where another
+// engine made one, the rest is compared without them.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/api/app.h"
+#include "server/api/compare_parts.h"
+#include "server/api/compare_side.h"
+#include "server/base/link.h"
+#include "server/codec/differ.h"
+#include "server/codec/report.h"
+#include "server/http/reply.h"
+
+static void put_side(Bytes *bytes, const char *name, const ResultRow *row) {
+    bytes_format(bytes, "\"%s\": {\"id\": \"%s\", \"engine\": ", name, row->id);
+    bytes_json_string(bytes, row->engine);
+    bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/results/%s\"}}", link_base(), row->id);
+}
+
+// Without outcomes (NULL), what is of series and spectra is null, and `gone` says why.
+static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const Summary summaries[2],
+                        const char *gone) {
+    const double horizons[2] = {summaries[0].trust_horizon, summaries[1].trust_horizon};
+    if (gone != NULL) {
+        bytes_text(bytes, ", \"channels\": null, \"divergence\": null, \"psd\": null, "
+                          "\"warnings\": [");
+        compare_put_warning(bytes, "series and spectra are not compared: %s", gone);
+        bytes_text(bytes, "]");
+        return;
+    }
+    const Outcome *a = outcomes[0], *b = outcomes[1];
+    bytes_text(bytes, ", ");
+    compare_put_motions(bytes, &a->response, &b->response, horizons);
+    bytes_text(bytes, ", \"psd\": ");
+    compare_put_spectra(bytes, &a->spectrum, &b->spectrum);
+    bytes_text(bytes, ", \"warnings\": [");
+    compare_warn(bytes, &a->response, &b->response, &a->spectrum, &b->spectrum);
+    bytes_text(bytes, "]");
+}
+
+static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const outcomes[SIDES],
+                               const char *gone, Reply *reply, Problem *problem) {
+    Summary summaries[2];
+    Differences differences = {0};
+    Bytes bytes = {.most = app->reply_most};
+    for (int i = 0; i < 2; i++)
+        TRY(report_read(rows[i].summary, summary_fields, &summaries[i], problem));
+    // A study asks more of a scene; what is compared is the scene's own run.
+    Status status = differ_json(rows[0].scene, rows[1].scene, "study", &differences, problem);
+    if (status == STATUS_OK) {
+        bytes_text(&bytes, "{");
+        put_side(&bytes, "a", &rows[0]);
+        bytes_text(&bytes, ", ");
+        put_side(&bytes, "b", &rows[1]);
+        bytes_text(&bytes, ", \"inputs\": ");
+        differences_write(&bytes, &differences);
+        bytes_format(&bytes, ", \"more_inputs\": %zu, \"metrics\": ", differences.more);
+        compare_put_metrics(&bytes, &summaries[0], &summaries[1]);
+        put_motions(&bytes, outcomes, summaries, gone);
+        bytes_text(&bytes, "}\n");
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    differences_clear(&differences);
+    bytes_clear(&bytes);
+    return status;
+}
+
+static Status show(App *app, char results[2][72], Outcome *const outcomes[SIDES], const char *gone,
+                   Reply *reply, Problem *problem) {
+    ResultRow rows[2] = {{.id = ""}, {.id = ""}};
+    Status status = STATUS_OK;
+    for (int i = 0; i < 2 && status == STATUS_OK; i++)
+        status = store_result_load(app->store, results[i], &rows[i], problem);
+    if (status == STATUS_OK && (rows[0].scene == NULL || rows[1].scene == NULL ||
+                                rows[0].summary == NULL || rows[1].summary == NULL))
+        status = problem_set(problem, STATUS_INTERNAL, "a stored result is not whole");
+    if (status == STATUS_OK)
+        status = write_comparison(app, rows, outcomes, gone, reply, problem);
+    for (int i = 0; i < 2; i++)
+        result_row_clear(&rows[i]);
+    return status;
+}
+
+static Status compare(App *app, const Request *request, Sides *sides, Reply *reply,
+                      Problem *problem) {
+    static const char *const names[2] = {"a", "b"};
+    char results[2][72], tag[104];
+    for (int i = 0; i < 2; i++) {
+        const char *id = request_query(request, names[i]);
+        if (id == NULL || *id == '\0')
+            return problem_set(problem, STATUS_USAGE,
+                               "\"%s\" is missing: /v1/compare?a=ID&b=ID takes two results or "
+                               "finished jobs",
+                               names[i]);
+        TRY(side_resolve(app, names[i], id, results[i], problem));
+    }
+    snprintf(tag, sizeof tag, "%.34s-%.34s-compare", results[0], results[1]);
+    if (reply_immutable(reply, request, tag))
+        return STATUS_OK;
+    bool is_waiting;
+    Problem *fault = calloc(1, sizeof *fault);
+    if (fault == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the comparison");
+    Status status = sides_outcomes(app, request, reply, 2, results, sides, &is_waiting, fault);
+    if (status == STATUS_GONE) {
+        // Another program may have the series: this answer is not for ever.
+        reply->is_immutable = false;
+        reply->etag[0] = reply->cache_control[0] = '\0';
+        status = show(app, results, sides->outcomes, fault->detail, reply, problem);
+    } else if (status != STATUS_OK) {
+        (void)problem_set(problem, status, "%s", fault->detail);
+    } else if (!is_waiting) {
+        status = show(app, results, sides->outcomes, NULL, reply, problem);
+    }
+    free(fault);
+    return status;
+}
+
+Status compare_results(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Sides sides = sides_begin(request);
+    const Status status = compare(app, request, &sides, reply, problem);
+    sides_end(&sides);
+    return status;
+}

@@ -1,0 +1,194 @@
+// POST /v1/compare: a result beside a measured motion. The measured samples are moved by a shift in
+// time, given or found by cross-correlation, and both are looked at over their common span at the
+// samples of the coarser one.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/excite/record.h"
+#include "server/api/app.h"
+#include "server/api/compare_parts.h"
+#include "server/api/compare_side.h"
+#include "server/base/link.h"
+#include "server/codec/read.h"
+#include "server/codec/write.h"
+#include "server/http/body.h"
+#include "server/http/reply.h"
+
+enum { SEGMENT = 4096, SAMPLES_LEAST = 16 };
+
+typedef enum Quantity { QUANTITY_ACCELERATION, QUANTITY_VELOCITY, QUANTITY_DISPLACEMENT } Quantity;
+static const char *const quantity_names[] = {"acceleration", "velocity", "displacement", NULL};
+static const char *const quantity_units[] = {"m/s^2", "m/s", "m"};
+
+typedef enum Align { ALIGN_GIVEN, ALIGN_AUTO } Align;
+static const char *const align_names[] = {"given", "auto", NULL};
+
+typedef struct Measured {
+    Reals samples;
+    double interval, start; // [s]
+    int quantity;           // Quantity
+} Measured;
+
+typedef struct MeasuredRequest {
+    char *a;
+    char *channel;
+    Measured measured;
+    int align;         // Align
+    double shift;      // [s]
+    double most_shift; // [s]
+} MeasuredRequest;
+
+// clang-format off
+static const Field measured_fields[] = {
+    FIELD_REALS(Measured, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
+    FIELD_REAL(Measured, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
+    FIELD_REAL(Measured, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
+    FIELD_CHOICE(Measured, quantity, quantity_names, QUANTITY_ACCELERATION, "what was measured"),
+    FIELD_END
+};
+
+static const Field request_fields[] = {
+    FIELD_TEXT(MeasuredRequest, a, 80, PRESENCE_REQUIRED, 0, "a result or a finished job"),
+    FIELD_TEXT(MeasuredRequest, channel, 64, PRESENCE_OPTIONAL, 0, "the result's channel; if absent the quantity's, or for an acceleration mean_acceleration where that alone was sampled"),
+    FIELD_ITEM(MeasuredRequest, measured, measured_fields, NULL, PRESENCE_DEFAULT, "the measurement"),
+    FIELD_CHOICE(MeasuredRequest, align, align_names, ALIGN_GIVEN, "given: by shift; auto: the shift at which both correlate best"),
+    FIELD_REAL(MeasuredRequest, shift, "s", WITHIN(-1e9, 1e9), 0, "that the measured samples are moved by to later times, under given"),
+    FIELD_REAL(MeasuredRequest, most_shift, "s", ABOVE(0), OPTIONAL, "under auto, within which it is sought; anywhere if absent"),
+    FIELD_END
+};
+// clang-format on
+
+static void release(void *asked) {
+    fields_clear(request_fields, asked);
+    free(asked);
+}
+
+// Into what is kept while the request sleeps.
+static Status request_read(const Request *request, Sides *sides, Problem *problem) {
+    TRY(body_require_json(request, problem));
+    MeasuredRequest *asked = calloc(1, sizeof *asked);
+    if (asked == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
+    sides->asked = asked;
+    sides->release = release;
+    TRY(read_json(request->body, request->body_size, request_fields, asked, problem));
+    TRY(fields_check(request_fields, asked, "", problem));
+    if (asked->measured.samples.count < SAMPLES_LEAST)
+        return problem_add(problem, STATUS_INVALID, "/measured/samples",
+                           "must be at least %d samples, are %zu", SAMPLES_LEAST,
+                           asked->measured.samples.count);
+    return STATUS_OK;
+}
+
+static Status refuse_channel(const MeasuredRequest *asked, const Response *response,
+                             Problem *problem) {
+    char there[200] = "";
+    for (size_t i = 0; i < response->series.count; i++) {
+        const Column *column = &response->series.at[i];
+        const size_t used = strlen(there);
+        if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0 &&
+            used + sizeof column->name + 2 < sizeof there)
+            snprintf(there + used, sizeof there - used, "%s%s", used > 0 ? ", " : "", column->name);
+    }
+    return problem_add(problem, STATUS_INVALID, "/channel",
+                       "must be a sampled channel in %s; the result has: %s",
+                       quantity_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
+}
+
+static Status choose_channel(const MeasuredRequest *asked, const Response *response,
+                             const Column **column, Problem *problem) {
+    const int quantity = asked->measured.quantity;
+    *column = columns_find(&response->series,
+                           asked->channel != NULL ? asked->channel : quantity_names[quantity]);
+    if (*column == NULL && asked->channel == NULL && quantity == QUANTITY_ACCELERATION)
+        *column = columns_find(&response->series, "mean_acceleration");
+    return *column != NULL && strcmp((*column)->unit, quantity_units[quantity]) == 0
+               ? STATUS_OK
+               : refuse_channel(asked, response, problem);
+}
+
+// Both spectra by the same method, of the common span.
+static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectrum,
+                              Problem *problem) {
+    static const char *const units[2] = {"", ""};
+    Columns pair = {0};
+    double rate;
+    TRY(likeness_pair(a, b, SAMPLES_LEAST, &pair, &rate, problem));
+    columns_name(&pair, 0, "a", "");
+    columns_name(&pair, 1, "measured", "");
+    const size_t segment = pair.rows < SEGMENT ? pair.rows : SEGMENT;
+    const SpectrumSettings settings = {segment, segment / 2, WINDOW_HANN, DETREND_CONSTANT};
+    const Status status =
+        spectrum_welch(&pair, units, rate, &settings, NULL, NULL, spectrum, problem);
+    columns_clear(&pair);
+    return status;
+}
+
+static void write_answer(Bytes *bytes, const char *result, const Column *column,
+                         const MeasuredRequest *asked, double shift, const Signal *a,
+                         const Signal *b, const Spectrum *spectrum) {
+    const Likeness likeness = likeness_measure(a, b, COMPARE_PART);
+    const Distance distance =
+        distance_measure(spectrum, spectrum->densities.at[0].values, spectrum,
+                         spectrum->densities.at[1].values, (double)NAN, (double)NAN);
+    bytes_format(bytes,
+                 "{\"a\": {\"id\": \"%s\", \"links\": {\"self\": \"%s/v1/results/%s\"}}, "
+                 "\"channel\": ",
+                 result, link_base(), result);
+    bytes_json_string(bytes, column->name);
+    bytes_text(bytes, ", \"unit\": ");
+    bytes_json_string(bytes, column->unit);
+    bytes_format(bytes, ", \"align\": \"%s\", \"shift\": ", align_names[asked->align]);
+    bytes_real(bytes, shift);
+    bytes_text(bytes, ", \"motion\": ");
+    write_item(bytes, likeness_fields, &likeness, WRITE_REPORT);
+    bytes_format(bytes, ", \"psd\": {\"segment\": %zu, ", spectrum->settings.segment);
+    write_members(bytes, distance_fields, &distance, WRITE_REPORT);
+    bytes_text(bytes, "}, \"warnings\": [");
+    if (b->rate > a->rate * (1 + 1e-9))
+        compare_put_warning(bytes,
+                            "the measurement has %g samples a second, the result %g: what is "
+                            "faster than the result's samples is not filtered off",
+                            b->rate, a->rate);
+    bytes_text(bytes, "]}\n");
+}
+
+static Status compare(App *app, const char *result, const MeasuredRequest *asked,
+                      const Outcome *outcome, Reply *reply, Problem *problem) {
+    const Response *response = &outcome->response;
+    const Measured *measured = &asked->measured;
+    const Column *column;
+    TRY(choose_channel(asked, response, &column, problem));
+    const Signal a = {column->values, response->count, response->sample_rate, 0};
+    Signal b = {measured->samples.at, measured->samples.count, 1 / measured->interval,
+                measured->start};
+    double shift = asked->shift;
+    const double longest = (double)a.count / a.rate + (double)b.count / b.rate + fabs(b.start);
+    if (asked->align == ALIGN_AUTO)
+        TRY(likeness_shift(&a, &b, fmin(asked->most_shift, longest), &shift, problem));
+    b.start += shift;
+    Spectrum spectrum = {0};
+    Bytes bytes = {.most = app->reply_most};
+    TRY(measure_spectra(&a, &b, &spectrum, problem));
+    write_answer(&bytes, result, column, asked, shift, &a, &b, &spectrum);
+    spectrum_clear(&spectrum);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+Status compare_measured(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Sides sides = sides_begin(request);
+    char results[1][72];
+    bool is_waiting = false;
+    Status status = sides.asked == NULL ? request_read(request, &sides, problem) : STATUS_OK;
+    const MeasuredRequest *asked = sides.asked;
+    if (status == STATUS_OK)
+        status = side_resolve(app, "a", asked->a, results[0], problem);
+    if (status == STATUS_OK)
+        status = sides_outcomes(app, request, reply, 1, results, &sides, &is_waiting, problem);
+    if (status == STATUS_OK && !is_waiting)
+        status = compare(app, results[0], asked, sides.outcomes[0], reply, problem);
+    sides_end(&sides);
+    return status;
+}

@@ -1,0 +1,12 @@
+// Reads back what was written in the style of reports, where null stands for what is not known.
+// Not a reader of what clients send: that is read.h. Used by api/compare.c.
+#ifndef SERVER_CODEC_REPORT_H
+#define SERVER_CODEC_REPORT_H
+
+#include "core/base/field.h"
+
+// One object of numbers and texts; `item` gets its defaults first and is clearable in any case.
+// STATUS_INTERNAL: it is not what was written.
+Status report_read(const char *text, const Field *fields, void *item, Problem *problem);
+
+#endif

@@ -1,0 +1,207 @@
+#include "server/encode/plot.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "server/encode/svg.h"
+
+enum { COLUMNS = 1300, DECADES = 8, TICKS = 12 };
+
+static const char *const light[PLOT_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#a8509a",
+                                                "#7a6a00", "#444444", "#b0003a", "#3f51b5"};
+static const char *const dark[PLOT_COLOURS] = {"#56b4e9", "#f0944d", "#3ad1a4", "#e29ad0",
+                                               "#e0cf50", "#c8c8c8", "#ff7a9c", "#9fa8ff"};
+
+void plot_style(Bytes *bytes) {
+    bytes_text(bytes,
+               "svg { font: 12px system-ui, sans-serif; color-scheme: light dark; }\n"
+               ".page { fill: #ffffff; } text { fill: #222222; }\n"
+               ".grid { stroke: #dddddd; fill: none; } .frame { stroke: #777777; fill: none; }\n"
+               ".line { fill: none; stroke-width: 1.5; } .band { fill-opacity: 0.4; }\n");
+    for (size_t i = 0; i < PLOT_COLOURS; i++)
+        bytes_format(bytes, ".line.s%zu { stroke: %s; } .band.s%zu { fill: %s; }\n", i, light[i], i,
+                     light[i]);
+    bytes_text(bytes, "@media (prefers-color-scheme: dark) {\n"
+                      ".page { fill: #16181c; } text { fill: #e4e4e4; } .grid { stroke: #363a41; } "
+                      ".frame { stroke: #8a8f98; }\n");
+    for (size_t i = 0; i < PLOT_COLOURS; i++)
+        bytes_format(bytes, ".line.s%zu { stroke: %s; } .band.s%zu { fill: %s; }\n", i, dark[i], i,
+                     dark[i]);
+    bytes_text(bytes, "}\n");
+}
+
+void plot_begin(Plot *plot) {
+    plot->x_least = plot->y_least = DBL_MAX;
+    plot->x_most = plot->y_most = -DBL_MAX;
+}
+
+static bool is_shown(const Plot *plot, double x, double y) {
+    return isfinite(x) && isfinite(y) && (!plot->is_logarithmic || (x > 0 && y > 0));
+}
+
+void plot_fit(Plot *plot, const Reals *x, const Reals *y) {
+    for (size_t i = 0; i < x->count && i < y->count; i++) {
+        if (!is_shown(plot, x->at[i], y->at[i]))
+            continue;
+        plot->x_least = fmin(plot->x_least, x->at[i]);
+        plot->x_most = fmax(plot->x_most, x->at[i]);
+        plot->y_least = fmin(plot->y_least, y->at[i]);
+        plot->y_most = fmax(plot->y_most, y->at[i]);
+    }
+}
+
+static double x_of(const Plot *plot, double x) {
+    const double share = plot->is_logarithmic
+                             ? log(x / plot->x_least) / log(plot->x_most / plot->x_least)
+                             : (x - plot->x_least) / (plot->x_most - plot->x_least);
+    return plot->left + (plot->right - plot->left) * share;
+}
+
+static double y_of(const Plot *plot, double y) {
+    double share = (y - plot->y_least) / (plot->y_most - plot->y_least);
+    if (plot->is_logarithmic)
+        share = y > 0 ? log(y / plot->y_least) / log(plot->y_most / plot->y_least) : 0;
+    return plot->bottom - (plot->bottom - plot->top) * fmin(fmax(share, 0), 1);
+}
+
+static void put_tick(const Plot *plot, bool is_x, double value, bool is_decade, int decade) {
+    Bytes *bytes = plot->bytes;
+    const double at = is_x ? x_of(plot, value) : y_of(plot, value);
+    if (is_x && (at < plot->left - 0.5 || at > plot->right + 0.5))
+        return;
+    if (is_x)
+        bytes_format(bytes,
+                     "<path class=\"grid\" d=\"M%.1f %.0fV%.0f\"/><text x=\"%.1f\" y=\"%.0f\" "
+                     "text-anchor=\"middle\">",
+                     at, plot->top, plot->bottom, at, plot->bottom + 18);
+    else
+        bytes_format(bytes,
+                     "<path class=\"grid\" d=\"M%.0f %.1fH%.0f\"/><text x=\"%.0f\" y=\"%.1f\" "
+                     "text-anchor=\"end\">",
+                     plot->left, at, plot->right, plot->left - 8, at + 4);
+    if (is_decade)
+        svg_power(bytes, decade);
+    else
+        bytes_format(bytes, "%.4g", value);
+    bytes_text(bytes, "</text>\n");
+}
+
+static void put_decades(const Plot *plot, bool is_x, int from, int to) {
+    for (int d = from; d <= to; d++)
+        put_tick(plot, is_x, pow(10, d), true, d);
+}
+
+// 1, 2 or 5 times a power of ten.
+static double tick_step(double span) {
+    const double power = pow(10, floor(log10(span / 4)));
+    const double rest = span / 4 / power;
+    return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
+}
+
+static void put_steps(const Plot *plot, bool is_x) {
+    const double from = is_x ? plot->x_least : plot->y_least;
+    const double to = is_x ? plot->x_most : plot->y_most, step = tick_step(to - from);
+    const double first = ceil(from / step - 1e-9);
+    for (int i = 0; i < TICKS && (first + i) * step <= to + 1e-9 * step; i++)
+        put_tick(plot, is_x, (first + i) * step, false, 0);
+}
+
+bool plot_axes(Plot *plot) {
+    if (!(plot->x_most > plot->x_least))
+        return false;
+    if (plot->is_logarithmic) {
+        int x_from, x_to, y_from, y_to;
+        svg_decades(plot->y_least, plot->y_most, &y_from, &y_to);
+        if (y_from < y_to - DECADES)
+            y_from = y_to - DECADES;
+        plot->y_least = pow(10, y_from);
+        plot->y_most = pow(10, y_to);
+        svg_decades(plot->x_least, plot->x_most, &x_from, &x_to);
+        put_decades(plot, true, x_from, x_to);
+        put_decades(plot, false, y_from, y_to);
+    } else {
+        const double room = plot->y_most > plot->y_least ? 0.05 * (plot->y_most - plot->y_least)
+                                                         : fmax(fabs(plot->y_most), 1);
+        plot->y_least -= room;
+        plot->y_most += room;
+        put_steps(plot, true);
+        put_steps(plot, false);
+    }
+    bytes_format(plot->bytes,
+                 "<rect class=\"frame\" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"/>\n"
+                 "<text x=\"%.0f\" y=\"%.0f\" text-anchor=\"middle\">",
+                 plot->left, plot->top, plot->right - plot->left, plot->bottom - plot->top,
+                 (plot->left + plot->right) / 2, plot->bottom + 36);
+    svg_text(plot->bytes, plot->x_title);
+    bytes_text(plot->bytes, "</text>\n");
+    return true;
+}
+
+// Points of the page, from left to right.
+typedef struct Curve {
+    double x[COLUMNS], y[COLUMNS];
+    size_t count;
+} Curve;
+
+static void curve_make(const Plot *plot, const Reals *x, const Reals *y, Curve *curve) {
+    const double column = (plot->right - plot->left) / (COLUMNS / 2);
+    const size_t count = x->count < y->count ? x->count : y->count;
+    size_t k = 0;
+    curve->count = 0;
+    while (k < count && !(x->at[k] >= plot->x_least))
+        k++;
+    while (k < count && curve->count < COLUMNS) {
+        const double from = x_of(plot, x->at[k]);
+        double along = 0, sum = 0, among = 0;
+        for (; k < count && x->at[k] <= plot->x_most; k++) {
+            const double at = x_of(plot, x->at[k]);
+            if (at - from > column)
+                break;
+            along += at;
+            sum += y->at[k];
+            among++;
+        }
+        if (among == 0)
+            break;
+        curve->x[curve->count] = along / among;
+        curve->y[curve->count++] = y_of(plot, sum / among);
+    }
+}
+
+static void put_points(Bytes *bytes, const Curve *curve) {
+    for (size_t i = 0; i < curve->count; i++)
+        bytes_format(bytes, "%s%.1f %.1f", i == 0 ? "M" : "L", curve->x[i], curve->y[i]);
+}
+
+void plot_line(const Plot *plot, const Reals *x, const Reals *y, size_t colour, const char *title) {
+    Curve curve;
+    curve_make(plot, x, y, &curve);
+    bytes_format(plot->bytes, "<path class=\"line s%zu\" d=\"", colour % PLOT_COLOURS);
+    put_points(plot->bytes, &curve);
+    bytes_text(plot->bytes, "\"><title>");
+    svg_text(plot->bytes, title != NULL ? title : "");
+    bytes_text(plot->bytes, "</title></path>\n");
+}
+
+void plot_band(const Plot *plot, const Reals *x, const Reals *low, const Reals *high,
+               size_t colour) {
+    Curve curve;
+    curve_make(plot, x, high, &curve);
+    bytes_format(plot->bytes, "<path class=\"band s%zu\" d=\"", colour % PLOT_COLOURS);
+    put_points(plot->bytes, &curve);
+    curve_make(plot, x, low, &curve);
+    for (size_t i = curve.count; i-- > 0;)
+        bytes_format(plot->bytes, "L%.1f %.1f", curve.x[i], curve.y[i]);
+    bytes_text(plot->bytes, "z\"/>\n");
+}
+
+void plot_legend(const Plot *plot, size_t line, size_t colour, const char *text) {
+    const double y = plot->top + 18 + 18 * (double)line;
+    const double x = plot->legend > 0 ? plot->legend : plot->right - 38;
+    bytes_format(plot->bytes,
+                 "<path class=\"line s%zu\" d=\"M%.0f %.0fh20\"/><text x=\"%.0f\" y=\"%.0f\" "
+                 "text-anchor=\"end\">",
+                 colour % PLOT_COLOURS, x + 8, y, x, y + 4);
+    svg_text(plot->bytes, text);
+    bytes_text(plot->bytes, "</text>\n");
+}
