@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 POINTS, KILLS = 6000, 6
-DURATION = 20  # of a scene [s]: the sweep is some seconds of CPU, in some twenty chunks
+DURATION = 12  # of a scene [s]: the sweep is some seconds of CPU, in a dozen chunks or more
 
 
 def scene(duration):
