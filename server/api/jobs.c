@@ -141,6 +141,22 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
     job_show_clear(&show);
 }
 
+static Status refuse_stopping(App *app, Problem *problem) {
+    return !atomic_load(&app->is_stopping)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_BUSY,
+                             "the daemon is stopping and takes no new jobs; try again when it is "
+                             "back");
+}
+
+static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,
+                     Job **job, Problem *problem) {
+    const Status status = intake_submit(app->intake, submission, job, problem);
+    if (status == STATUS_BUSY || status == STATUS_QUOTA)
+        reply->retry_after = intake_retry_after(app->intake, request->client, status);
+    return status;
+}
+
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
@@ -151,10 +167,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
         TRY(body_require_json(request, problem));
         if (is_dry)
             return dry_run(app, request, reply, problem);
-        if (atomic_load(&app->is_stopping))
-            return problem_set(problem, STATUS_BUSY,
-                               "the daemon is stopping and takes no new jobs; try again when it "
-                               "is back");
+        TRY(refuse_stopping(app, problem));
         const Submission submission = {.text = request->body,
                                        .size = request->body_size,
                                        .client = request->client,
@@ -168,10 +181,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
             return STATUS_OK;
         }
         const uint64_t mark = intake_mark(app->intake);
-        const Status status = intake_submit(app->intake, &submission, &job, problem);
-        if (status == STATUS_BUSY || status == STATUS_QUOTA)
-            reply->retry_after = intake_retry_after(app->intake, request->client, status);
-        TRY(status);
+        TRY(submit(app, request, &submission, reply, &job, problem));
         if (!reply->is_replayed)
             learn(app, &submission, mark, job);
     }
@@ -219,4 +229,23 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
+}
+
+Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    bool is_paused;
+    if (request->kept != NULL) {
+        job = pause_end(request->kept, reply);
+    } else {
+        const Submission submission = {.retry_of = request->parameters[0],
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
+        TRY(refuse_stopping(app, problem));
+        TRY(submit(app, request, &submission, reply, &job, problem));
+    }
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
+    return reply_job(app, reply, job, 202, problem);
 }
