@@ -33,9 +33,9 @@ static Status judge_engine(Intake *intake, const SweepRow *row, Problem *problem
         intake_result_id(&inquiry, result);
     if (status == STATUS_OK && strcmp(result, row->result) != 0)
         status = problem_set(problem, STATUS_GONE,
-                             "the sweep was made by another engine version, this is %s: submit its "
-                             "scene anew",
-                             engine_version);
+                             "the sweep was made by another engine version, this is %s: POST to "
+                             "/v1/results/%.72s/again, which submits its scene anew",
+                             engine_version, row->result);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
