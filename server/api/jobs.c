@@ -164,7 +164,7 @@ static Status submit(App *app, const Request *request, const Submission *submiss
     const Status status = intake_submit(app->intake, submission, job, problem);
     if (status == STATUS_BUSY || status == STATUS_QUOTA)
         reply->retry_after = intake_retry_after(app->intake, request->client, status);
-    if (status == STATUS_OK && !reply->is_replayed)
+    if (status == STATUS_OK && !reply->is_replayed && submission->retry_of == NULL)
         learn(app, submission, mark, *job);
     return status;
 }
@@ -287,4 +287,23 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
+}
+
+Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    bool is_paused;
+    if (request->kept != NULL) {
+        job = pause_end(request->kept, reply);
+    } else {
+        const Submission submission = {.retry_of = request->parameters[0],
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
+        TRY(refuse_stopping(app, problem));
+        TRY(submit(app, request, &submission, reply, &job, problem));
+    }
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
+    return reply_job(app, reply, job, 202, problem);
 }

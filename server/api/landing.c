@@ -43,6 +43,11 @@ static const Step steps[] = {
      "@/v1/jobs | " RESULT ")"},
     {NULL, "curl -s -O @/v1/results/$R/ensemble.svg"},
     {NULL, "curl -s @/v1/results/$R/ensemble.csv"},
+    {"The scene at many points, and one point's own series:",
+     "R=$(curl -s @/v1/examples/sweep_clearance_buffer | curl -s -H 'Prefer: wait=30' --json @- "
+     "@/v1/jobs | " RESULT ")"},
+    {NULL, "curl -s @/v1/results/$R/table.csv"},
+    {NULL, "curl -s @/v1/results/$R/points/17/scene | curl -s --json @- @/v1/jobs"},
     {"Where tokens are asked for, every line needs this too:",
      "curl -s -H \"Authorization: Bearer $IMPACTD_TOKEN\" @/v1/jobs"},
     {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
