@@ -20,6 +20,13 @@ const char no_impacts[] =
     "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
     "energy.json; with \"output\": {\"impacts\": true} they are listed";
 
+void results_link_gone(const char *id, Reply *reply) {
+    snprintf(reply->link, sizeof reply->link,
+             "</v1/results/%.72s/again>; rel=\"successor-version\"; title=\"POST submits the scene "
+             "anew\", </v1/results/%.72s/manifest>; rel=\"describedby\"",
+             id, id);
+}
+
 // The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
 // case.
 static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *problem) {

@@ -1,5 +1,5 @@
-// Parameters and columns are looked up by name in the table: a row has a dozen of them, so a walk
-// is cheaper than anything cleverer.
+// Parameters and columns are looked up by name in the table; parameters once for each statement,
+// which is bound many thousand times a second.
 #include "server/store/row.h"
 
 #include <math.h>
@@ -51,16 +51,31 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
     return SQLITE_MISUSE;
 }
 
-Status row_bind(Statement *statement, const RowColumn *columns, const void *item,
-                Problem *problem) {
-    const int count = sqlite3_bind_parameter_count(statement);
-    for (int index = 1; index <= count; index++) {
-        const char *name = sqlite3_bind_parameter_name(statement, index);
-        const RowColumn *column = name == NULL ? NULL : column_find(columns, name + 1);
-        if (column == NULL)
+static Status find_all(Statement *statement, const RowColumn *columns, RowMap *map,
+                       Problem *problem) {
+    map->columns = NULL;
+    map->count = sqlite3_bind_parameter_count(statement);
+    if (map->count > ROW_PARAMETERS)
+        return problem_set(problem, STATUS_INTERNAL, "more than %d parameters of a statement",
+                           ROW_PARAMETERS);
+    for (int i = 0; i < map->count; i++) {
+        const char *name = sqlite3_bind_parameter_name(statement, i + 1);
+        map->of[i] = name == NULL ? NULL : column_find(columns, name + 1);
+        if (map->of[i] == NULL)
             return problem_set(problem, STATUS_INTERNAL, "no member for the parameter %s",
                                name == NULL ? "?" : name);
-        const int code = bind(statement, index, column, (const char *)item + column->offset);
+    }
+    map->columns = columns;
+    return STATUS_OK;
+}
+
+Status row_bind(Statement *statement, RowMap *map, const RowColumn *columns, const void *item,
+                Problem *problem) {
+    if (map->columns == NULL || map->columns != columns)
+        TRY(find_all(statement, columns, map, problem));
+    for (int i = 0; i < map->count; i++) {
+        const RowColumn *column = map->of[i];
+        const int code = bind(statement, i + 1, column, (const char *)item + column->offset);
         if (code == SQLITE_TOOBIG)
             return problem_set(problem, STATUS_TOO_LARGE,
                                "%s is too long to be stored, a billion bytes at most",

@@ -275,7 +275,7 @@ def core_rate(build, kind):
 def idle_scene():
     """One that computes next to nothing."""
     scene = sponge(duration=0.002, output={"channels": [], "psd": None, "impacts": False}, dampers=[])
-    scene["excitation"]["displacement"] = 0.0000424242
+    scene["excitation"]["displacement"] = 0.0010424242
     return scene
 
 

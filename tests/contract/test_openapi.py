@@ -184,6 +184,8 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/jobs", "/v1/jobs", body=b" " * (1 << 24) + b"x", headers={"Content-Type": "application/json"})
         assert call("POST", "/v1/jobs", "/v1/jobs", json=slow, headers={"Prefer": "respond-async"}) == {
             "Location", "Retry-After", "Preference-Applied"}
+        call("POST", "/v1/results/{id}/again", f"/v1/results/{job['result']}/again")
+        call("POST", "/v1/results/{id}/again", "/v1/results/r-0/again")
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json=scene)
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json={**scene, "duration": 61})
         running = daemon.get("/v1/jobs").json()["jobs"][0]["id"]
