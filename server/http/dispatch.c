@@ -165,9 +165,14 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
         return false;
     const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
-    if ((!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) &&
-        !hot_find(dispatcher->hot, request->target, false, reply, route))
-        return false;
+    if (!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) {
+        if (!hot_find(dispatcher->hot, request->target, false, reply, route))
+            return false;
+        if (takes_gzip && reply->varies_by_encoding) {
+            reply_clear(reply); // it is made once more, to be packed
+            return false;
+        }
+    }
     Problem problem;
     problem_clear(&problem);
     Status status = doorman_admit(dispatcher->doorman, request->route->scope, request, &problem);

@@ -3,6 +3,7 @@
 
 import concurrent.futures
 import csv
+import gzip
 import http.client
 import io
 import json
@@ -304,6 +305,21 @@ def test_parts_of_binary_formats():
         assert daemon.get(path, headers={"Range": "bytes=0-1,4-5"}).body == whole
         text = path.replace("npy", "csv")
         assert daemon.get(text, headers={"Range": "bytes=0-1"}).status == 200
+
+
+def test_text_is_packed_for_whoever_asks():
+    """Also when somebody else had it plain before, and the other way round."""
+    with program.daemon() as daemon:
+        result = "/v1/results/" + daemon.submit(sponge()).json()["result"]
+        for path in (result, f"{result}/series.json", f"{result}/psd.csv"):
+            plain = daemon.get(path)
+            for _ in range(2):
+                packed = daemon.get(path, headers={"Accept-Encoding": "gzip"})
+                assert packed.headers.get("content-encoding") == "gzip", (path, packed.headers)
+                assert packed.headers["etag"] != plain.headers["etag"]
+                assert gzip.decompress(packed.body) == plain.body
+                again = daemon.get(path)
+                assert "content-encoding" not in again.headers and again.body == plain.body
 
 
 def test_materials_are_listed_and_shown():
