@@ -141,6 +141,21 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
     job_show_clear(&show);
 }
 
+// How long the client would wait, told in the reply.
+static double read_wait(const Request *request, Reply *reply) {
+    const Prefer prefer = header_prefer(request->prefer);
+    double wait = prefer.responds_async ? 0 : wait_initial;
+    char applied[24] = "";
+    if (prefer.has_wait) {
+        wait = prefer.wait < wait_most ? prefer.wait : wait_most;
+        snprintf(applied, sizeof applied, "wait=%.4g", wait);
+    }
+    snprintf(reply->preference_applied, sizeof reply->preference_applied, "%s%s%s",
+             prefer.responds_async ? "respond-async" : "",
+             prefer.responds_async && prefer.has_wait ? ", " : "", applied);
+    return wait;
+}
+
 Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     if (request->kept != NULL) {
@@ -165,6 +180,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
             reply_borrow(reply, 200, type_json, known.body, known.size);
             reply->release = free;
             reply->context = known.body;
+            (void)read_wait(request, reply);
             return STATUS_OK;
         }
         const uint64_t mark = intake_mark(app->intake);
@@ -176,22 +192,12 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
             learn(app, &submission, mark, job);
     }
 
-    const Prefer prefer = header_prefer(request->prefer);
-    double wait = prefer.responds_async ? 0 : wait_initial;
-    if (prefer.has_wait)
-        wait = prefer.wait < wait_most ? prefer.wait : wait_most;
-    if (pause_begin(request, reply, job, wait))
+    if (pause_begin(request, reply, job, read_wait(request, reply)))
         return STATUS_OK;
     bool is_paused;
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)
         return STATUS_OK;
-    char applied[24] = "";
-    if (prefer.has_wait)
-        snprintf(applied, sizeof applied, "wait=%.4g", wait);
-    snprintf(reply->preference_applied, sizeof reply->preference_applied, "%s%s%s",
-             prefer.responds_async ? "respond-async" : "",
-             prefer.responds_async && prefer.has_wait ? ", " : "", applied);
     return reply_job(app, reply, job, 0, problem);
 }
 

@@ -117,7 +117,6 @@ static void close_up(const Dispatcher *dispatcher, Request *request, Status stat
 
 static const Route *find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans,
                          size_t *count, char allow[64]) {
-    request->path = link_inside(request->path);
     request->route =
         route_find(dispatcher->table, request->method, request->path, spans, count, allow);
     return request->route;

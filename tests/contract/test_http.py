@@ -110,6 +110,11 @@ def test_waiting_follows_prefer():
             assert time.monotonic() - began < 2, "a waiter is woken at once"
         problem(daemon.request("DELETE", f"/v1/jobs/{job['id']}"), 409)
 
+        for _ in range(4):  # computed, from memory, by its body
+            for preference in ("wait=1", "respond-async"):
+                reply = daemon.submit(sponge(), headers={"Prefer": preference})
+                assert reply.headers.get("preference-applied") == preference, reply.headers
+
 
 def test_jobs_are_listed_by_pages():
     """GET /v1/jobs: newest first, and Link next leads through all of them."""
@@ -125,7 +130,7 @@ def test_jobs_are_listed_by_pages():
             path = link[1] if link else None
         assert seen == ids[::-1], (seen, ids)
         problem(daemon.get("/v1/jobs?before=j-none"), 404)
-        for limit in ("0", "101", "x", ""):
+        for limit in ("0", "101", "1.5", "x", ""):
             problem(daemon.get(f"/v1/jobs?limit={limit}"), 400)
 
 
