@@ -248,6 +248,17 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     return status;
 }
 
+// Before any thread starts, so that only sigwait sees them, and when the settings have been read:
+// until then they end us as they end anything.
+static void hold_signals(sigset_t *stops) {
+    sigemptyset(stops);
+    sigaddset(stops, SIGTERM);
+    sigaddset(stops, SIGINT);
+    pthread_sigmask(SIG_BLOCK, stops, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
+}
+
 static int run(int argc, char *const *argv) {
     ServeSettings settings;
     Options options = {0};
@@ -255,15 +266,6 @@ static int run(int argc, char *const *argv) {
     if (problem == NULL)
         return command_exit(STATUS_NO_MEMORY);
     problem_clear(problem);
-
-    // Blocked before any thread starts, so that only sigwait sees them.
-    sigset_t stops;
-    sigemptyset(&stops);
-    sigaddset(&stops, SIGTERM);
-    sigaddset(&stops, SIGINT);
-    pthread_sigmask(SIG_BLOCK, &stops, NULL);
-    signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 
     int code;
     Status status = fields_default(serve_fields, &settings);
@@ -274,10 +276,13 @@ static int run(int argc, char *const *argv) {
                              options.operands[0]);
     if (status == STATUS_OK)
         status = complete(&settings, problem);
-    if (status == STATUS_OK && settings.print_config)
+    if (status == STATUS_OK && settings.print_config) {
         options_print(serve_fields, &settings, &options, stdout);
-    else if (status == STATUS_OK)
+    } else if (status == STATUS_OK) {
+        sigset_t stops;
+        hold_signals(&stops);
         status = serve(&settings, &stops, problem);
+    }
     if (status == STATUS_OK) {
         code = COMMAND_OK;
     } else if (problem->status == STATUS_USAGE) {
