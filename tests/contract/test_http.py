@@ -3,6 +3,7 @@
 
 import concurrent.futures
 import csv
+import gzip
 import http.client
 import io
 import json
@@ -112,6 +113,11 @@ def test_waiting_follows_prefer():
             assert time.monotonic() - began < 2, "a waiter is woken at once"
         problem(daemon.request("DELETE", f"/v1/jobs/{job['id']}"), 409)
 
+        for _ in range(4):  # computed, from memory, by its body
+            for preference in ("wait=1", "respond-async"):
+                reply = daemon.submit(sponge(), headers={"Prefer": preference})
+                assert reply.headers.get("preference-applied") == preference, reply.headers
+
 
 def test_jobs_are_listed_by_pages():
     """GET /v1/jobs: newest first, and Link next leads through all of them."""
@@ -127,7 +133,7 @@ def test_jobs_are_listed_by_pages():
             path = link[1] if link else None
         assert seen == ids[::-1], (seen, ids)
         problem(daemon.get("/v1/jobs?before=j-none"), 404)
-        for limit in ("0", "101", "x", ""):
+        for limit in ("0", "101", "1.5", "x", ""):
             problem(daemon.get(f"/v1/jobs?limit={limit}"), 400)
 
 
@@ -220,7 +226,7 @@ def test_the_landing_page_has_lines_that_work():
     """Each curl line of GET / runs as it stands."""
     with program.daemon("--workers", "1") as daemon, tempfile.TemporaryDirectory() as folder:
         text = daemon.get("/", headers={"Host": f"localhost:{daemon.port}"}).body.decode()
-        lines = [line for line in text.splitlines() if re.match(r"(R=\$\()?curl ", line)]
+        lines = [line for line in text.splitlines() if re.match(r"(\w=\$\()?curl ", line)]
         assert len(lines) >= 8 and all(f"http://localhost:{daemon.port}/" in line for line in lines), text
         # The worker is busy for longer than the default wait: what needs a finished job must ask to wait for it.
         busy = daemon.submit(endless(), headers={"Prefer": "respond-async"}).headers["location"]
@@ -307,6 +313,21 @@ def test_parts_of_binary_formats():
         assert daemon.get(path, headers={"Range": "bytes=0-1,4-5"}).body == whole
         text = path.replace("npy", "csv")
         assert daemon.get(text, headers={"Range": "bytes=0-1"}).status == 200
+
+
+def test_text_is_packed_for_whoever_asks():
+    """Also when somebody else had it plain before, and the other way round."""
+    with program.daemon() as daemon:
+        result = "/v1/results/" + daemon.submit(sponge()).json()["result"]
+        for path in (result, f"{result}/series.json", f"{result}/psd.csv"):
+            plain = daemon.get(path)
+            for _ in range(2):
+                packed = daemon.get(path, headers={"Accept-Encoding": "gzip"})
+                assert packed.headers.get("content-encoding") == "gzip", (path, packed.headers)
+                assert packed.headers["etag"] != plain.headers["etag"]
+                assert gzip.decompress(packed.body) == plain.body
+                again = daemon.get(path)
+                assert "content-encoding" not in again.headers and again.body == plain.body
 
 
 def test_materials_are_listed_and_shown():
