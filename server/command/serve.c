@@ -15,6 +15,7 @@
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/base/notify.h"
+#include "server/base/process.h"
 #include "server/command/data_folder.h"
 #include "server/command/reach.h"
 #include "server/command/serve.h"
@@ -200,6 +201,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     Meter *meter = NULL;
     Listener *listener = NULL;
     Keeper *keeper = NULL;
+    process_return_memory();
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {
