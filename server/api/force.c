@@ -41,12 +41,11 @@ static Status read_scene(App *app, const char *id, Reply *reply, Look *look, Pro
     Warnings warnings = {NULL, 0};
     Status status = store_result_scene(app->store, id, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0) {
-        status = problem_set(
-            problem, STATUS_GONE,
-            "the result was made by %s, this is %s: submit the scene anew to see its impacts",
-            row.engine, engine_version);
-        snprintf(reply->link, sizeof reply->link,
-                 "</v1/results/%.72s/manifest>; rel=\"describedby\"", id);
+        status = problem_set(problem, STATUS_GONE,
+                             "the result was made by %s, this is %s: POST to /again below the "
+                             "result, which submits its scene anew, to see its impacts",
+                             row.engine, engine_version);
+        results_link_gone(id, reply);
     }
     if (status == STATUS_OK)
         status = intake_prepare(app->store, row.scene, strlen(row.scene), NULL, &look->inquiry,

@@ -156,42 +156,39 @@ static double read_wait(const Request *request, Reply *reply) {
     return wait;
 }
 
-Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
-    Job *job = NULL;
-    if (request->kept != NULL) {
-        job = pause_end(request->kept, reply);
-    } else {
-        bool is_dry = false;
-        TRY(read_flag(request, "dry_run", &is_dry, problem));
-        TRY(body_require_json(request, problem));
-        if (is_dry)
-            return dry_run(app, request, reply, problem);
-        if (atomic_load(&app->is_stopping))
-            return problem_set(problem, STATUS_BUSY,
-                               "the daemon is stopping and takes no new jobs; try again when it "
-                               "is back");
-        const Submission submission = {.text = request->body,
-                                       .size = request->body_size,
-                                       .client = request->client,
-                                       .idempotency_key = request->idempotency_key,
-                                       .is_replayed = &reply->is_replayed};
-        KnownAnswer known;
-        if (request->idempotency_key == NULL && intake_known(app->intake, &submission, &known)) {
-            reply_borrow(reply, 200, type_json, known.body, known.size);
-            reply->release = free;
-            reply->context = known.body;
-            (void)read_wait(request, reply);
-            return STATUS_OK;
-        }
-        const uint64_t mark = intake_mark(app->intake);
-        const Status status = intake_submit(app->intake, &submission, &job, problem);
-        if (status == STATUS_BUSY || status == STATUS_QUOTA)
-            reply->retry_after = intake_retry_after(app->intake, request->client, status);
-        TRY(status);
-        if (!reply->is_replayed)
-            learn(app, &submission, mark, job);
-    }
+static bool answer_known(App *app, const Request *request, const Submission *submission,
+                         Reply *reply) {
+    KnownAnswer known;
+    if (submission->idempotency_key != NULL || !intake_known(app->intake, submission, &known))
+        return false;
+    reply_borrow(reply, 200, type_json, known.body, known.size);
+    reply->release = free;
+    reply->context = known.body;
+    (void)read_wait(request, reply);
+    return true;
+}
 
+static Status refuse_stopping(App *app, Problem *problem) {
+    if (!atomic_load(&app->is_stopping))
+        return STATUS_OK;
+    return problem_set(problem, STATUS_BUSY,
+                       "the daemon is stopping and takes no new jobs; try again when it is back");
+}
+
+static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,
+                     Job **job, Problem *problem) {
+    const uint64_t mark = intake_mark(app->intake);
+    const Status status = intake_submit(app->intake, submission, job, problem);
+    if (status == STATUS_BUSY || status == STATUS_QUOTA)
+        reply->retry_after = intake_retry_after(app->intake, request->client, status);
+    if (status == STATUS_OK && !reply->is_replayed && submission->retry_of == NULL)
+        learn(app, submission, mark, *job);
+    return status;
+}
+
+// Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.
+static Status answer_job(App *app, const Request *request, Reply *reply, Job *job,
+                         Problem *problem) {
     if (pause_begin(request, reply, job, read_wait(request, reply)))
         return STATUS_OK;
     bool is_paused;
@@ -199,6 +196,78 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 0, problem);
+}
+
+Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    if (request->kept != NULL)
+        return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
+    bool is_dry = false;
+    TRY(read_flag(request, "dry_run", &is_dry, problem));
+    TRY(body_require_json(request, problem));
+    if (is_dry)
+        return dry_run(app, request, reply, problem);
+    TRY(refuse_stopping(app, problem));
+    const Submission submission = {.text = request->body,
+                                   .size = request->body_size,
+                                   .client = request->client,
+                                   .idempotency_key = request->idempotency_key,
+                                   .is_replayed = &reply->is_replayed};
+    if (answer_known(app, request, &submission, reply))
+        return STATUS_OK;
+    TRY(submit(app, request, &submission, reply, &job, problem));
+    return answer_job(app, request, reply, job, problem);
+}
+
+// The scene of a result, once more: what another engine's version made is made by this one.
+Status results_again(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    ResultRow row = {0};
+    if (request->kept != NULL)
+        return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
+    TRY(refuse_stopping(app, problem));
+    Status status = store_result_scene(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK) {
+        const Submission submission = {.text = row.scene,
+                                       .size = strlen(row.scene),
+                                       .client = request->client,
+                                       .is_replayed = &reply->is_replayed};
+        status = submit(app, request, &submission, reply, &job, problem);
+    }
+    result_row_clear(&row);
+    TRY(status);
+    return answer_job(app, request, reply, job, problem);
+}
+
+// Whether a scene is read, judged and planned in some ten microseconds: one structure of one mass
+// and nothing that asks for many runs. Nothing escaped, so that the words are seen.
+static bool is_light(const Request *request) {
+    static const char *const heavy[] = {"\\",           "\"study\"",  "\"frame\"",
+                                        "\"matrices\"", "\"target\"", "\"reduction\""};
+    enum { LIGHT_BYTES = 8192 };
+    if (request->body == NULL || request->body_size > LIGHT_BYTES)
+        return false;
+    for (size_t i = 0; i < COUNT(heavy); i++)
+        if (strstr(request->body, heavy[i]) != NULL)
+            return false;
+    return true;
+}
+
+Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const Submission submission = {.text = request->body,
+                                   .size = request->body_size,
+                                   .client = request->client,
+                                   .idempotency_key = request->idempotency_key};
+    if (request->kept != NULL)
+        return jobs_create(app, request, reply, problem);
+    if (request->query_count > 0 || request->idempotency_key != NULL)
+        return STATUS_OK;
+    if (is_light(request))
+        return jobs_create(app, request, reply, problem);
+    TRY(body_require_json(request, problem));
+    if (!atomic_load(&app->is_stopping))
+        (void)answer_known(app, request, &submission, reply);
+    return STATUS_OK;
 }
 
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -225,4 +294,23 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
+}
+
+Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    bool is_paused;
+    if (request->kept != NULL) {
+        job = pause_end(request->kept, reply);
+    } else {
+        const Submission submission = {.retry_of = request->parameters[0],
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
+        TRY(refuse_stopping(app, problem));
+        TRY(submit(app, request, &submission, reply, &job, problem));
+    }
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
+    return reply_job(app, reply, job, 202, problem);
 }

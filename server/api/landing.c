@@ -17,6 +17,10 @@
     "\"study\": {\"kind\": \"tradeoff\", \"solvers\": [\"exact\", \"rk4\"], \"repeats\": 1}"
 // Of a job's document.
 #define RESULT "grep -o '\"result\": \"r-[0-9a-f]*' | cut -d'\"' -f4"
+// Of an example, once it is done.
+#define RESULT_OF(example)                                                                         \
+    "$(curl -s @/v1/examples/" example                                                             \
+    " | curl -s -H 'Prefer: wait=30' --json @- @/v1/jobs | " RESULT ")"
 
 typedef struct Step {
     const char *what;
@@ -26,26 +30,44 @@ typedef struct Step {
 static const Step steps[] = {
     {"Simulate the paper's sponge damper, released from 15 mm:",
      "curl -s --json '" SCENE "}' @/v1/jobs"},
-    {"Keep the id of its result:",
-     "R=$(curl -s @/v1/examples/paper_free_sponge | curl -s -H 'Prefer: "
-     "wait=30' --json @- @/v1/jobs | " RESULT ")"},
+    {"Keep the id of its result:", "R=" RESULT_OF("paper_free_sponge")},
     {"The impacts, the time series, the spectrum:", "curl -s @/v1/results/$R/impacts.json"},
     {NULL, "curl -s \"@/v1/results/$R/series.csv?channels=displacement&to=0.1\""},
     {NULL, "curl -s -O @/v1/results/$R/series.npy"},
     {NULL, "curl -s @/v1/results/$R/psd.json"},
+    {"One impact, finely; all of it in one archive:",
+     "curl -s @/v1/results/$R/impacts/1/force.csv"},
+    {NULL, "curl -s -O @/v1/results/$R/bundle.zip"},
+    {"Beside another result, what differs in both inputs and motions:",
+     "S=" RESULT_OF("paper_free_impulse_sponge")},
+    {NULL, "curl -s \"@/v1/compare?a=$R&b=$S\""},
+    {"A job's progress as it goes:",
+     "J=$(curl -s @/v1/examples/paper_random_sponge | curl -s -H 'Prefer: respond-async' --json @- "
+     "@/v1/jobs | grep -o '\"id\": \"j-[0-9a-f]*' | cut -d'\"' -f4)"},
+    {NULL, "curl -s -N @/v1/jobs/$J/events"},
     {"Check a scene and see its plan without running it:",
      "curl -s @/v1/examples/paper_free_sponge | curl -s --json @- '@/v1/jobs?dry_run=1'"},
     {"What speed costs in accuracy on this scene, as a chart:",
      "R=$(curl -s -H 'Prefer: wait=30' --json '" SCENE ", " STUDY "}' @/v1/jobs | " RESULT ")"},
     {NULL, "curl -s -O @/v1/results/$R/tradeoff.svg"},
     {"Many seeds of a random base: means with their confidence, and every run:",
-     "R=$(curl -s @/v1/examples/ensemble_random_sponge | curl -s -H 'Prefer: wait=30' --json @- "
-     "@/v1/jobs | " RESULT ")"},
+     "R=" RESULT_OF("ensemble_random_sponge")},
     {NULL, "curl -s -O @/v1/results/$R/ensemble.svg"},
     {NULL, "curl -s @/v1/results/$R/ensemble.csv"},
+    {"The scene at many points, and one point's own series:",
+     "R=" RESULT_OF("sweep_clearance_buffer")},
+    {NULL, "curl -s @/v1/results/$R/table.csv"},
+    {NULL, "curl -s @/v1/results/$R/points/17/scene | curl -s --json @- @/v1/jobs"},
+    {"Every contact model on one scene; what errors of restitution and contact time do:",
+     "R=" RESULT_OF("compare_sponge")},
+    {NULL, "curl -s @/v1/results/$R/compare.csv"},
+    {NULL, "R=" RESULT_OF("sensitivity_sponge")},
+    {NULL, "curl -s @/v1/results/$R/sensitivity.csv"},
     {"Where tokens are asked for, every line needs this too:",
      "curl -s -H \"Authorization: Bearer $IMPACTD_TOKEN\" @/v1/jobs"},
-    {"Jobs, materials, examples, schemas, the whole API:", "curl -s @/v1/jobs"},
+    {"Jobs, what is known already, materials, examples, schemas, the whole API:",
+     "curl -s @/v1/jobs"},
+    {NULL, "curl -s @/v1/cache"},
     {NULL, "curl -s @/v1/materials"},
     {NULL, "curl -s @/v1/examples"},
     {NULL, "curl -s @/schemas/scene"},

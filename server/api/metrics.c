@@ -7,9 +7,42 @@
 #include "server/http/reply.h"
 #include "server/jobs/totals.h"
 
-static void write_queue(Bytes *bytes, Intake *intake) {
+// What is known already, by layer in the order in which they are asked.
+static void write_layers(Bytes *bytes, const IntakeTally *tally, Store *store) {
+    LayerTally stored = tally->stored;
+    uint64_t count = 0, size = 0;
+    store_series_tally(store, &count, &size, &stored.evictions);
+    stored.count = count;
+    stored.bytes = size;
+    const struct {
+        const char *label;
+        const LayerTally *layer;
+    } layers[] = {{"layer=\"bodies\"", &tally->known},
+                  {"layer=\"documents\"", &tally->heads},
+                  {"layer=\"series\"", &tally->series},
+                  {"layer=\"results\"", &tally->rows},
+                  {"layer=\"stored_series\"", &stored}};
+    static const char hits[] = "impactd_cache_hits_total", misses[] = "impactd_cache_misses_total",
+                      evictions[] = "impactd_cache_evictions_total",
+                      bytes_kept[] = "impactd_cache_layer_bytes";
+    tally_family(bytes, hits, "counter", "Looks that found what was known, by layer.");
+    for (size_t i = 0; i < COUNT(layers); i++)
+        tally_count(bytes, hits, layers[i].label, layers[i].layer->hits);
+    tally_family(bytes, misses, "counter", "Looks that did not, by layer.");
+    for (size_t i = 0; i < COUNT(layers); i++)
+        tally_count(bytes, misses, layers[i].label, layers[i].layer->misses);
+    tally_family(bytes, evictions, "counter", "What made room for others, by layer.");
+    for (size_t i = 0; i < COUNT(layers); i++)
+        tally_count(bytes, evictions, layers[i].label, layers[i].layer->evictions);
+    tally_family(bytes, bytes_kept, "gauge", "What a layer takes, in memory or on disk.");
+    for (size_t i = 0; i < COUNT(layers); i++)
+        tally_real(bytes, bytes_kept, layers[i].label, (double)layers[i].layer->bytes);
+}
+
+static void write_queue(Bytes *bytes, Intake *intake, Store *store) {
     IntakeTally tally = {0};
     intake_tally(intake, &tally);
+    write_layers(bytes, &tally, store);
     tally_gauge(bytes, "impactd_queue_length", "Computations that wait.", (double)tally.queued);
     tally_gauge(bytes, "impactd_queue_limit", "Unfinished jobs at most.", (double)tally.queue_most);
     tally_gauge(bytes, "impactd_workers", "Computations at once at most.", (double)tally.workers);
@@ -78,7 +111,7 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
                     (double)listener_connections(listener));
     if (app->hot != NULL)
         write_hot(&bytes, app->hot);
-    write_queue(&bytes, app->intake);
+    write_queue(&bytes, app->intake, app->store);
     totals_write(intake_totals(app->intake), &bytes);
     write_store(&bytes, app->store);
     write_process(&bytes, app);

@@ -20,6 +20,13 @@ const char no_impacts[] =
     "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
     "energy.json; with \"output\": {\"impacts\": true} they are listed";
 
+void results_link_gone(const char *id, Reply *reply) {
+    snprintf(reply->link, sizeof reply->link,
+             "</v1/results/%.72s/again>; rel=\"successor-version\"; title=\"POST submits the scene "
+             "anew\", </v1/results/%.72s/manifest>; rel=\"describedby\"",
+             id, id);
+}
+
 // The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
 // case.
 static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *problem) {
@@ -81,7 +88,9 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
     bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
                  link_base(), id);
     if (answer->study != NULL) {
-        const char *name = answer->study->kind->name;
+        // A sweep's rows are a table of their own.
+        const bool is_table = answer->study->kind == study_sweep.answer;
+        const char *name = is_table ? "table" : answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);
         bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, link_base(), id, name);
         while ((++format)->extension != NULL)

@@ -16,6 +16,9 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
 Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem);
 
+// The links of a 410: how to have the result made by this engine, and what it is.
+void results_link_gone(const char *id, Reply *reply);
+
 // Why a result has no ledger.
 extern const char no_impacts[];
 

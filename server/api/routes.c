@@ -3,7 +3,8 @@
 #include "server/api/app.h"
 
 static const char *const of_submit[] = {"dry_run", NULL};
-static const char *const of_jobs[] = {"limit", "before", "status", "q", "label", "result", "kind", "since", "until", NULL};
+static const char *const of_jobs[] = {"limit",  "before", "status", "q",     "label",
+                                      "result", "kind",   "since",  "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_force[] = {"points", NULL};
@@ -17,8 +18,16 @@ const Route routes[] = {
     {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show},
     {"GET",    "/v1/jobs/{id}/events",                  "read",   NULL,         "A job's progress as server-sent events", jobs_events},
     {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss},
+    {"POST",   "/v1/jobs/{id}/retry",                   "submit", NULL,         "Make failed points of a finished sweep again", jobs_retry},
+    {"GET",    "/v1/jobs/{id}/table.{format}",          "read",   NULL,         "Rows of a job's sweep so far", sweeps_table},
+    {"GET",    "/v1/jobs/{id}/table",                   "read",   NULL,         "Rows of a job's sweep so far, format by Accept", sweeps_table},
+    {"GET",    "/v1/results/{id}/table.{format}",       "read",   NULL,         "A sweep's rows, as far as they are there", sweeps_table},
+    {"GET",    "/v1/results/{id}/table",                "read",   NULL,         "A sweep's rows, format by Accept", sweeps_table},
+    {"GET",    "/v1/results/{id}/points/{index}/scene", "read",   NULL,         "The scene of one point, ready to submit", sweeps_scene},
+    {"GET",    "/v1/results/{id}/points/{index}",       "read",   NULL,         "One point: its values, metrics and scene", sweeps_point},
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show},
     {"DELETE", "/v1/results/{id}",                      "submit", NULL,         "Delete a result; its jobs stay", results_delete},
+    {"POST",   "/v1/results/{id}/again",                "submit", NULL,         "Submit its scene anew", results_again},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to do it again", results_manifest},
     {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", results_series},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
@@ -61,6 +70,7 @@ const Route routes[] = {
 // clang-format on
 
 const QuickHandler quick_handlers[] = {
+    {jobs_create, jobs_create_quick},
     {health_live, health_live},
     {health_ready, health_ready},
     {version_show, version_show},

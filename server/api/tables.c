@@ -1,4 +1,5 @@
 #include "server/api/tables.h"
+#include "server/api/results.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -73,8 +74,7 @@ Status tables_find(App *app, const Request *request, Reply *reply, Outcome **out
     const char *id = request->parameters[0];
     const Status status = intake_outcome(app->intake, id, request->waker, outcome, problem);
     if (status == STATUS_GONE)
-        snprintf(reply->link, sizeof reply->link,
-                 "</v1/results/%.72s/manifest>; rel=\"describedby\"", id);
+        results_link_gone(id, reply);
     if (status == STATUS_BUSY)
         reply->retry_after = 2;
     if (status != STATUS_OK || *outcome != NULL)

@@ -126,18 +126,62 @@ static bool walk(const json_t *value, const char *place, const char *key, Pairs 
     return true;
 }
 
-Status pairs_read(const char *text, size_t size, Pairs *pairs, Problem *problem) {
+// Cleared by json_decref.
+static Status document_read(const char *text, size_t size, json_t **root, Problem *problem) {
     size_t position;
     const char *sentence;
+    *root = size > 0 && scan_allows(text, size, &position, &sentence)
+                ? json_loadb(text, size, JSON_REJECT_DUPLICATES, NULL)
+                : NULL;
+    return json_is_object(*root)
+               ? STATUS_OK
+               : problem_set(problem, STATUS_UNREADABLE, "the document is no JSON object");
+}
+
+Status pairs_read(const char *text, size_t size, Pairs *pairs, Problem *problem) {
+    json_t *root;
     *pairs = (Pairs){0};
-    json_t *root = size > 0 && scan_allows(text, size, &position, &sentence)
-                       ? json_loadb(text, size, JSON_REJECT_DUPLICATES, NULL)
-                       : NULL;
-    Status status = STATUS_OK;
-    if (!json_is_object(root))
-        status = problem_set(problem, STATUS_UNREADABLE, "the document is no JSON object");
-    else if (!walk(root, "", "", pairs))
+    Status status = document_read(text, size, &root, problem);
+    if (status == STATUS_OK && !walk(root, "", "", pairs))
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory");
     json_decref(root);
     return status;
+}
+
+static void cell_put(char cell[LISTING_CELL], const json_t *value) {
+    char text[PAIRS_TEXT] = "-";
+    if (json_is_number(value))
+        snprintf(text, sizeof text, "%.4g", json_number_value(value));
+    else if (value != NULL)
+        value_put(text, value);
+    text_fit(cell, LISTING_CELL, text);
+}
+
+Status listing_read(const char *text, size_t size, const char *list, const char *const *members,
+                    Listing *listing, Problem *problem) {
+    json_t *root;
+    *listing = (Listing){0};
+    while (members[listing->columns] != NULL)
+        listing->columns++;
+    Status status = document_read(text, size, &root, problem);
+    const json_t *rows = json_object_get(root, list);
+    const size_t most = PAIRS_MOST,
+                 count = json_array_size(rows) < most ? json_array_size(rows) : most;
+    if (status == STATUS_OK && count > 0) {
+        listing->cells = calloc(count * listing->columns, sizeof *listing->cells);
+        if (listing->cells == NULL)
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory");
+        else
+            listing->rows = count;
+    }
+    for (size_t i = 0; i < listing->rows * listing->columns; i++)
+        cell_put(listing->cells[i], json_object_get(json_array_get(rows, i / listing->columns),
+                                                    members[i % listing->columns]));
+    json_decref(root);
+    return status;
+}
+
+void listing_clear(Listing *listing) {
+    free(listing->cells);
+    *listing = (Listing){0};
 }

@@ -25,6 +25,61 @@ static int wider(int width, const char *text) {
     return length > width ? length : width;
 }
 
+// Lists of things that are alike, as tables with their own heads.
+static const struct {
+    const char *list;
+    const char *members[8], *heads[8];
+} listings[] = {
+    {"channels",
+     {"channel", "unit", "rms", "other_rms", "difference_rms", "relative", "correlation"},
+     {"channel", "unit", "rms A", "rms B", "rms A - B", "relative", "correlation"}},
+    {"psd",
+     {"channel", "unit", "from", "to", "level", "difference", "power"},
+     {"spectrum", "unit", "from Hz", "to Hz", "level dB", "difference", "power"}},
+};
+
+// "psd/0" is, "psd/distance" is not.
+static bool is_listed(const char *name) {
+    for (size_t i = 0; i < COUNT(listings); i++) {
+        const size_t length = strlen(listings[i].list);
+        if (strncmp(name, listings[i].list, length) == 0 && name[length] == '/' &&
+            strspn(name + length + 1, "0123456789") == strlen(name + length + 1))
+            return true;
+    }
+    return false;
+}
+
+// What names is to the left, what counts to the right.
+static void listing_print(const Listing *listing, const char *const *heads) {
+    enum { NAMES = 2 };
+    for (size_t row = 0; row <= listing->rows; row++)
+        for (size_t column = 0; column < listing->columns; column++) {
+            int width = wider(0, heads[column]);
+            for (size_t i = 0; i < listing->rows; i++)
+                width = wider(width, listing->cells[i * listing->columns + column]);
+            printf("%*s%s", column < NAMES ? -width : width,
+                   row == 0 ? heads[column] : listing->cells[(row - 1) * listing->columns + column],
+                   column + 1 < listing->columns ? "  " : "\n");
+        }
+}
+
+static Status listings_print(const HttpAnswer *answer, Problem *problem) {
+    for (size_t i = 0; i < COUNT(listings); i++) {
+        Listing listing;
+        const Status status = listing_read(answer->body.at, answer->body.count, listings[i].list,
+                                           listings[i].members, &listing, problem);
+        for (size_t cell = 0; cell < listing.rows * listing.columns; cell++)
+            told_tame(listing.cells[cell]);
+        if (listing.rows > 0) {
+            puts("");
+            listing_print(&listing, listings[i].heads);
+        }
+        listing_clear(&listing);
+        TRY(status);
+    }
+    return STATUS_OK;
+}
+
 static void table_print(const Pairs *pairs, const char *a, const char *b) {
     enum { WIDEST = 48 };
     int names = 4, firsts = 12, seconds = 12;
@@ -50,7 +105,7 @@ static void table_print(const Pairs *pairs, const char *a, const char *b) {
                    pairs->at[i].rest);
     puts("");
     for (size_t i = 0; i < pairs->count; i++)
-        if (pairs->at[i].b == NULL)
+        if (pairs->at[i].b == NULL && !is_listed(pairs->at[i].name))
             printf("%s: %s\n", pairs->at[i].name, pairs->at[i].a);
 }
 
@@ -69,8 +124,10 @@ static Status ask_compare(const CompareSettings *settings, Daemon *daemon, const
                      ? STATUS_OK
                      : problem_set(problem, STATUS_UNREACHABLE,
                                    "the answer is no comparison: what answers there is no impactd");
-        if (status == STATUS_OK)
+        if (status == STATUS_OK) {
             table_print(&pairs, a, b);
+            status = listings_print(&answer, problem);
+        }
     }
     pairs_clear(&pairs);
     http_answer_clear(&answer);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
@@ -27,6 +27,7 @@ Computation *computation_new(const char *result) {
 void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
+    sweep_free(computation->sweep);
     inquiry_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
@@ -36,6 +37,12 @@ void computation_free(Computation *computation) {
 
 Computation *computation_of(QueueEntry *entry) {
     return (Computation *)(void *)((char *)entry - offsetof(Computation, queued));
+}
+
+void intake_call_worker(Intake *intake) {
+    pthread_cond_signal(&intake->work);
+    if (intake->slow_running >= intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
 }
 
 void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
@@ -52,9 +59,7 @@ void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
         queue_urge(intake->queue, &computation->queued);
     else
         queue_put(intake->queue, &computation->queued, client, 1e-9 * (double)clock_monotonic_ns());
-    pthread_cond_signal(&intake->work);
-    if (intake->slow_running >= intake->settings.workers)
-        pthread_cond_signal(&intake->spare_work);
+    intake_call_worker(intake);
 }
 
 void intake_release(Job *job) {
@@ -105,6 +110,7 @@ void intake_drop(Intake *intake) {
     pthread_cond_destroy(&intake->spare_work);
     pthread_cond_destroy(&intake->keys_free);
     pthread_cond_destroy(&intake->settled);
+    pthread_mutex_destroy(&intake->retries);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
 }
@@ -127,6 +133,8 @@ void intake_detach(Job *job) {
     index_remove(job->intake->in_flight, &computation->indexed);
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
+        if (computation->sweep != NULL)
+            sweep_stop(computation->sweep);
     } else {
         queue_remove(job->intake->queue, &computation->queued);
         computation_free(computation);
@@ -175,6 +183,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->settings.queue_bytes == 0)
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
+    pthread_mutex_init(&intake->retries, NULL);
     pthread_cond_init(&intake->work, NULL);
     pthread_cond_init(&intake->spare_work, NULL);
     pthread_cond_init(&intake->keys_free, NULL);
@@ -191,6 +200,8 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
         intake->known == NULL || intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
+    if (status == STATUS_OK)
+        status = store_sweep_tidy(store, problem);
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
     while (status == STATUS_OK && intake->worker_count < settings->workers + 1) {
@@ -232,6 +243,8 @@ void intake_close(Intake *intake) {
     for (size_t i = 0; i < intake->worker_count; i++)
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
+    for (SweepRun *run = intake->sweeps; run != NULL; run = run->next)
+        atomic_store(&run->computation->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
     pthread_cond_broadcast(&intake->spare_work);
     pthread_mutex_unlock(&intake->lock);
@@ -242,6 +255,17 @@ void intake_close(Intake *intake) {
         pthread_cond_wait(&intake->settled, &intake->lock);
     pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
+    while (intake->stalled != NULL) {
+        Computation *computation = intake->stalled;
+        intake->stalled = computation->next_stalled;
+        let_go(computation);
+    }
+    while (intake->sweeps != NULL) {
+        Computation *computation = intake->sweeps->computation;
+        intake->sweeps = intake->sweeps->next;
+        queue_remove(intake->queue, &computation->queued);
+        let_go(computation);
+    }
     for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
         let_go(computation_of(entry));
     intake_abandon_delayed(intake);
@@ -372,7 +396,7 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     tally->cached_bytes = tally->series.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
-        tally->running += intake->workers[i].running != NULL;
+        tally->running += intake->workers[i].running != NULL || intake->workers[i].sweep != NULL;
     pthread_mutex_unlock(&intake->lock);
     tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -97,11 +97,10 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
     Computation *computation = NULL;
     Status status = store_result_scene(intake->store, result, &row, problem);
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
-        status = problem_set(
-            problem, STATUS_GONE,
-            "the series was made by %s, this is %s: to have it again, POST the member \"scene\" of "
-            "/v1/results/%.72s/manifest to /v1/jobs",
-            row.engine, engine_version, result);
+        status = problem_set(problem, STATUS_GONE,
+                             "the series was made by %s, this is %s: to have it again, POST to "
+                             "/v1/results/%.72s/again, which submits the scene anew",
+                             row.engine, engine_version, result);
     // The scene was judged when it came; today's limits are no reason to refuse it now.
     if (status == STATUS_OK)
         status = intake_prepare(intake->store, row.scene, strlen(row.scene), NULL, &inquiry,

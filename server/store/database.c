@@ -1,4 +1,4 @@
-// A connection keeps the statements it has made: there are some twenty texts in all, each a
+// A connection keeps the statements it has made: there are some fifty texts in all, each a
 // constant, so that its address is its name. Settings are those that were measured to pay; FULL
 // makes every commit durable.
 #include "server/store/database.h"
@@ -15,14 +15,17 @@
 
 #include "server/store/row.h"
 
-enum { STATEMENTS = 48, APPLICATION = 0x696D7064 }; // "impd"
+enum { STATEMENTS = 96, APPLICATION = 0x696D7064 }; // "impd"
+
+typedef struct Kept {
+    const char *sql;
+    Statement *statement;
+    RowMap map;
+} Kept;
 
 struct Database {
     sqlite3 *connection;
-    struct {
-        const char *sql;
-        Statement *statement;
-    } kept[STATEMENTS];
+    Kept kept[STATEMENTS];
     size_t kept_count;
 };
 
@@ -105,34 +108,34 @@ uint64_t database_rows_changed(Database *database) {
     return (uint64_t)sqlite3_total_changes64(database->connection);
 }
 
-static Status prepare(Database *database, const char *sql, Statement **statement,
-                      Problem *problem) {
+static Status prepare(Database *database, const char *sql, Kept **kept, Problem *problem) {
     for (size_t i = 0; i < database->kept_count; i++)
         if (database->kept[i].sql == sql) {
-            *statement = database->kept[i].statement;
+            *kept = &database->kept[i];
             return STATUS_OK;
         }
     if (database->kept_count == STATEMENTS)
         return problem_set(problem, STATUS_INTERNAL, "more than %d SQL texts", STATEMENTS);
-    if (sqlite3_prepare_v3(database->connection, sql, -1, SQLITE_PREPARE_PERSISTENT, statement,
+    Statement *statement;
+    if (sqlite3_prepare_v3(database->connection, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement,
                            NULL) != SQLITE_OK)
         return report(database->connection, "preparing a statement", problem);
-    database->kept[database->kept_count].sql = sql;
-    database->kept[database->kept_count++].statement = *statement;
+    *kept = &database->kept[database->kept_count++];
+    **kept = (Kept){.sql = sql, .statement = statement};
     return STATUS_OK;
 }
 
 Status statement_begin(Database *database, const char *sql, const RowColumn *columns,
                        const void *item, Statement **statement, Problem *problem) {
     *statement = NULL;
-    Statement *prepared;
-    TRY(prepare(database, sql, &prepared, problem));
-    const Status status = row_bind(prepared, columns, item, problem);
+    Kept *kept = NULL;
+    TRY(prepare(database, sql, &kept, problem));
+    const Status status = row_bind(kept->statement, &kept->map, columns, item, problem);
     if (status != STATUS_OK) {
-        statement_end(prepared);
+        statement_end(kept->statement);
         return status;
     }
-    *statement = prepared;
+    *statement = kept->statement;
     return STATUS_OK;
 }
 

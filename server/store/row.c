@@ -1,5 +1,5 @@
-// Parameters and columns are looked up by name in the table: a row has a dozen of them, so a walk
-// is cheaper than anything cleverer.
+// Parameters and columns are looked up by name in the table; parameters once for each statement,
+// which is bound many thousand times a second.
 #include "server/store/row.h"
 
 #include <math.h>
@@ -8,6 +8,8 @@
 #include <string.h>
 
 #include <sqlite3.h>
+
+#include "server/store/store.h"
 
 static const RowColumn *column_find(const RowColumn *columns, const char *name) {
     for (const RowColumn *column = columns; column != NULL && column->kind != COLUMN_END; column++)
@@ -42,8 +44,10 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
     case COLUMN_FLAG:
         return sqlite3_bind_int(statement, index, *(const bool *)(const void *)member);
     case COLUMN_BYTES: {
-        const RowBytes *bytes = (const void *)member;
-        return sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
+        const StoredBytes *bytes = (const StoredBytes *)(const void *)member;
+        return bytes->at == NULL
+                   ? sqlite3_bind_null(statement, index)
+                   : sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
     }
     case COLUMN_END:
         break;
@@ -51,16 +55,31 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
     return SQLITE_MISUSE;
 }
 
-Status row_bind(Statement *statement, const RowColumn *columns, const void *item,
-                Problem *problem) {
-    const int count = sqlite3_bind_parameter_count(statement);
-    for (int index = 1; index <= count; index++) {
-        const char *name = sqlite3_bind_parameter_name(statement, index);
-        const RowColumn *column = name == NULL ? NULL : column_find(columns, name + 1);
-        if (column == NULL)
+static Status find_all(Statement *statement, const RowColumn *columns, RowMap *map,
+                       Problem *problem) {
+    map->columns = NULL;
+    map->count = sqlite3_bind_parameter_count(statement);
+    if (map->count > ROW_PARAMETERS)
+        return problem_set(problem, STATUS_INTERNAL, "more than %d parameters of a statement",
+                           ROW_PARAMETERS);
+    for (int i = 0; i < map->count; i++) {
+        const char *name = sqlite3_bind_parameter_name(statement, i + 1);
+        map->of[i] = name == NULL ? NULL : column_find(columns, name + 1);
+        if (map->of[i] == NULL)
             return problem_set(problem, STATUS_INTERNAL, "no member for the parameter %s",
                                name == NULL ? "?" : name);
-        const int code = bind(statement, index, column, (const char *)item + column->offset);
+    }
+    map->columns = columns;
+    return STATUS_OK;
+}
+
+Status row_bind(Statement *statement, RowMap *map, const RowColumn *columns, const void *item,
+                Problem *problem) {
+    if (map->columns == NULL || map->columns != columns)
+        TRY(find_all(statement, columns, map, problem));
+    for (int i = 0; i < map->count; i++) {
+        const RowColumn *column = map->of[i];
+        const int code = bind(statement, i + 1, column, (const char *)item + column->offset);
         if (code == SQLITE_TOOBIG)
             return problem_set(problem, STATUS_TOO_LARGE,
                                "%s is too long to be stored, a billion bytes at most",
@@ -82,6 +101,21 @@ static bool read_text(Statement *statement, int index, char **text) {
         return false;
     memcpy(*text, bytes, size);
     (*text)[size] = '\0';
+    return true;
+}
+
+static bool read_bytes(Statement *statement, int index, StoredBytes *bytes) {
+    if (sqlite3_column_type(statement, index) == SQLITE_NULL)
+        return true;
+    const void *blob = sqlite3_column_blob(statement, index);
+    bytes->size = (size_t)sqlite3_column_bytes(statement, index);
+    bytes->at = malloc(bytes->size + 1);
+    if (bytes->at == NULL || (blob == NULL && bytes->size > 0)) {
+        bytes->size = 0;
+        return false;
+    }
+    if (bytes->size > 0)
+        memcpy(bytes->at, blob, bytes->size);
     return true;
 }
 
@@ -120,19 +154,23 @@ static bool read_column(Statement *statement, int index, const RowColumn *column
     case COLUMN_FLAG:
         *(bool *)(void *)member = sqlite3_column_int(statement, index) != 0;
         return true;
-    case COLUMN_BYTES: {
-        RowBytes *bytes = (void *)member;
-        const void *at = sqlite3_column_blob(statement, index);
-        bytes->size = (size_t)sqlite3_column_bytes(statement, index);
-        bytes->at = malloc(bytes->size + 1);
-        if (bytes->at != NULL && bytes->size > 0)
-            memcpy(bytes->at, at, bytes->size);
-        return bytes->at != NULL;
-    }
+    case COLUMN_BYTES:
+        return read_bytes(statement, index, (StoredBytes *)(void *)member);
     case COLUMN_END:
         break;
     }
     return true;
+}
+
+static void free_owned(const RowColumn *column, void *item) {
+    void *member = (char *)item + column->offset;
+    if (column->kind == COLUMN_TEXT) {
+        free(*(char **)member);
+        *(char **)member = NULL;
+    } else if (column->kind == COLUMN_BYTES) {
+        free(((StoredBytes *)member)->at);
+        *(StoredBytes *)member = (StoredBytes){NULL, 0};
+    }
 }
 
 Status row_read(Statement *statement, const RowColumn *columns, void *item, Problem *problem) {
@@ -142,12 +180,8 @@ Status row_read(Statement *statement, const RowColumn *columns, void *item, Prob
         const RowColumn *column = name == NULL ? NULL : column_find(columns, name);
         if (column == NULL || read_column(statement, index, column, (char *)item + column->offset))
             continue;
-        for (const RowColumn *text = columns; text->kind != COLUMN_END; text++)
-            if (text->kind == COLUMN_TEXT) {
-                char **member = (char **)(void *)((char *)item + text->offset);
-                free(*member);
-                *member = NULL;
-            }
+        for (const RowColumn *owner = columns; owner->kind != COLUMN_END; owner++)
+            free_owned(owner, item);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
     }
     return STATUS_OK;
@@ -155,7 +189,6 @@ Status row_read(Statement *statement, const RowColumn *columns, void *item, Prob
 
 void row_clear(const RowColumn *columns, void *item, size_t size) {
     for (const RowColumn *column = columns; column->kind != COLUMN_END; column++)
-        if (column->kind == COLUMN_TEXT)
-            free(*(char **)(void *)((char *)item + column->offset));
+        free_owned(column, item);
     memset(item, 0, size);
 }

@@ -18,13 +18,8 @@ typedef enum ColumnKind {
     COLUMN_COUNT,   // uint64_t, size_t
     COLUMN_CHOICE,  // int
     COLUMN_FLAG,    // bool
-    COLUMN_BYTES,   // RowBytes, owned
+    COLUMN_BYTES,   // StoredBytes, owned
 } ColumnKind;
-
-typedef struct RowBytes {
-    char *at;
-    size_t size;
-} RowBytes;
 
 typedef struct RowColumn {
     const char *name;
@@ -38,9 +33,19 @@ typedef struct RowColumn {
 #define ROW_END {.kind = COLUMN_END}
 // clang-format on
 
+// Which columns a statement's parameters ":name" stand for, found once and kept with the statement.
+// All zero at first.
+enum { ROW_PARAMETERS = 40 };
+typedef struct RowMap {
+    const RowColumn *columns; // it holds for these; NULL: for none yet
+    int count;
+    const RowColumn *of[ROW_PARAMETERS];
+} RowMap;
+
 // Binds every parameter ":name" of the statement to the member of that name. `columns` may be NULL
 // where it has none. Texts are borrowed until the statement ends.
-Status row_bind(Statement *statement, const RowColumn *columns, const void *item, Problem *problem);
+Status row_bind(Statement *statement, RowMap *map, const RowColumn *columns, const void *item,
+                Problem *problem);
 
 // Reads the current row into the members of its columns' names; the others stay as they are. `item`
 // holds no texts. On failure it is cleared.

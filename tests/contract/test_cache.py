@@ -3,7 +3,9 @@
 
 import json
 import os
+import sqlite3
 import sys
+import tempfile
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
@@ -78,6 +80,28 @@ def test_a_miss_is_explained_by_the_nearest_known_scene():
         faulty = daemon.request("POST", "/v1/cache/explain", json={**scene, "duration": -1})
         assert faulty.status == 422 and faulty.json()["errors"][0]["pointer"] == "/duration", faulty
         assert len(daemon.get("/v1/jobs").json()["jobs"]) == 2, "explaining made a job"
+
+
+def test_what_another_engine_made_names_the_way_to_have_it_again():
+    """Summary, impacts and psd stay; the series answers 410 with a link, and POST there makes it by this engine."""
+    old = "r-" + 64 * "0"
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            made = program.finished(daemon, program.scene("paper_free_sponge"))
+        with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
+            database.execute("UPDATE results SET engine = 'impactd-0', id = ? WHERE id = ?", (old, made["result"]))
+        database.close()
+        with program.daemon(data=folder) as daemon:
+            assert daemon.get(f"/v1/results/{old}").json()["summary"] == made["summary"]
+            assert daemon.get(f"/v1/results/{old}/impacts.json").json()["count"] == made["summary"]["impacts"]
+            reply = daemon.get(f"/v1/results/{old}/series.csv")
+            assert reply.status == 410 and "impactd-0" in reply.json()["detail"], reply
+            link = reply.headers["link"]
+            again = daemon.request("POST", link[link.index("<") + 1:link.index(">")])
+            assert again.status == 200 and again.json()["result"] == made["result"], again
+            assert again.json()["summary"] == made["summary"]
+            assert daemon.get(f"/v1/results/{made['result']}/series.csv").status == 200
+            assert daemon.request("POST", f"/v1/results/r-{64 * '1'}/again").status == 404
 
 
 if __name__ == "__main__":

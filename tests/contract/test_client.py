@@ -6,6 +6,7 @@ import http.server
 import json
 import os
 import pty
+import re
 import signal
 import socket
 import subprocess
@@ -411,12 +412,14 @@ def test_compare_prints_what_differs():
     """compare asks for both results and prints each pair in a row; --json prints the answer."""
     answer = {"a": "r-1", "metrics": {"peak_displacement": {"a": 0.015, "b": 0.0151, "unit": "m", "difference": 1e-4}},
               "inputs": [{"pointer": "/dampers/0/clearance", "a": 0.015, "b": 0.02}, {"pointer": "/title", "a": None, "b": "x\x1b"}],
-              "psd": {"distance": 1.25, "frequency": [1, 2, 3]}, "divergence": None}
+              "psd": {"distance": 1.25, "frequency": [1, 2, 3]}, "divergence": None,
+              "channels": [{"channel": "velocity\x1b", "unit": "m/s", "rms": 0.06174418, "relative": None}]}
     with fake(say(body=json.dumps(answer).encode())) as (url, seen):
         code, out, errors = client(url, "compare", "r-1", "r-2")
         assert code == 0 and errors == "" and seen[0][1] == "/v1/compare?a=r-1&b=r-2", (code, errors, seen)
         assert "peak_displacement" in out and "0.0151" in out and "difference 0.0001" in out, out
         assert "/dampers/0/clearance" in out and "psd/distance: 1.25" in out and "\x1b" not in out, out
+        assert re.search(r"^channel +unit +rms A .*\nvelocity\S +m/s +0.06174 +- +- +- +-$", out, re.M), out
         assert json.loads(client(url, "compare", "r-1", "r-2", "--json")[1]) == answer
     for body in (b"", b"[1]", b"{", b"[" * 100000):
         with fake(say(body=body)) as (url, _):

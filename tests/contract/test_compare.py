@@ -220,7 +220,8 @@ def test_series_are_computed_again_where_they_are_not_in_memory():
 def test_what_another_engine_made_is_compared_without_its_series():
     """Metrics and inputs stay, motions and spectra are null with a warning, and the answer is not for ever; POST: 410."""
     with tempfile.TemporaryDirectory() as folder:
-        with program.daemon(data=folder) as daemon:
+        # Series on the disk would outlast the engine.
+        with program.daemon("--store-bytes", "0", data=folder) as daemon:
             one, two = (program.finished(daemon, scene(duration=duration)) for duration in (1, 2))
         with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
             database.execute("UPDATE results SET engine = 'impactd-0' WHERE id = ?", (two["result"],))

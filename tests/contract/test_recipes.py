@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The README's recipes for scripts run as they stand there, against a daemon."""
 
+import json
 import os
 import re
 import shutil
@@ -72,6 +73,48 @@ def test_octave():
     assert numpy.array_equal(tables["motion.csv"][:, 1], whole[:, 1]) and numpy.array_equal(tables["psd.csv"], psd)
     assert out.splitlines() == [f"{len(whole)} samples, peak {abs(whole[:, 1]).max():g} m, 22 impacts",
                                 f"most power at {psd[numpy.argmax(psd[:, 1]), 0]:g} Hz"], out
+
+
+# Lines that are not for a test: they install, need a certificate or a machine of that name, or go on for minutes.
+LEFT_OUT = re.compile(r"demo\.sh|run\.sh|^cmake|^ctest|^systemctl|^man |serve|example\.org|retell\.py|bench/|tests/|"
+                      r"^curl --json '\{$")
+# Which scene a line is about, where it is not the first one.
+SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_frequency"}
+
+
+def lines():
+    """The README's lines for a shell, without what is said of them."""
+    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
+        text = re.sub(r"^```.*?^```$", "", file.read(), flags=re.M | re.S)
+    found = re.findall(r"^    ((?:curl|impactd|\w+=\$\(impactd|[\w./]+\.(?:sh|py)) ?.*?)(?:  +# .*|  +[a-z].*)?$", text, re.M)
+    return list(dict.fromkeys(line for line in found if not LEFT_OUT.search(line)))
+
+
+def test_lines():
+    """Every other line of the README for a shell runs, one after the other, each with a scene that fits it."""
+    kept = lines()
+    assert len(kept) > 25, kept
+    with program.daemon("--max-cpu-seconds", "1000") as daemon, tempfile.TemporaryDirectory() as folder:
+        with open(os.path.join(folder, "motion.AT2"), "w", encoding="utf-8") as file:
+            file.write("A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n")
+        endless = program.scene("paper_sine_aluminium")
+        endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+        one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
+        for line in kept:
+            name = next((scene for begin, scene in SCENES.items() if line.startswith(begin)), "paper_free_sponge")
+            scene = program.scene(name)
+            with open(os.path.join(folder, "scene.json"), "w", encoding="utf-8") as file:
+                json.dump({**scene, "duration": min(2, scene["duration"])}, file)
+            is_end = re.search(r"cancel|jobs/\$JOB$", line)
+            job = daemon.submit(endless, headers={"Prefer": "respond-async"}).json()["id"] if is_end else one["id"]
+            said = re.sub(r"\[\.\.\.\]", str([0.1 * i for i in range(40)]), line).replace("r-…", one["result"])
+            said = said.replace(USUAL, daemon.url).replace("localhost:8080", f"localhost:{daemon.port}")
+            said = re.sub(r"\bcurl ", "curl -fsS ", said)
+            done = subprocess.run(["bash", "-euc", said], cwd=folder, capture_output=True, text=True, timeout=200, check=False,
+                                  env={**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder, "URL": daemon.url,
+                                       "XDG_STATE_HOME": folder, "R": one["result"], "RESULT": two["result"],
+                                       "JOB": job, "job": job, "other": two["id"], "PATH": program.build + os.pathsep + os.environ["PATH"]})
+            assert done.returncode == 0, (line, said, done)
 
 
 if __name__ == "__main__":

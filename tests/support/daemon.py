@@ -38,7 +38,8 @@ def record(method, path, headers, body, reply):
         return
     kind = reply.headers.get("content-type", "")
     is_text = "json" in kind and len(reply.body) < 1 << 20 and "content-encoding" not in reply.headers
-    line = {"method": method, "path": path, "headers": {k.lower(): v for k, v in headers.items()},
+    sent = {k.lower(): v.decode("latin-1") if isinstance(v, bytes) else v for k, v in headers.items()}
+    line = {"method": method, "path": path, "headers": sent,
             "body": base64.b64encode(body).decode() if body is not None and len(body) < 1 << 20 else None,
             "status": reply.status, "answer_headers": reply.headers, "size": len(reply.body),
             "answer": base64.b64encode(reply.body).decode() if is_text else None}

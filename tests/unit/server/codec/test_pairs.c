@@ -42,6 +42,32 @@ static void every_object_with_both_sides_is_a_row(void **state) {
     assert_int_equal(pairs.count, 0);
 }
 
+static void a_list_is_a_table_of_the_members_that_are_asked_for(void **state) {
+    (void)state;
+    static const char text[] =
+        "{\"rows\": [{\"name\": \"x\", \"rms\": 0.123456, \"more\": 1}, "
+        "{\"rms\": null, \"name\": \"yyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyyy\"}, "
+        "7]}";
+    static const char *const members[] = {"name", "rms", NULL};
+    Listing listing;
+    assert_int_equal(listing_read(text, sizeof text - 1, "rows", members, &listing, NULL),
+                     STATUS_OK);
+    assert_int_equal(listing.columns, 2);
+    assert_int_equal(listing.rows, 3);
+    assert_string_equal(listing.cells[0], "x");
+    assert_string_equal(listing.cells[1], "0.1235");
+    assert_int_equal(strlen(listing.cells[2]), LISTING_CELL - 1);
+    assert_string_equal(listing.cells[3], "-");
+    assert_string_equal(listing.cells[4], "-");
+    listing_clear(&listing);
+    assert_int_equal(listing_read(text, sizeof text - 1, "none", members, &listing, NULL),
+                     STATUS_OK);
+    assert_int_equal(listing.rows, 0);
+    listing_clear(&listing);
+    assert_int_equal(listing_read("[1]", 3, "rows", members, &listing, NULL), STATUS_UNREADABLE);
+    listing_clear(&listing);
+}
+
 static void what_is_no_object_is_refused(void **state) {
     (void)state;
     static const char *const texts[] = {"", "[1]", "{", "1", "{\"a\": 1, \"a\": 2}"};
@@ -70,6 +96,7 @@ static void rows_are_bounded_and_long_texts_cut(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_object_with_both_sides_is_a_row),
+        cmocka_unit_test(a_list_is_a_table_of_the_members_that_are_asked_for),
         cmocka_unit_test(what_is_no_object_is_refused),
         cmocka_unit_test(rows_are_bounded_and_long_texts_cut),
     };
