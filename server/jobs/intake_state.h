@@ -133,6 +133,9 @@ void computation_free(Computation *computation);
 
 void intake_drop(Intake *intake); // frees what is left with the last hold
 
+// Held for the caller; NULL if no such job is in memory.
+Job *intake_find_live(Intake *intake, const char *id);
+
 // With the lock held: what intake_retry does for jobs that were dismissed.
 void intake_retry_dismissed(Intake *intake);
 // Nobody else is there any more: what waits for room stays unfinished in the store.

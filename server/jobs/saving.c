@@ -66,13 +66,14 @@ static bool make_room(Saving *saving, size_t count) {
     return true;
 }
 
-// With the lock held: the rows as they go to the store, of jobs that have none on the way.
-static void close_jobs(Saving *saving) {
+// With the lock held: the rows as they go to the store, of at most so many jobs that have none on
+// the way.
+static void close_jobs(Saving *saving, size_t most) {
     const Findings *findings = &saving->findings;
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
     size_t count = 0;
     for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared)
-        count += !job->is_closing;
+        count += !job->is_closing && count < most;
     saving->count = 0;
     if (!make_room(saving, count))
         count = saving->room; // the others get the next turn
@@ -211,7 +212,7 @@ static Status post(Saving *saving) {
 // With the lock held: what waits is on the way to the store, or else this is at its end (false).
 static bool go_on(Saving *saving) {
     for (;;) {
-        close_jobs(saving);
+        close_jobs(saving, SIZE_MAX);
         if (saving->count == 0)
             return false;
         const Status status = post(saving);
@@ -329,7 +330,7 @@ static void lose(Intake *intake, Computation *computation, Findings *findings) {
                      .room = 1};
     intake->saving++;
     for (;;) {
-        close_jobs(&saving);
+        close_jobs(&saving, COUNT(jobs));
         if (saving.count == 0)
             break;
         publish(&saving, STATUS_NO_MEMORY, "no memory to save the job", false);

@@ -232,6 +232,25 @@ def test_a_dripping_head_is_cut_off():
         assert seconds is not None and 8 < seconds < 20, seconds
 
 
+def test_large_bodies_keep_no_scene_out():
+    """Clients who hold back the last byte of large bodies: another large one is 503, a small one is run."""
+    most = 1 << 16
+    with program.daemon("--max-body", str(most)) as daemon:
+        holders = [connect(daemon) for _ in range(17)]
+        for client in holders:
+            client.sendall(POST + b"Content-Length: %d\r\n\r\n" % most + b" " * (most - 1))
+        time.sleep(1)  # until all are read
+        scene = json.dumps(program.scene("paper_free_sponge"))
+        headers = {"Content-Type": "application/json"}
+        large = daemon.request("POST", "/v1/jobs", body=scene.ljust(most), headers=headers)
+        assert large.status == 503 and int(large.headers["retry-after"]) >= 1, large
+        assert daemon.request("POST", "/v1/jobs", body=scene, headers=headers).status == 200
+        for client in holders:
+            client.close()
+        time.sleep(1)
+        assert daemon.request("POST", "/v1/jobs", body=scene.ljust(most), headers=headers).status == 200
+
+
 def test_who_takes_nothing_is_cut_off():
     """A client who asks for much and reads none of it is thrown out after a minute; a slow reader is not."""
     with program.daemon("--workers", "1") as daemon:
