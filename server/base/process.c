@@ -48,7 +48,7 @@ void process_facts(ProcessFacts *facts) {
 // By default the C library keeps, for each of its up to 8 arenas a core, twice the largest block
 // that was ever freed: after one study of 20 MB, 40 MB for every few threads.
 void process_return_memory(void) {
-    enum { KEPT = 4 << 20 };
+    enum { KEPT = 8 << 20 };
     mallopt(M_MMAP_THRESHOLD, KEPT);
     mallopt(M_TRIM_THRESHOLD, KEPT);
 }

@@ -114,7 +114,7 @@ static Status check(const ServeSettings *settings, Problem *problem) {
                         "is %llu, more than the %llu jobs of --queue: no token could ever have "
                         "so many; lower --quota or raise --queue",
                         (unsigned long long)settings->quota, (unsigned long long)settings->queue);
-    if (settings->keep_bytes > 0 && settings->keep_bytes < MIB)
+    if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
         status =
             problem_add(problem, STATUS_USAGE, "--keep-bytes",
                         "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
