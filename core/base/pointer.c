@@ -253,7 +253,7 @@ static bool takes_value(const Place *place) {
 
 static bool find(const Field *fields, const void *item, const char *pointer, Place *place,
                  char why[POINTER_SENTENCE]) {
-    *place = (Place){NULL};
+    *place = (Place){0};
     if (!go_on(place, fields, (void *)item, NULL, NULL, pointer, "the scene", why))
         return false;
     if (takes_value(place))

@@ -1,6 +1,7 @@
 #include "server/base/process.h"
 
 #include <dirent.h>
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,4 +43,12 @@ void process_facts(ProcessFacts *facts) {
         facts->cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
         facts->open_files_most = limit.rlim_cur;
+}
+
+// By default the C library keeps, for each of its up to 8 arenas a core, twice the largest block
+// that was ever freed: after one study of 20 MB, 40 MB for every few threads.
+void process_return_memory(void) {
+    enum { KEPT = 8 << 20 };
+    mallopt(M_MMAP_THRESHOLD, KEPT);
+    mallopt(M_TRIM_THRESHOLD, KEPT);
 }

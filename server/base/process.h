@@ -1,4 +1,5 @@
-// What the system says of this process. Used by api/metrics.c.
+// What the system says of this process, and how it deals with its memory. Not what is in that
+// memory: every cache has a budget of its own. Used by api/metrics.c and command/serve.c.
 #ifndef SERVER_BASE_PROCESS_H
 #define SERVER_BASE_PROCESS_H
 
@@ -9,5 +10,8 @@ typedef struct ProcessFacts {
     double cpu_seconds;
 } ProcessFacts;
 void process_facts(ProcessFacts *facts); // 0 where the system does not tell
+
+// From here on what is freed soon goes back to the system, whichever thread it was that freed it.
+void process_return_memory(void);
 
 #endif

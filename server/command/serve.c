@@ -15,6 +15,7 @@
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/base/notify.h"
+#include "server/base/process.h"
 #include "server/command/data_folder.h"
 #include "server/command/reach.h"
 #include "server/command/serve.h"
@@ -113,7 +114,7 @@ static Status check(const ServeSettings *settings, Problem *problem) {
                         "is %llu, more than the %llu jobs of --queue: no token could ever have "
                         "so many; lower --quota or raise --queue",
                         (unsigned long long)settings->quota, (unsigned long long)settings->queue);
-    if (settings->keep_bytes > 0 && settings->keep_bytes < MIB)
+    if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
         status =
             problem_add(problem, STATUS_USAGE, "--keep-bytes",
                         "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
@@ -200,6 +201,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     Meter *meter = NULL;
     Listener *listener = NULL;
     Keeper *keeper = NULL;
+    process_return_memory();
     fourier_start();
     Status status = address_read(settings->listen, &door.address, problem);
     if (status == STATUS_OK) {

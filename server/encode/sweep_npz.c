@@ -129,7 +129,7 @@ static void copy(const Layout *layout, Bytes *bytes) {
 
 void sweep_npz(const Sweep *sweep, Bytes *bytes) {
     Layout layout = {0};
-    Archive archive = {.sweep = sweep, .rows = sweep->table.points.count, .zip = {&layout}};
+    Archive archive = {.sweep = sweep, .rows = sweep->table.points.count, .zip = {.layout = &layout}};
     const size_t columns = sweep->axes.count + sweep->metrics.count;
     double *room = calloc(archive.rows * columns + 1, sizeof *room);
     if (room == NULL)

@@ -234,7 +234,11 @@ def test_the_landing_page_has_lines_that_work():
         timer.start()
         # -x names the line, -fS its fault.
         script = "set -ex\n" + "\n".join(re.sub(r"\bcurl -s", "curl -fsS", line) for line in lines[1:] + lines[:1])
-        done = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+        # Where it is instrumented a study may outlast its wait; it goes on, and is known the next time.
+        for _ in range(6 if program.is_sanitized() else 1):
+            done = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+            if done.returncode == 0:
+                break
         timer.join()
         assert done.returncode == 0, (done.returncode, done.stderr[-1500:], done.stdout[-500:])
         assert done.stdout.count('"status": "successful"') >= 1, done.stdout[-2000:]

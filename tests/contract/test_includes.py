@@ -33,6 +33,7 @@ MHD_FILES = [f"server/http/{name}" for name in ("listener.c", "exchange.c", "exc
 # One room per foreign library: header -> the only files or folders that may include it.
 FOREIGN = {
     "microhttpd.h": MHD_FILES,
+    "malloc.h": ["server/base/process.c"],
     "sqlite3.h": ["server/store/database.c", "server/store/row.c"],
     "jansson.h": ["server/codec/"],
     "fftw3.h": ["core/math/fourier.c"],

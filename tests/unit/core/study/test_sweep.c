@@ -57,7 +57,7 @@ static void values_add(Inquiry *inquiry, const char *pointer, size_t count,
 }
 
 static SweepPlan *plan_of(Inquiry *inquiry) {
-    SweepPlan *plan;
+    SweepPlan *plan = NULL;
     if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK ||
         sweep_plan_new(study_of(inquiry), &inquiry->simulation, NULL, &plan, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);

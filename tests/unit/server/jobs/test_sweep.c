@@ -92,7 +92,7 @@ static JobState state_of(const Room *room, const char *id, char result[72]) {
 
 static void finish(const Room *room, const char *id, char result[72]) {
     JobState state;
-    while (!job_state_is_final(state = state_of(room, id, result)))
+    while (!job_state_is_final((int)(state = state_of(room, id, result))))
         nap(2000000);
     assert_int_equal(state, JOB_SUCCESSFUL);
 }
