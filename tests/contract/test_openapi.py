@@ -188,9 +188,15 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/results/{id}/again", "/v1/results/r-0/again")
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json=scene)
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json={**scene, "duration": 61})
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", json={})
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body="{", headers={"Content-Type": "application/json"})
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body="{}")
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body=b" " * (1 << 24) + b"x",
+             headers={"Content-Type": "application/json"})
         running = daemon.get("/v1/jobs").json()["jobs"][0]["id"]
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("GET", "/v1/compare", f"/v1/compare?a={running}&b={job['id']}")
+        call("POST", "/v1/compare", "/v1/compare", json={**measured, "a": running})
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")
