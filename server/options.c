@@ -185,14 +185,22 @@ static Status file_read(const Reader *reader, const char *path) {
         return problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
                            strerror(errno));
     char line[LINE_SIZE], typed[NAME_SIZE];
+    errno = 0;
     for (size_t number = 1; fgets(line, sizeof line, file) != NULL; number++) {
+        snprintf(typed, sizeof typed, "%.64s:%zu", path, number);
+        if (strchr(line, '\n') == NULL && !feof(file)) {
+            (void)problem_add(reader->problem, STATUS_USAGE, typed,
+                              "must be a line of text of at most %d bytes", LINE_SIZE - 2);
+            break;
+        }
         for (char *c = line; *c != '\0'; c++)
-            if (*c == '#' && (c == line || isspace((unsigned char)c[-1])))
-                *c = '\0', c--;
+            if (*c == '#' && (c == line || isspace((unsigned char)c[-1]))) {
+                *c = '\0';
+                break;
+            }
         char *name = trimmed(line);
         if (*name == '\0')
             continue;
-        snprintf(typed, sizeof typed, "%.64s:%zu", path, number);
         char *equals = strchr(name, '=');
         if (equals == NULL) {
             (void)problem_add(reader->problem, STATUS_USAGE, typed, "must read: name = value");
@@ -206,6 +214,9 @@ static Status file_read(const Reader *reader, const char *path) {
         else
             (void)option_set(reader, row, typed, trimmed(equals + 1), OPTION_FILE);
     }
+    if (ferror(file))
+        (void)problem_add(reader->problem, STATUS_USAGE, path, "cannot be read: %s",
+                          strerror(errno));
     fclose(file);
     return STATUS_OK;
 }

@@ -63,7 +63,9 @@ done
 ask() {
     echo "-- $1 ($2)"
     local code
-    "$python" "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
+    local -a runner=()
+    [ "$2" != tsan ] || runner=("${still[@]}")
+    "${runner[@]}" "$python" "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
     code=${PIPESTATUS[0]}
     # "tests/contract/test_includes.py: 3 passed, 0 failed"; a file that counts nothing is one test.
     if read -r good bad < <(sed -n '$s/.*: \([0-9]*\) passed, \([0-9]*\) failed.*/\1 \2/p' "$log"); then
@@ -86,6 +88,10 @@ rm -f "$record"
 # What faces hostile input is asked once more of the instrumented program.
 if [[ " ${presets[*]} " == *" debug "* ]]; then
     while read -r file; do ask "$file" debug; done < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)
+fi
+# And what concerns threads of the one that watches them.
+if [[ " ${presets[*]} " == *" tsan "* ]]; then
+    while read -r file; do ask "$file" tsan; done < <(grep -l '^THREADED = True' tests/contract/test_*.py)
 fi
 
 echo

@@ -108,6 +108,8 @@ enum {
     // FLAG: false counts as absent, so that the canonical form without it is as it was before there
     // was such a row.
     FIELD_RARE = 32,
+    // TEXTS: each is a JSON number, string, true or false, kept as JSON text.
+    FIELD_SCALARS = 64,
 };
 
 struct Field {
@@ -225,9 +227,9 @@ void fields_clear(const Field *fields, void *item);
 Status fields_copy(const Field *fields, const void *source, void *target);
 
 // Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ...
-// Never absent are FLAG (but FIELD_RARE), BASE and, under PRESENCE_DEFAULT, an ITEM and what has elements (an empty
-// list was asked for then). Any other ITEM is absent if all its members are, whatever their
-// presence (its flags do not count).
+// Never absent are FLAG (but FIELD_RARE), BASE and, under PRESENCE_DEFAULT, an ITEM and what has
+// elements (an empty list was asked for then). Any other ITEM is absent if all its members are,
+// whatever their presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);
 
 // Makes a new default value of `kind`; NULL without memory. Freed by variant_free.

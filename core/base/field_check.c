@@ -230,9 +230,29 @@ static bool must_be_there(const Field *field) {
             field->kind == FIELD_KIND_VARIANT);
 }
 
+// Whether there is nothing to say of a member, not even where it stands: of most.
+static bool is_plainly_right(const Field *field, const void *item) {
+    const void *member = (const char *)item + field->offset;
+    if (field_is_absent(field, item))
+        return !must_be_there(field);
+    switch (field->kind) {
+    case FIELD_KIND_FLAG:
+        return true;
+    case FIELD_KIND_REAL:
+        return isfinite(*(const double *)member) &&
+               range_holds(&field->range, *(const double *)member);
+    case FIELD_KIND_COUNT:
+        return range_holds(&field->range, (double)*(const uint64_t *)member);
+    default:
+        return false;
+    }
+}
+
 Status fields_check(const Field *fields, const void *item, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        if (is_plainly_right(field, item))
+            continue;
         char place[POINTER_SIZE];
         if (field->kind == FIELD_KIND_BASE)
             text_fit(place, sizeof place, pointer);

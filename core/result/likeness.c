@@ -253,7 +253,7 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
         if (isnan(lag))
             status = problem_set(problem, STATUS_LIMIT,
                                  "no shift within %g s leaves half of the shorter one in common "
-                                 "with the other",
+                                 "with the other, and both moving there",
                                  most);
         else
             *shift = (lag - centre) / rate;

@@ -255,7 +255,7 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
         status = complete_accuracy(simulation, problem);
     if (status == STATUS_OK)
         status = check_cost(simulation, limits, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && warnings != NULL)
         status = plausible_warn(simulation, warnings);
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for warnings")
                                       : status;

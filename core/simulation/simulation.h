@@ -51,7 +51,8 @@ typedef struct SimulationLimits {
     // Solver steps that a run may be foretold to take; it is refused beyond, and stopped at
     // SIMULATION_PATIENCE times as many where it was foretold too little. 0: none.
     double steps;
-    double bytes; // of memory that a run may be foretold to take; 0: none
+    double bytes;  // of memory that a run may be foretold to take; 0: none
+    size_t points; // of a sweep; 0: the usual
 } SimulationLimits;
 
 #define SIMULATION_PATIENCE 3

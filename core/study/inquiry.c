@@ -18,13 +18,14 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
     if (limits == NULL || !(limits->steps > 0))
         return STATUS_OK;
     Cost cost;
+    const double own = study_kind(inquiry->study)->most_runs;
+    const double most = (own > 0 ? own : study_runs) * limits->steps;
     TRY(inquiry_cost(inquiry, limits, &cost, problem));
-    if (cost.steps <= study_runs * limits->steps)
+    if (cost.steps <= most)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
                        "would take about %.2g s of CPU in all, at most %.4g s are allowed: %s",
-                       cost.cpu_seconds, study_runs * limits->steps * SOLVER_STEP,
-                       study_kind(inquiry->study)->lessen);
+                       cost.cpu_seconds, most * SOLVER_STEP, study_kind(inquiry->study)->lessen);
 }
 
 Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,

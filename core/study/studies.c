@@ -2,7 +2,7 @@
 #include "core/study/study.h"
 
 const StudyKind *const studies[] = {
-    &study_tradeoff, &study_ensemble, &study_compare, &study_sensitivity, NULL,
+    &study_tradeoff, &study_ensemble, &study_compare, &study_sensitivity, &study_sweep, NULL,
 };
 
 static const Kind *study_at(size_t index) {

@@ -25,6 +25,7 @@ typedef struct StudyKind {
     const Kind *answer; // of the same name; its value struct begins with a Variant
     const char *lessen; // what makes it shorter: "ask for fewer runs"
     bool is_measured;   // its answer holds CPU times, which another time will differ
+    double most_runs;   // it may take as long as so many runs may; 0: ten
     // Judges what rows cannot say and completes defaults, below "/study", for a completed scene.
     Status (*complete)(Study *study, const Simulation *simulation, const SimulationLimits *limits,
                        Problem *problem);
@@ -39,7 +40,8 @@ typedef struct StudyKind {
 
 extern const StudyKind *const studies[]; // NULL-terminated
 extern const KindTable study_kinds, study_answer_kinds;
-extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity;
+extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity,
+    study_sweep;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;

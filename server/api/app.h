@@ -29,12 +29,13 @@ extern const char program_version[]; // "0.1.0"
 extern const char program_build[];   // the compiler
 
 // The handlers, by file; routes.c lists them with their patterns.
-Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_events;
+Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
     results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
     results_ensemble, results_compare, results_sensitivity;
 Handler cache_show, cache_explain;
 Handler compare_results, compare_measured;
+Handler sweeps_table, sweeps_point, sweeps_scene;
 Handler materials_list, materials_show, materials_show_revision;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;

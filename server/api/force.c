@@ -1,6 +1,5 @@
 // One impact at full detail. The result does not keep it: the scene is run again (closeup.h), at
 // once where that is foretold to be quick, else beside the workers while the request sleeps.
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,20 +62,14 @@ static Status read_what(const Request *request, Look *look, Problem *problem) {
     const char *text = request->parameters[1];
     char *end;
     const unsigned long long number = strtoull(text, &end, 10);
-    double points;
     if (*text < '1' || *text > '9' || *end != '\0' || strlen(text) > 12)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is no impact \"%.20s\": they are numbered from 1, as "
                            "impacts.json lists them",
                            text);
-    TRY(request_number(request, "points", CLOSEUP_POINTS_LEAST, CLOSEUP_POINTS_MOST, CLOSEUP_POINTS,
-                       &points, problem));
-    if (points != floor(points))
-        return problem_set(problem, STATUS_USAGE, "\"points\" must be a whole number, is %.17g",
-                           points);
     look->number = (size_t)number;
-    look->points = (size_t)points;
-    return STATUS_OK;
+    return request_count(request, "points", CLOSEUP_POINTS_LEAST, CLOSEUP_POINTS_MOST,
+                         CLOSEUP_POINTS, &look->points, problem);
 }
 
 // Of a look that has been taken; its columns become the sheet's.

@@ -22,10 +22,12 @@ static void write_raw(Bytes *bytes, const char *name, const char *json) {
 }
 
 static void write_links(Bytes *bytes, const char *id, const char *result, bool has_result,
-                        JobSlots *slots) {
+                        bool has_table, JobSlots *slots) {
     bytes_format(bytes, ", \"links\": {\"self\": \"%s/v1/jobs/", link_base());
     slots->self = bytes->count;
     bytes_format(bytes, "%s\"", id);
+    if (has_table)
+        bytes_format(bytes, ", \"table\": \"%s/v1/jobs/%s/table.json\"", link_base(), id);
     if (has_result)
         bytes_format(
             bytes,
@@ -55,6 +57,10 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
         bytes_format(bytes, ", \"study\": \"%s\"", show->study);
     bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);
     bytes_real(bytes, show->progress);
+    if (show->points > 0)
+        bytes_format(bytes, ", \"points\": {\"all\": %llu, \"done\": %llu, \"failed\": %llu}",
+                     (unsigned long long)show->points, (unsigned long long)show->points_done,
+                     (unsigned long long)show->points_failed);
     bytes_format(bytes, ", \"cached\": %s, \"result\": ", show->is_cached ? "true" : "false");
     bytes_json_string(bytes, has_result ? show->result : NULL);
     if (has_result && show->is_result_deleted)
@@ -85,7 +91,8 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
         bytes_real(bytes, show->total);
     bytes_text(bytes, "}");
     if (parts & JOB_PUT_LINKS)
-        write_links(bytes, show->id, show->result, has_result && !show->is_result_deleted, slots);
+        write_links(bytes, show->id, show->result, has_result && !show->is_result_deleted,
+                    show->points > 0, slots);
     else
         bytes_text(bytes, ", \"links\": {}");
     bytes_text(bytes, "}");

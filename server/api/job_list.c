@@ -114,10 +114,10 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     size_t count = 1;
     for (size_t i = 0; studies[i] != NULL && count + 1 < COUNT(kinds); i++)
         kinds[count++] = studies[i]->kind.name;
-    double limit;
+    size_t limit;
     int kind;
-    TRY(request_number(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
-    *search = job_search_all((size_t)limit);
+    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    *search = job_search_all(limit);
     TRY(read_choice(request, "status", job_state_names, -1, state, problem));
     TRY(read_choice(request, "kind", kinds, -1, &kind, problem));
     TRY(read_text(request, "before", &search->before, problem));

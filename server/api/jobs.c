@@ -141,13 +141,30 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
     job_show_clear(&show);
 }
 
-static bool answer_known(App *app, const Submission *submission, Reply *reply) {
+// How long the client would wait, told in the reply.
+static double read_wait(const Request *request, Reply *reply) {
+    const Prefer prefer = header_prefer(request->prefer);
+    double wait = prefer.responds_async ? 0 : wait_initial;
+    char applied[24] = "";
+    if (prefer.has_wait) {
+        wait = prefer.wait < wait_most ? prefer.wait : wait_most;
+        snprintf(applied, sizeof applied, "wait=%.4g", wait);
+    }
+    snprintf(reply->preference_applied, sizeof reply->preference_applied, "%s%s%s",
+             prefer.responds_async ? "respond-async" : "",
+             prefer.responds_async && prefer.has_wait ? ", " : "", applied);
+    return wait;
+}
+
+static bool answer_known(App *app, const Request *request, const Submission *submission,
+                         Reply *reply) {
     KnownAnswer known;
     if (submission->idempotency_key != NULL || !intake_known(app->intake, submission, &known))
         return false;
     reply_borrow(reply, 200, type_json, known.body, known.size);
     reply->release = free;
     reply->context = known.body;
+    (void)read_wait(request, reply);
     return true;
 }
 
@@ -164,7 +181,7 @@ static Status submit(App *app, const Request *request, const Submission *submiss
     const Status status = intake_submit(app->intake, submission, job, problem);
     if (status == STATUS_BUSY || status == STATUS_QUOTA)
         reply->retry_after = intake_retry_after(app->intake, request->client, status);
-    if (status == STATUS_OK && !reply->is_replayed)
+    if (status == STATUS_OK && !reply->is_replayed && submission->retry_of == NULL)
         learn(app, submission, mark, *job);
     return status;
 }
@@ -172,22 +189,12 @@ static Status submit(App *app, const Request *request, const Submission *submiss
 // Waits as long as the client likes, and at least until nobody can lose the job. Drops the hold.
 static Status answer_job(App *app, const Request *request, Reply *reply, Job *job,
                          Problem *problem) {
-    const Prefer prefer = header_prefer(request->prefer);
-    double wait = prefer.responds_async ? 0 : wait_initial;
-    if (prefer.has_wait)
-        wait = prefer.wait < wait_most ? prefer.wait : wait_most;
-    if (pause_begin(request, reply, job, wait))
+    if (pause_begin(request, reply, job, read_wait(request, reply)))
         return STATUS_OK;
     bool is_paused;
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)
         return STATUS_OK;
-    char applied[24] = "";
-    if (prefer.has_wait)
-        snprintf(applied, sizeof applied, "wait=%.4g", wait);
-    snprintf(reply->preference_applied, sizeof reply->preference_applied, "%s%s%s",
-             prefer.responds_async ? "respond-async" : "",
-             prefer.responds_async && prefer.has_wait ? ", " : "", applied);
     return reply_job(app, reply, job, 0, problem);
 }
 
@@ -206,7 +213,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
                                    .client = request->client,
                                    .idempotency_key = request->idempotency_key,
                                    .is_replayed = &reply->is_replayed};
-    if (answer_known(app, &submission, reply))
+    if (answer_known(app, request, &submission, reply))
         return STATUS_OK;
     TRY(submit(app, request, &submission, reply, &job, problem));
     return answer_job(app, request, reply, job, problem);
@@ -259,7 +266,7 @@ Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem
         return jobs_create(app, request, reply, problem);
     TRY(body_require_json(request, problem));
     if (!atomic_load(&app->is_stopping))
-        (void)answer_known(app, &submission, reply);
+        (void)answer_known(app, request, &submission, reply);
     return STATUS_OK;
 }
 
@@ -287,4 +294,23 @@ Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *pro
     if (is_paused)
         return STATUS_OK;
     return reply_job(app, reply, job, 200, problem);
+}
+
+Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *problem) {
+    Job *job = NULL;
+    bool is_paused;
+    if (request->kept != NULL) {
+        job = pause_end(request->kept, reply);
+    } else {
+        const Submission submission = {.retry_of = request->parameters[0],
+                                       .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
+                                       .is_replayed = &reply->is_replayed};
+        TRY(refuse_stopping(app, problem));
+        TRY(submit(app, request, &submission, reply, &job, problem));
+    }
+    TRY(pause_until_kept(request, reply, job, &is_paused, problem));
+    if (is_paused)
+        return STATUS_OK;
+    return reply_job(app, reply, job, 202, problem);
 }

@@ -88,7 +88,9 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
     bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
                  link_base(), id);
     if (answer->study != NULL) {
-        const char *name = answer->study->kind->name;
+        // A sweep's rows are a table of their own.
+        const bool is_table = answer->study->kind == study_sweep.answer;
+        const char *name = is_table ? "table" : answer->study->kind->name;
         const AnswerFormat *format = answer_formats(answer->study->kind);
         bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", name, link_base(), id, name);
         while ((++format)->extension != NULL)

@@ -75,14 +75,11 @@ static Status choose_rows(const Request *request, const Response *response, Tabl
 // "?points=n": at most n buckets, all of one size but the last.
 static Status choose_buckets(const Request *request, Sheet *sheet, Problem *problem) {
     Table *table = &sheet->table;
-    double points;
+    size_t most;
     if (request_query(request, "points") == NULL)
         return STATUS_OK;
-    TRY(request_number(request, "points", 1, 1e9, 1, &points, problem));
-    if (points != floor(points))
-        return problem_set(problem, STATUS_USAGE,
-                           "\"points\" must be a whole number of at least 1, is %.17g", points);
-    const size_t most = (size_t)points, samples = table->count;
+    TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
+    const size_t samples = table->count;
     const size_t bucket = (samples + most - 1) / most;
     TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket,
                      &sheet->own, problem));

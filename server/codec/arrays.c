@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/base/bytes.h"
+
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 void read_no_memory(Reader *reader) {
@@ -116,6 +118,31 @@ static char *pair_text(const char *key, const char *value) {
     return text;
 }
 
+// The value as JSON text; NULL without memory.
+static char *scalar_text(const json_t *value) {
+    Bytes bytes = {0};
+    if (json_is_string(value))
+        bytes_json_string(&bytes, json_string_value(value));
+    else if (json_is_boolean(value))
+        bytes_text(&bytes, json_is_true(value) ? "true" : "false");
+    else if (json_is_integer(value) && json_integer_value(value) > (json_int_t)1 << 53)
+        bytes_format(&bytes, "%lld", (long long)json_integer_value(value));
+    else
+        bytes_real(&bytes, read_number(value));
+    return bytes_take(&bytes, NULL);
+}
+
+static void add_scalar(Reader *reader, const json_t *value, Texts *texts, const char *place) {
+    const bool is_scalar = json_is_string(value) || json_is_boolean(value) || json_is_number(value);
+    if (!is_scalar)
+        refuse_type(reader, place, value, NULL, "a number, a string, true or false");
+    char *text = is_scalar ? scalar_text(value) : strdup("0");
+    if (text == NULL)
+        read_no_memory(reader);
+    else
+        texts->at[texts->count++] = text;
+}
+
 // What is no string is told and its place kept by an allowed text, so that those behind it keep
 // theirs.
 static void add_text(Reader *reader, const json_t *value, const char *key, const Field *field,
@@ -160,7 +187,10 @@ void read_texts(Reader *reader, const json_t *value, const Field *field, Texts *
     } else {
         for (size_t i = 0; i < count; i++) {
             pointer_index(place, sizeof place, pointer, i);
-            add_text(reader, json_array_get(value, i), NULL, field, &texts, place);
+            if ((field->flags & FIELD_SCALARS) != 0)
+                add_scalar(reader, json_array_get(value, i), &texts, place);
+            else
+                add_text(reader, json_array_get(value, i), NULL, field, &texts, place);
         }
     }
     for (size_t i = 0; i < target->count; i++)

@@ -156,7 +156,10 @@ static void print_texts(Printer *printer, const Field *field) {
     }
     text_member(printer, "type", "array");
     open_member(printer, "items", "{");
-    text_member(printer, "type", "string");
+    if ((field->flags & FIELD_SCALARS) != 0)
+        word_member(printer, "type", "[\"number\", \"string\", \"boolean\"]");
+    else
+        text_member(printer, "type", "string");
     print_choices(printer, field);
     close_bracket(printer, "}");
     print_length(printer, field);

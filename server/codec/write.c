@@ -36,12 +36,15 @@ static void put_rows(Bytes *bytes, const Rows *rows) {
     bytes_text(bytes, "]");
 }
 
-static void put_texts(Bytes *bytes, const Texts *texts) {
+static void put_texts(Bytes *bytes, const Texts *texts, bool is_json) {
     bytes_text(bytes, "[");
     for (size_t i = 0; i < texts->count; i++) {
         if (i > 0)
             bytes_text(bytes, ", ");
-        bytes_json_string(bytes, texts->at[i]);
+        if (is_json)
+            bytes_text(bytes, texts->at[i]);
+        else
+            bytes_json_string(bytes, texts->at[i]);
     }
     bytes_text(bytes, "]");
 }
@@ -85,7 +88,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
         put_rows(bytes, member);
         break;
     case FIELD_KIND_TEXTS:
-        put_texts(bytes, member);
+        put_texts(bytes, member, (field->flags & FIELD_SCALARS) != 0);
         break;
     case FIELD_KIND_ITEM:
         write_item(bytes, field->fields, member, style);

@@ -15,6 +15,7 @@
 #include "server/command/run.h"
 #include "server/command/serve.h"
 #include "server/command/submit.h"
+#include "server/command/sweep.h"
 #include "server/command/token.h"
 #include "server/command/tradeoff.h"
 #include "server/command/watch.h"
@@ -38,10 +39,10 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,   &command_check,   &command_tradeoff,
-    &command_ensemble, &command_study, &command_import,  &command_token,
-    &command_submit,   &command_watch, &command_get,     &command_cancel,
-    &command_compare,  &command_help,  &command_version, NULL,
+    &command_serve,   &command_run,   &command_check,  &command_tradeoff, &command_ensemble,
+    &command_study,   &command_sweep, &command_import, &command_token,    &command_submit,
+    &command_watch,   &command_get,   &command_cancel, &command_compare,  &command_help,
+    &command_version, NULL,
 };
 
 static const char overview[] =
@@ -54,6 +55,7 @@ static const char overview[] =
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
     "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
+    "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd token create --name lab      let a client in who has this token\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"

@@ -88,7 +88,7 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
                              "may be read by everyone on this machine; chmod 600 %s", path);
     char piece[4096];
     Bytes bytes = {.most = PEM_MOST};
-    for (size_t count; (count = fread(piece, 1, sizeof piece, file)) > 0;)
+    for (size_t count; !bytes.is_failed && (count = fread(piece, 1, sizeof piece, file)) > 0;)
         bytes_put(&bytes, piece, count);
     fclose(file);
     const bool has_nul = bytes.at != NULL && strlen(bytes.at) != bytes.count;

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "core/math/fourier.h"
+#include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
 #include "server/base/notify.h"
@@ -26,7 +27,7 @@ typedef struct ServeSettings {
     char *listen, *data, *config, *base_url, *tls_cert, *tls_key;
     Texts host;
     uint64_t workers, queue, queue_bytes, max_body, max_samples, max_impacts, max_run_bytes,
-        cache_bytes, store_bytes;
+        max_points, cache_bytes, store_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
     double max_cpu_seconds, rate, keep_days;
     int journal;
@@ -51,6 +52,7 @@ static const Field serve_fields[] = {
     FIELD_COUNT(ServeSettings, max_impacts, NULL, WITHIN(1, 1e9), 5e5, "impacts a run may have before it is stopped"),
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
+    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
     FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
@@ -106,15 +108,17 @@ static Status check(const ServeSettings *settings, Problem *problem) {
         status = refuse(problem, "--queue", settings->queue, "--workers", settings->workers,
                         "a worker without a job is of no use");
     if (settings->quota > settings->queue)
-        status = problem_add(problem, STATUS_USAGE, "--quota",
-                          "is %llu, more than the %llu jobs of --queue: no token could ever have "
-                          "so many; lower --quota or raise --queue",
-                          (unsigned long long)settings->quota, (unsigned long long)settings->queue);
+        status =
+            problem_add(problem, STATUS_USAGE, "--quota",
+                        "is %llu, more than the %llu jobs of --queue: no token could ever have "
+                        "so many; lower --quota or raise --queue",
+                        (unsigned long long)settings->quota, (unsigned long long)settings->queue);
     if (settings->keep_bytes > 0 && settings->keep_bytes < MIB)
-        status = problem_add(problem, STATUS_USAGE, "--keep-bytes",
-                          "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
-                          "for no limit",
-                          (unsigned long long)settings->keep_bytes, MIB);
+        status =
+            problem_add(problem, STATUS_USAGE, "--keep-bytes",
+                        "is %llu B, less than an empty database takes: use at least %.0f, or 0 "
+                        "for no limit",
+                        (unsigned long long)settings->keep_bytes, MIB);
     return status;
 }
 
@@ -187,7 +191,8 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                                  .limits = {.samples = settings->max_samples,
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
-                                            .bytes = (double)settings->max_run_bytes}};
+                                            .bytes = (double)settings->max_run_bytes,
+                                            .points = settings->max_points}};
     const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
     const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,
                                  settings->tls_key, settings->require_tokens};
@@ -243,6 +248,17 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     return status;
 }
 
+// Before any thread starts, so that only sigwait sees them, and when the settings have been read:
+// until then they end us as they end anything.
+static void hold_signals(sigset_t *stops) {
+    sigemptyset(stops);
+    sigaddset(stops, SIGTERM);
+    sigaddset(stops, SIGINT);
+    pthread_sigmask(SIG_BLOCK, stops, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
+}
+
 static int run(int argc, char *const *argv) {
     ServeSettings settings;
     Options options = {0};
@@ -250,15 +266,6 @@ static int run(int argc, char *const *argv) {
     if (problem == NULL)
         return command_exit(STATUS_NO_MEMORY);
     problem_clear(problem);
-
-    // Blocked before any thread starts, so that only sigwait sees them.
-    sigset_t stops;
-    sigemptyset(&stops);
-    sigaddset(&stops, SIGTERM);
-    sigaddset(&stops, SIGINT);
-    pthread_sigmask(SIG_BLOCK, &stops, NULL);
-    signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 
     int code;
     Status status = fields_default(serve_fields, &settings);
@@ -269,10 +276,13 @@ static int run(int argc, char *const *argv) {
                              options.operands[0]);
     if (status == STATUS_OK)
         status = complete(&settings, problem);
-    if (status == STATUS_OK && settings.print_config)
+    if (status == STATUS_OK && settings.print_config) {
         options_print(serve_fields, &settings, &options, stdout);
-    else if (status == STATUS_OK)
+    } else if (status == STATUS_OK) {
+        sigset_t stops;
+        hold_signals(&stops);
         status = serve(&settings, &stops, problem);
+    }
     if (status == STATUS_OK) {
         code = COMMAND_OK;
     } else if (problem->status == STATUS_USAGE) {

@@ -7,10 +7,13 @@
 #include "server/encode/chart_compare.h"
 #include "server/encode/chart_ensemble.h"
 #include "server/encode/chart_sensitivity.h"
+#include "server/encode/chart_sweep.h"
 #include "server/encode/compare_csv.h"
 #include "server/encode/ensemble_csv.h"
 #include "server/encode/sensitivity_csv.h"
 #include "server/encode/svg.h"
+#include "server/encode/sweep_npz.h"
+#include "server/encode/sweep_table.h"
 #include "server/jobs/documents.h"
 
 static void json_write(const Variant *answer, Bytes *bytes) {
@@ -28,6 +31,22 @@ static void ensemble_chart(const Variant *answer, Bytes *bytes) {
 
 static void ensemble_table(const Variant *answer, Bytes *bytes) {
     ensemble_csv((const Ensemble *)(const void *)answer, bytes);
+}
+
+static void sweep_whole(const Variant *answer, Bytes *bytes) {
+    sweep_json((const Sweep *)(const void *)answer, NULL, bytes);
+}
+
+static void sweep_archive(const Variant *answer, Bytes *bytes) {
+    sweep_npz((const Sweep *)(const void *)answer, bytes);
+}
+
+static void sweep_chart(const Variant *answer, Bytes *bytes) {
+    chart_sweep((const Sweep *)(const void *)answer, bytes);
+}
+
+static void sweep_table(const Variant *answer, Bytes *bytes) {
+    sweep_csv((const Sweep *)(const void *)answer, bytes);
 }
 
 static void compare_chart(const Variant *answer, Bytes *bytes) {
@@ -60,6 +79,12 @@ static const struct {
      {{"json", "application/json", json_write},
       {"csv", csv_type, ensemble_table},
       {"svg", svg_type, ensemble_chart},
+      {NULL, NULL, NULL}}},
+    {&study_sweep,
+     {{"json", "application/json", sweep_whole},
+      {"csv", csv_type, sweep_table},
+      {"npz", "application/x-npz", sweep_archive},
+      {"svg", svg_type, sweep_chart},
       {NULL, NULL, NULL}}},
     {&study_compare,
      {{"json", "application/json", json_write},

@@ -6,7 +6,7 @@
 #include "core/study/study.h"
 #include "server/base/bytes.h"
 
-enum { ANSWER_FORMATS = 4 }; // at most, with the end
+enum { ANSWER_FORMATS = 5 }; // at most, with the end
 
 typedef struct AnswerFormat {
     const char *extension; // "svg"; NULL: the end

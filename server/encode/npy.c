@@ -5,14 +5,15 @@
 
 enum { PREAMBLE = 10, ALIGNMENT = 64 };
 
-void npy_put_header(Layout *layout, size_t rows, size_t columns) {
+void npy_put_header_of(Layout *layout, const char *type, size_t rows, size_t columns) {
     char header[2 * ALIGNMENT], shape[48];
     if (columns > 0)
         snprintf(shape, sizeof shape, "%zu, %zu", rows, columns);
     else
         snprintf(shape, sizeof shape, "%zu,", rows);
-    const int length = snprintf(header, sizeof header,
-                                "{'descr': '<f8', 'fortran_order': True, 'shape': (%s), }", shape);
+    const int length =
+        snprintf(header, sizeof header,
+                 "{'descr': '%.16s', 'fortran_order': True, 'shape': (%s), }", type, shape);
     // Blanks and a line's end fill it up, so that the numbers begin at a multiple of 64 bytes.
     const size_t used = PREAMBLE + (size_t)length + 1;
     const size_t size = (used + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT - PREAMBLE;
@@ -21,6 +22,10 @@ void npy_put_header(Layout *layout, size_t rows, size_t columns) {
     layout_put(layout, header, (size_t)length);
     layout_fill(layout, ' ', size - 1 - (size_t)length);
     layout_put(layout, "\n", 1);
+}
+
+void npy_put_header(Layout *layout, size_t rows, size_t columns) {
+    npy_put_header_of(layout, "<f8", rows, columns);
 }
 
 void npy_put_axis(Layout *layout, const Table *table) {

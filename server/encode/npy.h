@@ -9,6 +9,8 @@ extern const Encoder encoder_npy;
 
 // The header alone; `columns` 0: of one dimension.
 void npy_put_header(Layout *layout, size_t rows, size_t columns);
+// The same of another type: "|S7".
+void npy_put_header_of(Layout *layout, const char *type, size_t rows, size_t columns);
 // The axis's numbers alone; nothing where there is no axis.
 void npy_put_axis(Layout *layout, const Table *table);
 

@@ -117,7 +117,6 @@ static void close_up(const Dispatcher *dispatcher, Request *request, Status stat
 
 static const Route *find(const Dispatcher *dispatcher, Request *request, RouteSpan *spans,
                          size_t *count, char allow[64]) {
-    request->path = link_inside(request->path);
     request->route =
         route_find(dispatcher->table, request->method, request->path, spans, count, allow);
     return request->route;
@@ -165,9 +164,14 @@ static bool find_hot(const Dispatcher *dispatcher, Request *request, Reply *repl
         return false;
     const bool takes_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
-    if ((!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) &&
-        !hot_find(dispatcher->hot, request->target, false, reply, route))
-        return false;
+    if (!takes_gzip || !hot_find(dispatcher->hot, request->target, true, reply, route)) {
+        if (!hot_find(dispatcher->hot, request->target, false, reply, route))
+            return false;
+        if (takes_gzip && reply->varies_by_encoding) {
+            reply_clear(reply); // it is made once more, to be packed
+            return false;
+        }
+    }
     Problem problem;
     problem_clear(&problem);
     Status status = doorman_admit(dispatcher->doorman, request->route->scope, request, &problem);

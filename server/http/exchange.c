@@ -26,7 +26,8 @@ enum {
         10000, // from the connection to its first request line, from any to the end of its head
     BODY_MS = 60000,
     DRAINED = 4, // times the body's limit is read and thrown away, so that the client sees the 413
-    BODIES_HELD = 16, // times the body's limit may be in memory over all connections
+    BODIES_HELD = 16,       // times the body's limit may be in memory over all connections
+    BODY_SMALL = 16 * 1024, // is taken in any case: who holds large ones keeps no scene out
 };
 
 static enum MHD_Result send_problem(Exchange *exchange, int code, const Problem *problem,
@@ -134,7 +135,8 @@ static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t si
     exchange->request.is_too_large = exchange->received > most;
     if (!exchange->request.is_too_large) {
         exchange->is_counted = true;
-        exchange->is_busy = atomic_fetch_add(&desk->held, size) + size > BODIES_HELD * most;
+        exchange->is_busy = atomic_fetch_add(&desk->held, size) + size > BODIES_HELD * most &&
+                            exchange->received > BODY_SMALL;
         bytes_put(&exchange->body, data, size);
         if (exchange->body.is_failed) {
             atomic_fetch_sub(&desk->held, exchange->received);

@@ -25,6 +25,7 @@ enum {
     CONNECTIONS_MOST = 8192, // over all loops, where as many files may be open
     FILES_KEPT = 64,         // for everything else
     CONNECTION_MEMORY = 16 * 1024,
+    SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
 };
 
 struct Listener {
@@ -148,7 +149,7 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
     loop->daemon = MHD_start_daemon(
         flags, 0, NULL, NULL, exchange_go_on, loop, MHD_OPTION_CONNECTION_LIMIT, (unsigned)most,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_STRICT_FOR_CLIENT, 0,
+        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S, MHD_OPTION_STRICT_FOR_CLIENT, 0,
         MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop, MHD_OPTION_NOTIFY_CONNECTION,
         exchange_connection, loop, MHD_OPTION_NOTIFY_COMPLETED, exchange_close, loop,
         MHD_OPTION_ARRAY, is_tls ? tls : none, MHD_OPTION_END);

@@ -8,6 +8,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "server/base/link.h"
+
 static int hex_digit(char c) {
     if (c >= '0' && c <= '9')
         return c - '0';
@@ -66,13 +68,14 @@ Status request_open(Request *request, const char *target, Problem *problem) {
     memcpy(request->storage, target, size);
     memcpy(path, target, size);
     request->target = request->storage;
-    request->path = path;
     request->query_count = 0;
 
     char *question = strchr(path, '?');
+    if (question != NULL)
+        *question = '\0';
+    request->path = link_inside(path);
     if (question == NULL)
         return STATUS_OK;
-    *question = '\0';
     memcpy(queries, question + 1, strlen(question + 1) + 1);
     char *next = queries;
     while (next != NULL) {
@@ -153,5 +156,18 @@ Status request_number(const Request *request, const char *name, double least, do
             "the query parameter \"%s\" must be a number within [%s, %s], is \"%.40s\"", name,
             text_real(low, least), text_real(high, most), text);
     *value = number;
+    return STATUS_OK;
+}
+
+Status request_count(const Request *request, const char *name, size_t least, size_t most,
+                     size_t initial, size_t *value, Problem *problem) {
+    double number;
+    TRY(request_number(request, name, (double)least, (double)most, (double)initial, &number,
+                       problem));
+    if (number != floor(number))
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"%s\" must be a whole number, is \"%.40s\"", name,
+                           request_query(request, name));
+    *value = (size_t)number;
     return STATUS_OK;
 }

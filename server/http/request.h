@@ -25,7 +25,7 @@ typedef struct RequestPair {
 typedef struct Request {
     const char *method; // "GET"; HEAD is shown as GET, the listener drops the body
     const char *target; // path and query as sent
-    const char *path;   // as sent, without query and, once dispatched, base path
+    const char *path;   // as sent, without query and base path
     const char *parameters[REQUEST_PARAMETERS]; // what {..} in the route's pattern matched, in
                                                 // order, decoded
     RequestPair queries[REQUEST_QUERIES];
@@ -72,6 +72,9 @@ bool request_decode(char *text, bool is_query);
 // would be right.
 Status request_number(const Request *request, const char *name, double least, double most,
                       double initial, double *value, Problem *problem);
+// The same for a whole number of at most 2^53.
+Status request_count(const Request *request, const char *name, size_t least, size_t most,
+                     size_t initial, size_t *value, Problem *problem);
 
 // A body made piece by piece while it is sent, for what is too long to hold and for what is not
 // known yet. `next` writes up to `size` bytes and returns how many, STREAM_END behind the last, or

@@ -1,5 +1,4 @@
-// The jobs room as a whole: its computations and who waits for them, opening, closing, finding and
-// dismissing.
+// The jobs room as a whole: its computations and who waits for them, opening, closing and finding.
 #include "server/jobs/intake.h"
 
 #include <stddef.h>
@@ -7,7 +6,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
@@ -28,6 +27,7 @@ Computation *computation_new(const char *result) {
 void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
+    sweep_free(computation->sweep);
     inquiry_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
@@ -37,6 +37,12 @@ void computation_free(Computation *computation) {
 
 Computation *computation_of(QueueEntry *entry) {
     return (Computation *)(void *)((char *)entry - offsetof(Computation, queued));
+}
+
+void intake_call_worker(Intake *intake) {
+    pthread_cond_signal(&intake->work);
+    if (intake->slow_running >= intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
 }
 
 void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
@@ -53,9 +59,7 @@ void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
         queue_urge(intake->queue, &computation->queued);
     else
         queue_put(intake->queue, &computation->queued, client, 1e-9 * (double)clock_monotonic_ns());
-    pthread_cond_signal(&intake->work);
-    if (intake->slow_running >= intake->settings.workers)
-        pthread_cond_signal(&intake->spare_work);
+    intake_call_worker(intake);
 }
 
 void intake_release(Job *job) {
@@ -106,6 +110,7 @@ void intake_drop(Intake *intake) {
     pthread_cond_destroy(&intake->spare_work);
     pthread_cond_destroy(&intake->keys_free);
     pthread_cond_destroy(&intake->settled);
+    pthread_mutex_destroy(&intake->retries);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
 }
@@ -128,6 +133,8 @@ void intake_detach(Job *job) {
     index_remove(job->intake->in_flight, &computation->indexed);
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
+        if (computation->sweep != NULL)
+            sweep_stop(computation->sweep);
     } else {
         queue_remove(job->intake->queue, &computation->queued);
         computation_free(computation);
@@ -176,6 +183,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->settings.queue_bytes == 0)
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
+    pthread_mutex_init(&intake->retries, NULL);
     pthread_cond_init(&intake->work, NULL);
     pthread_cond_init(&intake->spare_work, NULL);
     pthread_cond_init(&intake->keys_free, NULL);
@@ -192,6 +200,8 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||
         intake->known == NULL || intake->queue == NULL || intake->workers == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
+    if (status == STATUS_OK)
+        status = store_sweep_tidy(store, problem);
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
     while (status == STATUS_OK && intake->worker_count < settings->workers + 1) {
@@ -233,6 +243,8 @@ void intake_close(Intake *intake) {
     for (size_t i = 0; i < intake->worker_count; i++)
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
+    for (SweepRun *run = intake->sweeps; run != NULL; run = run->next)
+        atomic_store(&run->computation->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
     pthread_cond_broadcast(&intake->spare_work);
     pthread_mutex_unlock(&intake->lock);
@@ -243,6 +255,17 @@ void intake_close(Intake *intake) {
         pthread_cond_wait(&intake->settled, &intake->lock);
     pthread_mutex_unlock(&intake->lock);
     // Whoever is still queued stays unfinished in the store, for the next start.
+    while (intake->stalled != NULL) {
+        Computation *computation = intake->stalled;
+        intake->stalled = computation->next_stalled;
+        let_go(computation);
+    }
+    while (intake->sweeps != NULL) {
+        Computation *computation = intake->sweeps->computation;
+        intake->sweeps = intake->sweeps->next;
+        queue_remove(intake->queue, &computation->queued);
+        let_go(computation);
+    }
     for (QueueEntry *entry; (entry = queue_take(intake->queue, false)) != NULL;)
         let_go(computation_of(entry));
     intake_abandon_delayed(intake);
@@ -266,7 +289,7 @@ void intake_close(Intake *intake) {
     intake_drop(intake);
 }
 
-static Job *find_live(Intake *intake, const char *id) {
+Job *intake_find_live(Intake *intake, const char *id) {
     pthread_mutex_lock(&intake->lock);
     Job *job = index_find(intake->jobs, id);
     if (job != NULL)
@@ -276,7 +299,7 @@ static Job *find_live(Intake *intake, const char *id) {
 }
 
 Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem) {
-    *found = find_live(intake, id);
+    *found = intake_find_live(intake, id);
     if (*found != NULL)
         return STATUS_OK;
     Job *job = job_new(NULL);
@@ -294,101 +317,6 @@ Status intake_find(Intake *intake, const char *id, Job **found, Problem *problem
         job->head = head_new(&result);
     result_row_clear(&result);
     *found = job;
-    return STATUS_OK;
-}
-
-static Status refuse_finished(const char *id, int state, Problem *problem) {
-    return problem_set(problem, STATUS_CONFLICT,
-                       "the job %.40s cannot be dismissed: it is %s already", id,
-                       job_state_names[state]);
-}
-
-static void dismissed(void *context, Status status, const char *detail) {
-    Job *job = context;
-    Intake *intake = job->intake;
-    pthread_mutex_lock(&intake->lock);
-    job->is_kept = status == STATUS_OK;
-    job->refusal = status;
-    text_fit(job->refused, sizeof job->refused, detail);
-    // Until the store has it, the job is found here.
-    if (status == STATUS_OK) {
-        intake_retire(job);
-    } else if (!intake->is_closing) {
-        job->next_undismissed = intake->undismissed;
-        intake->undismissed = job_hold(job);
-    }
-    wakers_call(&job->keepers);
-    intake_settle(intake);
-    pthread_mutex_unlock(&intake->lock);
-    job_drop(job); // the post's hold
-}
-
-void intake_retry_dismissed(Intake *intake) {
-    Job *job = intake->undismissed, *next;
-    intake->undismissed = NULL;
-    for (; job != NULL; job = next) {
-        next = job->next_undismissed;
-        const StoreDone done = {dismissed, job}; // takes the list's hold
-        if (store_job_update_post(intake->store, &job->closing, &done) == STATUS_OK) {
-            intake->posted++;
-        } else {
-            job->next_undismissed = intake->undismissed;
-            intake->undismissed = job;
-        }
-    }
-}
-
-// Live jobs only: dismissed for all at once, and on its way to the store.
-static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem) {
-    pthread_mutex_lock(&intake->lock);
-    if (job->is_closing || job_state_is_final(job->row.state)) {
-        const int state = job->is_closing ? job->closing.state : job->row.state;
-        pthread_mutex_unlock(&intake->lock);
-        return refuse_finished(id, state, problem);
-    }
-    job->row.state = JOB_DISMISSED;
-    if (job->started_ns > 0)
-        job->row.run = 1e-9 * (double)(clock_monotonic_ns() - job->started_ns);
-    job->row.finished_unix_ms = clock_unix_ms();
-    job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
-    intake_withdraw(job);
-    job->is_closing = true;
-    job->closing = job->row;
-    job->closing.is_unsaved = !job->is_kept;
-    job->is_kept = false;
-    intake_detach(job);
-    intake_release(job);
-    const StoreDone done = {dismissed, job_hold(job)};
-    const Status status = store_job_update_post(intake->store, &job->closing, &done);
-    if (status == STATUS_OK) {
-        intake->posted++;
-    } else {
-        job->refusal = status;
-        text_fit(job->refused, sizeof job->refused, "no memory to save the job");
-        wakers_call(&job->keepers);
-        job_drop(job); // the post's hold
-    }
-    wakers_call(&job->wakers);
-    totals_ended(&intake->totals, JOB_DISMISSED, false);
-    pthread_mutex_unlock(&intake->lock);
-    return STATUS_OK;
-}
-
-Status intake_dismiss(Intake *intake, const char *id, Job **dismissed, Problem *problem) {
-    *dismissed = NULL;
-    Job *job = find_live(intake, id);
-    Status status;
-    if (job != NULL) {
-        status = dismiss(intake, job, id, problem);
-    } else {
-        TRY(intake_find(intake, id, &job, problem));
-        status = refuse_finished(id, job->row.state, problem);
-    }
-    if (status != STATUS_OK) {
-        job_drop(job);
-        return status;
-    }
-    *dismissed = job;
     return STATUS_OK;
 }
 
@@ -468,7 +396,7 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     tally->cached_bytes = tally->series.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
-        tally->running += intake->workers[i].running != NULL;
+        tally->running += intake->workers[i].running != NULL || intake->workers[i].sweep != NULL;
     pthread_mutex_unlock(&intake->lock);
     tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -44,6 +44,9 @@ typedef struct Submission {
     const char *client;          // its token's name; NULL: nobody in particular
     const char *idempotency_key; // as it came, perhaps in quotes; NULL: none
     bool *is_replayed;           // set where the job is an earlier request's; NULL: not told
+    // Instead of a text the id of a finished job: those points of its sweep that failed are made
+    // again. STATUS_CONFLICT where none did or it is not finished, STATUS_GONE for another engine.
+    const char *retry_of;
 } Submission;
 
 // Accepts a scene: a job of its own, on its way to the store when this returns; nobody may be told

@@ -16,6 +16,8 @@
 
 enum { OUTCOME_FAILURES = 64 };
 
+struct SweepRun;
+
 typedef struct Wakers {
     Waker *at;
     size_t count;
@@ -27,14 +29,16 @@ typedef struct Computation {
     char result[72];
     Inquiry inquiry;
     char *scene, *warnings; // documents
-    QueueEntry queued;
+    QueueEntry queued;      // also for the next turn of a sweep
     bool is_running;
     int64_t began_ns;
     bool is_again; // only its series is wanted: the result is saved already
     Job *jobs;     // those who wait for it, by next_shared
     Wakers askers; // readers of the outcome
     atomic_bool is_stopped;
-    atomic_uint progress; // in 1/10,000
+    atomic_uint progress;   // in 1/10,000
+    struct SweepRun *sweep; // of a sweep that is under way, under the lock
+    struct Computation *next_stalled;
 } Computation;
 
 // A job goes to the store twice: when it is accepted and when it is final. Both are posted; where
@@ -72,9 +76,11 @@ typedef struct Failure {
 typedef struct Worker {
     Intake *intake;
     pthread_t thread;
-    Computation *running; // or NULL
-    bool is_spare;        // beyond the number asked for: takes quick work while all others are slow
-    Workspace workspace;  // of its thread alone
+    Computation *running;   // or NULL
+    struct SweepRun *sweep; // of which it has a chunk in hand, or NULL
+    size_t chunk;
+    bool is_spare;       // beyond the number asked for: takes quick work while all others are slow
+    Workspace workspace; // of its thread alone
 } Worker;
 
 struct Intake {
@@ -87,6 +93,7 @@ struct Intake {
     pthread_cond_t spare_work; // for the spare worker alone
     pthread_cond_t settled;    // nothing is posted any more
     pthread_cond_t keys_free;  // a KeyHold was given up
+    pthread_mutex_t retries;   // retries of sweeps come one by one; taken before `lock`
     struct KeyHold *keys;
     Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
     Worker *workers;     // settings.workers of them, and the spare one
@@ -97,6 +104,8 @@ struct Intake {
     Index *jobs;                 // not yet finished
     Index *in_flight;            // computations
     Queue *queue;                // of computations
+    struct SweepRun *sweeps;     // under way
+    Computation *stalled;        // sweeps that could not be written down for want of room
     size_t live;                 // jobs not yet finished
     size_t scene_bytes;          // of them all
     size_t posted;               // writes that the store has yet to answer
@@ -124,6 +133,9 @@ void computation_free(Computation *computation);
 
 void intake_drop(Intake *intake); // frees what is left with the last hold
 
+// Held for the caller; NULL if no such job is in memory.
+Job *intake_find_live(Intake *intake, const char *id);
+
 // With the lock held: what intake_retry does for jobs that were dismissed.
 void intake_retry_dismissed(Intake *intake);
 // Nobody else is there any more: what waits for room stays unfinished in the store.
@@ -135,6 +147,7 @@ void intake_release(Job *job);
 void intake_retire(Job *job); // it is live no more; drops the index's hold
 // `client` NULL: ahead of all.
 void intake_enqueue(Intake *intake, Computation *computation, Client *client);
+void intake_call_worker(Intake *intake); // something was put into the queue
 Computation *computation_of(QueueEntry *entry);
 void intake_admit(Intake *intake, Job *job); // it is live, held by the index
 void intake_attach(Job *job, Computation *computation);
@@ -166,6 +179,8 @@ void findings_clear(Findings *findings);
 // Without the lock. Takes the computation, which has run, and what is in `findings`: saves them
 // with the jobs that wait for them, and says that these are finished once that is durable.
 void intake_save(Intake *intake, Computation *computation, Findings *findings);
+// Whether what failed is worth another try: a full disk and the like pass.
+bool status_is_passing(Status status);
 // With the lock held: whether a worker should wait before it makes more to be saved.
 bool intake_is_behind(const Intake *intake);
 

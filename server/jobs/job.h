@@ -45,6 +45,7 @@ typedef struct JobShow {
     char *labels;        // JSON array; NULL: none
     char *study;         // the kind of its study; NULL: none
     bool is_result_deleted;
+    uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobShow;
 
 Job *job_hold(Job *job);

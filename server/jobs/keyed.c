@@ -78,7 +78,12 @@ Status keyed_begin(Intake *intake, const Submission *submission, KeyHold *hold, 
     Digest *digest = digest_new();
     if (digest == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-    digest_take(digest, submission->text, submission->size);
+    if (submission->retry_of != NULL) {
+        digest_take(digest, "retry ", 6);
+        digest_take(digest, submission->retry_of, strlen(submission->retry_of));
+    } else {
+        digest_take(digest, submission->text, submission->size);
+    }
     digest_end(digest, hold->request);
 
     pthread_mutex_lock(&intake->lock);

@@ -6,7 +6,9 @@
 // for PATIENCE seconds and by none after that: nothing waits for ever. Equal ranks go by arrival.
 //
 // Each client has two lanes, quick and slow, each a pairing heap by rank: workers take the first of
-// both, the one that is kept for quick jobs looks into the quick ones alone.
+// both, the one that is kept for quick jobs looks into the quick ones alone. A third lane holds the
+// turns of work that is done bit by bit, such as sweeps; they go when nothing else of their client
+// waits, and once in turn_after seconds of what does.
 #include "server/jobs/queue.h"
 
 #include <stdlib.h>
@@ -14,10 +16,11 @@
 
 const double queue_quick = 0.1;
 
-static const double patience = 10; // [s] for each second
-static const double least = 1e-5;  // [s] that any job counts as
+static const double patience = 10;     // [s] for each second
+static const double least = 1e-5;      // [s] that any job counts as
+static const double turn_after = 0.05; // [s]
 
-enum { QUICK, SLOW };
+enum { QUICK, SLOW, TURNS };
 
 struct Queue {
     Client *first, **last; // in order of their first job
@@ -104,7 +107,7 @@ static QueueEntry *merge_all(QueueEntry *first) {
 }
 
 static QueueEntry **lane_of(Client *client, const QueueEntry *entry) {
-    return &client->lanes[entry->seconds <= queue_quick ? QUICK : SLOW];
+    return &client->lanes[entry->is_turn ? TURNS : entry->seconds <= queue_quick ? QUICK : SLOW];
 }
 
 static void count_in(Queue *queue, QueueEntry *entry) {
@@ -182,10 +185,13 @@ void queue_share(Queue *queue, QueueEntry *entry, Client *client) {
 }
 
 static QueueEntry *first_of(const Client *client, bool only_quick) {
-    QueueEntry *quick = client->lanes[QUICK], *slow = client->lanes[SLOW];
-    if (only_quick || slow == NULL)
-        return quick;
-    return quick == NULL || is_before(slow, quick) ? slow : quick;
+    QueueEntry *first = client->lanes[QUICK], *slow = client->lanes[SLOW];
+    if (only_quick)
+        return first;
+    if (first == NULL || (slow != NULL && is_before(slow, first)))
+        first = slow;
+    QueueEntry *turn = client->lanes[TURNS];
+    return first == NULL || (turn != NULL && client->ordinary >= turn_after) ? turn : first;
 }
 
 QueueEntry *queue_take(Queue *queue, bool only_quick) {
@@ -204,7 +210,9 @@ QueueEntry *queue_take(Queue *queue, bool only_quick) {
     queue_remove(queue, entry);
     if (next->served > queue->reached)
         queue->reached = next->served;
-    next->served += entry->seconds > least ? entry->seconds : least;
+    const double seconds = entry->seconds > least ? entry->seconds : least;
+    next->served += seconds;
+    next->ordinary = entry->is_turn ? 0 : next->ordinary + seconds;
     return entry;
 }
 

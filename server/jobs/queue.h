@@ -20,7 +20,8 @@ typedef struct Client {
     int64_t allowed_ns; // 0: never asked
     size_t waiting;     // entries
     double served;      // [s] of CPU foretold for what it was given
-    struct QueueEntry *lanes[2];
+    double ordinary;    // of these, since the last turn
+    struct QueueEntry *lanes[3];
     char name[];
 } Client;
 
@@ -29,6 +30,7 @@ typedef struct QueueEntry {
     struct QueueEntry *child, *next, *previous;
     Client *client; // NULL: ahead of all
     double seconds; // of CPU foretold
+    bool is_turn; // of long work that is done bit by bit: it goes between a client's ordinary work
     double rank;
     uint64_t number; // of arrival, from 1; 0: does not wait
 } QueueEntry;

@@ -14,7 +14,7 @@
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/codec/write.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // Computations on the way to the store, and the bytes of what they came to.
 enum { SAVING_MOST = 4096, SAVING_BYTES = 256 << 20 };
@@ -66,13 +66,14 @@ static bool make_room(Saving *saving, size_t count) {
     return true;
 }
 
-// With the lock held: the rows as they go to the store, of jobs that have none on the way.
-static void close_jobs(Saving *saving) {
+// With the lock held: the rows as they go to the store, of at most so many jobs that have none on
+// the way.
+static void close_jobs(Saving *saving, size_t most) {
     const Findings *findings = &saving->findings;
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
     size_t count = 0;
     for (Job *job = saving->computation->jobs; job != NULL; job = job->next_shared)
-        count += !job->is_closing;
+        count += !job->is_closing && count < most;
     saving->count = 0;
     if (!make_room(saving, count))
         count = saving->room; // the others get the next turn
@@ -139,8 +140,7 @@ static void saving_free(Saving *saving) {
     free(saving);
 }
 
-// A full disk and the like pass; then the jobs are worth another try.
-static bool is_passing(Status status) {
+bool status_is_passing(Status status) {
     return status == STATUS_IO || status == STATUS_FULL || status == STATUS_BUSY ||
            status == STATUS_NO_MEMORY;
 }
@@ -212,7 +212,7 @@ static Status post(Saving *saving) {
 // With the lock held: what waits is on the way to the store, or else this is at its end (false).
 static bool go_on(Saving *saving) {
     for (;;) {
-        close_jobs(saving);
+        close_jobs(saving, SIZE_MAX);
         if (saving->count == 0)
             return false;
         const Status status = post(saving);
@@ -242,14 +242,14 @@ static void saved(void *context, Status status, const char *detail) {
     saving->is_told = status != STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     bool goes_on;
-    if (status != STATUS_OK && !is_passing(status) && saving->findings.status == STATUS_OK) {
+    if (status != STATUS_OK && !status_is_passing(status) && saving->findings.status == STATUS_OK) {
         give_up(saving, status, detail);
         goes_on = post(saving) == STATUS_OK;
         if (!goes_on) {
             publish(saving, STATUS_NO_MEMORY, "no memory to save the job", false);
             goes_on = go_on(saving);
         }
-    } else if (is_passing(status)) {
+    } else if (status_is_passing(status)) {
         publish(saving, status, detail, !intake->is_closing);
         goes_on = wait_for_room(saving) || go_on(saving);
     } else {
@@ -284,6 +284,7 @@ void intake_retry(Intake *intake) {
         ended = saving;
     }
     intake_retry_dismissed(intake);
+    sweeps_resume(intake);
     pthread_mutex_unlock(&intake->lock);
     for (; ended != NULL; ended = next) {
         next = ended->next;
@@ -329,7 +330,7 @@ static void lose(Intake *intake, Computation *computation, Findings *findings) {
                      .room = 1};
     intake->saving++;
     for (;;) {
-        close_jobs(&saving);
+        close_jobs(&saving, COUNT(jobs));
         if (saving.count == 0)
             break;
         publish(&saving, STATUS_NO_MEMORY, "no memory to save the job", false);

@@ -13,6 +13,7 @@
 #include "server/jobs/job_id.h"
 #include "server/jobs/keyed.h"
 #include "server/jobs/quota.h"
+#include "server/jobs/retry.h"
 #include "server/store/job_search.h"
 
 // With the lock held: one of this scene that is under way, to be shared. One for readers alone
@@ -138,14 +139,15 @@ static Computation *begin(const JobRow *row, Inquiry *inquiry) {
 }
 
 // Queues it, or lets it share what is under way. Takes the inquiry.
-static Status start(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
+static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, Problem *problem) {
     Computation *computation = begin(&job->row, inquiry);
     if (computation == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
     // It may have become known meanwhile.
-    if (other == NULL && (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
+    if (other == NULL && !is_retry &&
+        (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
         pthread_mutex_unlock(&intake->lock);
         computation_free(computation);
         return finish_known(intake, job, problem);
@@ -245,13 +247,13 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, Inquiry *inquiry, Problem *problem) {
-    const Status known = find_known(intake, job, problem);
+static Status submit(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, Problem *problem) {
+    const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
     if (known == STATUS_OK)
         return finish_known(intake, job, problem);
     if (known != STATUS_NOT_FOUND)
         return known;
-    return start(intake, job, inquiry, problem);
+    return start(intake, job, inquiry, is_retry, problem);
 }
 
 // Who asks, if it may.
@@ -286,7 +288,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     if (status == STATUS_OK)
         status = fill_sender(job, submission, hold);
     if (status == STATUS_OK)
-        status = submit(intake, job, &inquiry, problem);
+        status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {
@@ -297,6 +299,22 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     return STATUS_OK;
 }
 
+static Status submit_retry(Intake *intake, const Submission *submission, const KeyHold *hold,
+                           Job **accepted, Problem *problem) {
+    SweepRow row;
+    pthread_mutex_lock(&intake->retries);
+    Status status = retry_open(intake, submission->retry_of, &row, problem);
+    if (status == STATUS_OK) {
+        Submission scene = *submission;
+        scene.text = row.scene;
+        scene.size = strlen(row.scene);
+        status = submit_new(intake, &scene, hold, accepted, problem);
+    }
+    pthread_mutex_unlock(&intake->retries);
+    sweep_row_clear(&row);
+    return status;
+}
+
 Status intake_submit(Intake *intake, const Submission *submission, Job **accepted,
                      Problem *problem) {
     KeyHold hold;
@@ -304,7 +322,9 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
     if (submission->is_replayed != NULL)
         *submission->is_replayed = *accepted != NULL;
     if (status == STATUS_OK && *accepted == NULL) {
-        status = submit_new(intake, submission, &hold, accepted, problem);
+        status = submission->retry_of != NULL
+                     ? submit_retry(intake, submission, &hold, accepted, problem)
+                     : submit_new(intake, submission, &hold, accepted, problem);
         if (status == STATUS_OK)
             keyed_remember(intake, &hold, *accepted);
     }

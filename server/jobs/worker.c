@@ -4,12 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/intake_state.h"
+#include "server/jobs/sweep.h"
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
@@ -83,7 +84,7 @@ static Status describe(const Computation *computation, Findings *findings) {
                                                                               : status;
 }
 
-static void fail(Findings *findings, Status status, const Problem *problem) {
+void findings_fail(Findings *findings, Status status, const Problem *problem) {
     findings->status = status;
     text_fit(findings->detail, sizeof findings->detail, problem->detail);
     Bytes bytes = {.most = 1 << 20};
@@ -97,6 +98,11 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
+static bool is_sweep(const Computation *computation) {
+    const Variant *study = computation->inquiry.study;
+    return study != NULL && !computation->is_again && study_kind(study) == &study_sweep;
+}
+
 static Status run_study(Worker *worker, Computation *computation, Findings *findings,
                         Problem *problem) {
     Part part = {computation, own_share, 1 - own_share};
@@ -105,6 +111,8 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
                               .watch = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
+    if (is_sweep(computation))
+        return sweep_open(worker, computation, findings, &watch, problem);
     return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
                      &findings->answer.study, problem);
 }
@@ -137,13 +145,13 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
             (void)problem_set(problem, status, "no memory for the result's documents");
     }
     if (status != STATUS_OK)
-        fail(findings, status, problem);
+        findings_fail(findings, status, problem);
     findings->status = status;
 }
 
-// With the lock held: nobody waits for it any more, or the daemon ends and its jobs stay unfinished
-// in the store.
-static void abandon(Intake *intake, Computation *computation) {
+// Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
+void computation_abandon(Intake *intake, Computation *computation) {
+    pthread_mutex_lock(&intake->lock);
     index_remove(intake->in_flight, &computation->indexed);
     while (computation->jobs != NULL) {
         Job *job = computation->jobs;
@@ -155,11 +163,31 @@ static void abandon(Intake *intake, Computation *computation) {
         job_drop(job); // the computation's hold
     }
     wakers_call(&computation->askers);
+    pthread_mutex_unlock(&intake->lock);
+    computation_free(computation);
+}
+
+void computation_finish(Intake *intake, Computation *computation, Findings *findings) {
+    char result[sizeof computation->result];
+    const double seconds = findings->seconds;
+    Outcome *outcome = findings->outcome != NULL ? outcome_hold(findings->outcome) : NULL;
+    memcpy(result, computation->result, sizeof result);
+    intake_save(intake, computation, findings);
+    if (outcome != NULL)
+        intake_keep_series(intake, result, outcome, seconds);
+    outcome_drop(outcome);
 }
 
 static bool is_slow(const Computation *computation) {
     return computation->queued.seconds > queue_quick;
 }
+
+// What a worker does next: a computation, or a part of a sweep, or the end of one (no part).
+typedef struct Task {
+    Computation *computation;
+    SweepRun *sweep;
+    SweepPart *part;
+} Task;
 
 // The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
 static QueueEntry *take_entry(const Worker *worker) {
@@ -169,19 +197,18 @@ static QueueEntry *take_entry(const Worker *worker) {
     return queue_take(intake->queue, worker->is_spare);
 }
 
-static Computation *next_computation(Worker *worker) {
+// What may take long keeps the spare worker ready for what does not.
+static void begin_slow(Intake *intake) {
+    if (++intake->slow_running == intake->settings.workers)
+        pthread_cond_signal(&intake->spare_work);
+}
+
+static void begin_computation(Worker *worker, Computation *computation) {
     Intake *intake = worker->intake;
-    QueueEntry *entry = NULL;
-    while (!intake->is_closing &&
-           (intake_is_behind(intake) || (entry = take_entry(worker)) == NULL))
-        pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
-    if (entry == NULL)
-        return NULL;
-    Computation *computation = computation_of(entry);
     computation->is_running = true;
     worker->running = computation;
-    if (is_slow(computation) && ++intake->slow_running == intake->settings.workers)
-        pthread_cond_signal(&intake->spare_work);
+    if (is_slow(computation))
+        begin_slow(intake);
     const int64_t now_ms = clock_unix_ms(), now_ns = clock_monotonic_ns();
     computation->began_ns = now_ns;
     for (Job *job = computation->jobs; job != NULL; job = job->next_shared) {
@@ -191,7 +218,41 @@ static Computation *next_computation(Worker *worker) {
         job->row.queued = 1e-9 * (double)(now_ns - job->submitted_ns);
         histogram_add(&intake->totals.waited, now_ns - job->submitted_ns);
     }
-    return computation;
+}
+
+static QueueEntry *wait_for_entry(Worker *worker) {
+    Intake *intake = worker->intake;
+    QueueEntry *entry = NULL;
+    while (!intake->is_closing &&
+           (intake_is_behind(intake) || (entry = take_entry(worker)) == NULL))
+        pthread_cond_wait(worker->is_spare ? &intake->spare_work : &intake->work, &intake->lock);
+    return entry;
+}
+
+// With the lock held. False when the daemon ends.
+static bool next_task(Worker *worker, Task *task) {
+    *task = (Task){NULL, NULL, NULL};
+    for (;;) {
+        bool is_ended;
+        QueueEntry *entry = wait_for_entry(worker);
+        if (entry == NULL)
+            return false;
+        Computation *computation = computation_of(entry);
+        if (computation->sweep == NULL) {
+            task->computation = computation;
+            begin_computation(worker, computation);
+            return true;
+        }
+        task->sweep = computation->sweep;
+        task->part = sweep_take(task->sweep, &is_ended);
+        if (task->part != NULL) {
+            worker->sweep = task->sweep;
+            worker->chunk = task->part->chunk;
+            begin_slow(worker->intake);
+        }
+        if (task->part != NULL || is_ended)
+            return true;
+    }
 }
 
 // How long runs take beside what was foretold, for those who ask when to come back.
@@ -202,37 +263,45 @@ static void keep_pace(Intake *intake, const Computation *computation, const Find
         intake->pace += 0.1 * (ratio - intake->pace);
 }
 
+static void compute(Worker *worker, Computation *computation, Problem *problem) {
+    Intake *intake = worker->intake;
+    Findings findings = {0};
+    run(worker, computation, &findings, problem);
+    const bool is_launched = findings.status == STATUS_OK && computation->sweep != NULL;
+    const bool is_stalled = findings.status == STATUS_FULL && is_sweep(computation);
+    pthread_mutex_lock(&intake->lock);
+    worker->running = NULL;
+    intake->slow_running -= is_slow(computation);
+    if (findings.status == STATUS_OK && !is_launched)
+        keep_pace(intake, computation, &findings);
+    if (is_stalled) {
+        computation->next_stalled = intake->stalled;
+        intake->stalled = computation;
+    }
+    pthread_mutex_unlock(&intake->lock);
+    if (findings.status == STATUS_CANCELLED)
+        computation_abandon(intake, computation);
+    else if (is_launched)
+        sweep_launch(intake, computation, &findings, problem);
+    else if (!is_stalled)
+        computation_finish(intake, computation, &findings);
+    findings_clear(&findings);
+}
+
 void *worker_main(void *context) {
     Worker *worker = context;
     Intake *intake = worker->intake;
     Problem problem; // large, but a thread's stack is larger
+    Task task;
     pthread_mutex_lock(&intake->lock);
-    Computation *computation;
-    while ((computation = next_computation(worker)) != NULL) {
+    while (next_task(worker, &task)) {
         pthread_mutex_unlock(&intake->lock);
-        Findings findings = {0};
-        run(worker, computation, &findings, &problem);
-        pthread_mutex_lock(&intake->lock);
-        worker->running = NULL;
-        intake->slow_running -= is_slow(computation);
-        if (findings.status == STATUS_OK)
-            keep_pace(intake, computation, &findings);
-        if (findings.status == STATUS_CANCELLED)
-            abandon(intake, computation);
-        pthread_mutex_unlock(&intake->lock);
-        if (findings.status == STATUS_CANCELLED) {
-            computation_free(computation);
-        } else {
-            char result[sizeof computation->result];
-            const double seconds = findings.seconds;
-            Outcome *outcome = findings.outcome != NULL ? outcome_hold(findings.outcome) : NULL;
-            memcpy(result, computation->result, sizeof result);
-            intake_save(intake, computation, &findings);
-            if (outcome != NULL)
-                intake_keep_series(intake, result, outcome, seconds);
-            outcome_drop(outcome);
-        }
-        findings_clear(&findings);
+        if (task.computation != NULL)
+            compute(worker, task.computation, &problem);
+        else if (task.part != NULL)
+            sweep_work(worker, task.sweep, task.part, &problem);
+        else
+            sweep_end(intake, task.sweep);
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);

@@ -93,6 +93,17 @@ bool database_is_in_transaction(Database *database) {
     return sqlite3_get_autocommit(database->connection) == 0;
 }
 
+Status database_check_place(Database *database, Problem *problem) {
+    int has_moved = 0;
+    (void)sqlite3_file_control(database->connection, "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
+    if (has_moved == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_IO,
+                       "%s was deleted, moved or replaced while in use: nothing can be stored; put "
+                       "it back, or stop the daemon and start it again",
+                       sqlite3_db_filename(database->connection, "main"));
+}
+
 uint64_t database_rows_changed(Database *database) {
     return (uint64_t)sqlite3_total_changes64(database->connection);
 }

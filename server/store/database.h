@@ -38,6 +38,10 @@ Status database_execute(Database *database, const char *sql, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.
 bool database_is_in_transaction(Database *database);
 
+// STATUS_IO where the file was deleted, renamed or replaced since it was opened: what is written to
+// it then is found by nobody.
+Status database_check_place(Database *database, Problem *problem);
+
 // How many rows this connection has changed, ever.
 uint64_t database_rows_changed(Database *database);
 

@@ -9,6 +9,8 @@
 
 #include <sqlite3.h>
 
+#include "server/store/store.h"
+
 static const RowColumn *column_find(const RowColumn *columns, const char *name) {
     for (const RowColumn *column = columns; column != NULL && column->kind != COLUMN_END; column++)
         if (strcmp(column->name, name) == 0)
@@ -42,8 +44,10 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
     case COLUMN_FLAG:
         return sqlite3_bind_int(statement, index, *(const bool *)(const void *)member);
     case COLUMN_BYTES: {
-        const RowBytes *bytes = (const void *)member;
-        return sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
+        const StoredBytes *bytes = (const StoredBytes *)(const void *)member;
+        return bytes->at == NULL
+                   ? sqlite3_bind_null(statement, index)
+                   : sqlite3_bind_blob64(statement, index, bytes->at, bytes->size, SQLITE_STATIC);
     }
     case COLUMN_END:
         break;
@@ -100,6 +104,21 @@ static bool read_text(Statement *statement, int index, char **text) {
     return true;
 }
 
+static bool read_bytes(Statement *statement, int index, StoredBytes *bytes) {
+    if (sqlite3_column_type(statement, index) == SQLITE_NULL)
+        return true;
+    const void *blob = sqlite3_column_blob(statement, index);
+    bytes->size = (size_t)sqlite3_column_bytes(statement, index);
+    bytes->at = malloc(bytes->size + 1);
+    if (bytes->at == NULL || (blob == NULL && bytes->size > 0)) {
+        bytes->size = 0;
+        return false;
+    }
+    if (bytes->size > 0)
+        memcpy(bytes->at, blob, bytes->size);
+    return true;
+}
+
 // A text that does not fit cannot be one of ours; it is cut.
 static void read_name(Statement *statement, int index, char *name, size_t size) {
     const unsigned char *text = sqlite3_column_text(statement, index);
@@ -135,19 +154,23 @@ static bool read_column(Statement *statement, int index, const RowColumn *column
     case COLUMN_FLAG:
         *(bool *)(void *)member = sqlite3_column_int(statement, index) != 0;
         return true;
-    case COLUMN_BYTES: {
-        RowBytes *bytes = (void *)member;
-        const void *at = sqlite3_column_blob(statement, index);
-        bytes->size = (size_t)sqlite3_column_bytes(statement, index);
-        bytes->at = malloc(bytes->size + 1);
-        if (bytes->at != NULL && bytes->size > 0)
-            memcpy(bytes->at, at, bytes->size);
-        return bytes->at != NULL;
-    }
+    case COLUMN_BYTES:
+        return read_bytes(statement, index, (StoredBytes *)(void *)member);
     case COLUMN_END:
         break;
     }
     return true;
+}
+
+static void free_owned(const RowColumn *column, void *item) {
+    void *member = (char *)item + column->offset;
+    if (column->kind == COLUMN_TEXT) {
+        free(*(char **)member);
+        *(char **)member = NULL;
+    } else if (column->kind == COLUMN_BYTES) {
+        free(((StoredBytes *)member)->at);
+        *(StoredBytes *)member = (StoredBytes){NULL, 0};
+    }
 }
 
 Status row_read(Statement *statement, const RowColumn *columns, void *item, Problem *problem) {
@@ -157,12 +180,8 @@ Status row_read(Statement *statement, const RowColumn *columns, void *item, Prob
         const RowColumn *column = name == NULL ? NULL : column_find(columns, name);
         if (column == NULL || read_column(statement, index, column, (char *)item + column->offset))
             continue;
-        for (const RowColumn *text = columns; text->kind != COLUMN_END; text++)
-            if (text->kind == COLUMN_TEXT) {
-                char **member = (char **)(void *)((char *)item + text->offset);
-                free(*member);
-                *member = NULL;
-            }
+        for (const RowColumn *owner = columns; owner->kind != COLUMN_END; owner++)
+            free_owned(owner, item);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a row of the database");
     }
     return STATUS_OK;
@@ -170,7 +189,6 @@ Status row_read(Statement *statement, const RowColumn *columns, void *item, Prob
 
 void row_clear(const RowColumn *columns, void *item, size_t size) {
     for (const RowColumn *column = columns; column->kind != COLUMN_END; column++)
-        if (column->kind == COLUMN_TEXT)
-            free(*(char **)(void *)((char *)item + column->offset));
+        free_owned(column, item);
     memset(item, 0, size);
 }

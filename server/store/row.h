@@ -18,13 +18,8 @@ typedef enum ColumnKind {
     COLUMN_COUNT,   // uint64_t, size_t
     COLUMN_CHOICE,  // int
     COLUMN_FLAG,    // bool
-    COLUMN_BYTES,   // RowBytes, owned
+    COLUMN_BYTES,   // StoredBytes, owned
 } ColumnKind;
-
-typedef struct RowBytes {
-    char *at;
-    size_t size;
-} RowBytes;
 
 typedef struct RowColumn {
     const char *name;

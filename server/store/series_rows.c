@@ -8,7 +8,7 @@
 
 typedef struct Blob {
     char result[72];
-    RowBytes body;
+    StoredBytes body;
     uint64_t bytes, most;
     atomic_uint_fast64_t *evictions;
     StoreDone done;
@@ -74,7 +74,7 @@ Status store_series_post(Store *store, const char *result, char *body, size_t si
         return size <= most ? STATUS_NO_MEMORY : STATUS_LIMIT;
     }
     text_fit(blob->result, sizeof blob->result, result);
-    blob->body = (RowBytes){body, size};
+    blob->body = (StoredBytes){body, size};
     blob->bytes = size;
     blob->most = most;
     blob->evictions = store_evictions(store);

@@ -159,4 +159,55 @@ Status store_series_load(Store *store, const char *result, char **body, size_t *
 bool store_series_exists(Store *store, const char *result);
 void store_series_tally(Store *store, uint64_t *count, uint64_t *bytes, uint64_t *evictions);
 
+typedef struct StoredBytes {
+    void *at;
+    size_t size;
+} StoredBytes;
+
+// A sweep: what is to be done, written before any of it runs.
+typedef struct SweepRow {
+    int64_t number; // the store's
+    char result[72];
+    char *scene;                      // canonical JSON, with the study
+    uint64_t points, metrics, chunks; // scene i stands in chunk i mod chunks
+    uint64_t retries;
+    int64_t created_unix_ms;
+} SweepRow;
+void sweep_row_clear(SweepRow *row);
+
+// The rows of one chunk, all of them.
+typedef struct SweepChunkRow {
+    int64_t sweep;
+    uint64_t chunk, failed;
+    bool is_open;  // those that failed are to be tried again
+    char *reasons; // "place sentence" lines of those that failed; NULL: none
+    StoredBytes rows;
+} SweepChunkRow;
+typedef struct SweepChunkRows {
+    SweepChunkRow *at;
+    size_t count;
+} SweepChunkRows;
+void sweep_chunk_rows_clear(SweepChunkRows *rows);
+
+// Writes the sweep down; one that is there already stays as it is, and `row` becomes that one.
+Status store_sweep_begin(Store *store, SweepRow *row, Problem *problem);
+// STATUS_NOT_FOUND. `row` may be uninitialised.
+Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem *problem);
+// What a job asked for, of which nothing may be written down yet: result and scene alone.
+// STATUS_NOT_FOUND.
+Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem);
+// Adds a chunk, in one transaction. One that is there already and not open stays as it is.
+Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem);
+// All that are there, by chunk; `has_rows` false: without reasons and rows.
+Status store_sweep_chunks(Store *store, int64_t sweep, bool has_rows, SweepChunkRows *chunks,
+                          Problem *problem);
+// One of them. STATUS_NOT_FOUND.
+Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
+                         Problem *problem);
+void sweep_chunk_row_clear(SweepChunkRow *row);
+// Opens every chunk that has failures. STATUS_CONFLICT where none has.
+Status store_sweep_reopen(Store *store, const char *result, Problem *problem);
+// Forgets all sweeps that have neither a result nor an unfinished job.
+Status store_sweep_tidy(Store *store, Problem *problem);
+
 #endif

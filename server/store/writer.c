@@ -70,6 +70,8 @@ static bool commit(Writer *writer, Database *database, StoreTicket *first, const
     uint64_t writes = 0;
     problem_clear(&writer->problem);
     Status status = database_change(database, begin, NULL, NULL, NULL, &writer->problem);
+    if (status == STATUS_OK)
+        status = database_check_place(database, &writer->problem);
     for (StoreTicket *write = first; status == STATUS_OK && write != end; write = write->next) {
         problem_clear(&writer->problem);
         if (!has_savepoints) {

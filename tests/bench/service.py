@@ -189,12 +189,13 @@ def npy(daemon):
 
 def cliff(daemon):
     path = f"/v1/results/{submit(daemon, sponge(output={'channels': [], 'psd': None}))['result']}"
-    rates = {}
-    for connections in (64, 120, 127, 128, 129, 255, 256, 257, 384, 512, 768, 1000):
-        rates[connections] = statistics.median(
-            wrk(daemon.port, path, connections, [daemon.process.pid], seconds=2)[0] for _ in range(3))
-    print("cliff, of the rate at 64 connections: " +
-          ", ".join(f"{count}: {rate / rates[64]:.2f}" for count, rate in rates.items() if count != 64), flush=True)
+    counts = (64, 120, 127, 128, 129, 255, 256, 257, 384, 512, 768, 1000)
+    with Nginx({"r.json": daemon.request("GET", path).body}) as nginx:
+        rates = [[statistics.median(wrk(port, target, count, pids, seconds=2)[0] for _ in range(3)) for count in counts]
+                 for port, target, pids in ((daemon.port, path, [daemon.process.pid]), (nginx.port, "/r.json", nginx.pids()))]
+    print("of the rate at 64 connections (nginx's own): " +
+          ", ".join(f"{count}: {a / rates[0][0]:.2f} ({b / rates[1][0]:.2f})"
+                    for count, a, b in list(zip(counts, *rates))[1:]), flush=True)
 
 
 def latencies(port, path, seconds):

@@ -229,6 +229,7 @@ def test_behind_a_base_url_every_link_begins_with_it():
         assert accepted.status == 202 and accepted.headers["location"].startswith("/impactd/v1/jobs/"), accepted.headers
         assert daemon.request("DELETE", accepted.headers["location"]).status == 200
         assert daemon.get("/v1/jobs?limit=1").headers["link"].startswith("</impactd/v1/jobs?"), "Link"
+        assert daemon.get("/impactd/impactd/version").status == 404, "the base is taken off once"
         page = daemon.get("/impactd").body.decode()
         assert f"{base}/v1/jobs" in page and "127.0.0.1" not in page
         html = daemon.get("/impactd/", headers={"Accept": "text/html"}).body.decode()

@@ -125,5 +125,21 @@ def test_a_full_disk_at_the_start_is_told():
         assert code not in (0, -6, -11) and "room" in errors or "full" in errors, (code, errors)
 
 
+def test_a_database_that_was_moved_away_takes_no_jobs():
+    """Nothing is promised that only an unlinked file would hold; put back, it is written to again."""
+    with program.daemon() as daemon:
+        known = daemon.submit(scene(0)).json()
+        file = os.path.join(daemon.data, "impactd.db")
+        os.rename(file, file + ".away")
+        refused = daemon.submit(scene(1))
+        assert refused.status == 500 and file in refused.json()["detail"], refused
+        assert daemon.get(known["links"]["self"]).status == 200
+        os.rename(file + ".away", file)
+        assert daemon.submit(scene(2)).json()["status"] == "successful"
+        daemon.kill()
+        daemon.start()
+        assert daemon.get(known["links"]["self"]).status == 200
+
+
 if __name__ == "__main__":
     program.main(globals())

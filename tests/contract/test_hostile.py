@@ -232,6 +232,47 @@ def test_a_dripping_head_is_cut_off():
         assert seconds is not None and 8 < seconds < 20, seconds
 
 
+def test_large_bodies_keep_no_scene_out():
+    """Clients who hold back the last byte of large bodies: another large one is 503, a small one is run."""
+    most = 1 << 16
+    with program.daemon("--max-body", str(most)) as daemon:
+        holders = [connect(daemon) for _ in range(17)]
+        for client in holders:
+            client.sendall(POST + b"Content-Length: %d\r\n\r\n" % most + b" " * (most - 1))
+        time.sleep(1)  # until all are read
+        scene = json.dumps(program.scene("paper_free_sponge"))
+        headers = {"Content-Type": "application/json"}
+        large = daemon.request("POST", "/v1/jobs", body=scene.ljust(most), headers=headers)
+        assert large.status == 503 and int(large.headers["retry-after"]) >= 1, large
+        assert daemon.request("POST", "/v1/jobs", body=scene, headers=headers).status == 200
+        for client in holders:
+            client.close()
+        time.sleep(1)
+        assert daemon.request("POST", "/v1/jobs", body=scene.ljust(most), headers=headers).status == 200
+
+
+def test_who_takes_nothing_is_cut_off():
+    """A client who asks for much and reads none of it is thrown out after a minute; a slow reader is not."""
+    with program.daemon("--workers", "1") as daemon:
+        result = daemon.submit({**program.scene("paper_free_sponge"), "duration": 2000}, wait=60).json()["result"]
+
+        def ask(path):
+            client = connect(daemon)
+            client.sendall(b"GET /v1/results/%s/%s HTTP/1.1\r\n" % (result.encode(), path) + HOST + b"\r\n")
+            return client
+
+        silent = [ask(b"series.npy"), ask(b"series.json"), ask(b"series.npy?channels=displacement&to=400")]
+        slow = ask(b"series.npy")
+        time.sleep(1)  # until all are connected
+        folder = f"/proc/{daemon.process.pid}/fd"
+        before, began = len(os.listdir(folder)), time.monotonic()
+        while len(os.listdir(folder)) > before - len(silent) and time.monotonic() < began + 120:
+            time.sleep(1)
+            assert slow.recv(1 << 16), "who reads slowly is served"
+        assert 50 < time.monotonic() - began < 110, time.monotonic() - began
+        assert slow.recv(1 << 16), "who reads slowly is served"
+
+
 def test_clients_who_leave_while_waiting():
     """Many clients submit, wait and vanish: the daemon goes on, and its jobs can be dismissed."""
     scene = program.scene("paper_sine_aluminium")

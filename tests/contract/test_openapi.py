@@ -112,10 +112,15 @@ def test_real_answers_have_the_promised_shapes():
         tradeoff = {"id": study["result"]}
         many = program.finished(daemon, program.scene("ensemble_random_sponge"))
         ensemble = {"id": many["result"]}
+        swept = program.finished(daemon, program.scene("sweep_frequency"))
+        sweep = {"id": swept["result"], "index": "7"}
         studies = {}
         for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity")):
             studies[kind] = {"id": program.finished(daemon, program.scene(name))["result"]}
-        values = {**{f"/v1/results/{{id}}/{kind}{ending}": value for kind, value in studies.items()
+        values = {"/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
+                  "/v1/results/{id}/points/{index}": sweep, "/v1/results/{id}/points/{index}/scene": sweep,
+                  "/v1/jobs/{id}/table.{format}": {"id": swept["id"]}, "/v1/jobs/{id}/table": {"id": swept["id"]},
+                  **{f"/v1/results/{{id}}/{kind}{ending}": value for kind, value in studies.items()
                      for ending in ("", ".{format}")}, "/v1/results/{id}/tradeoff.{format}": tradeoff, "/v1/results/{id}/tradeoff": tradeoff,
                   "/v1/results/{id}/ensemble.{format}": ensemble, "/v1/results/{id}/ensemble": ensemble,
                   "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
@@ -164,6 +169,23 @@ def test_real_answers_have_the_promised_shapes():
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
+        call("GET", "/v1/results/{id}", f"/v1/results/{swept['result']}")
+        failing = program.scene("paper_free_sponge")
+        failing.update(accuracy={"solver": "rk4", "step": 1e-3},
+                       study={"kind": "sweep", "axes": [{"pointer": "/dampers/0/buffer", "values": ["aluminium"]}]})
+        failed = program.finished(daemon, failing)
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry")
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{swept['id']}/retry")
+        call("POST", "/v1/jobs/{id}/retry", "/v1/jobs/0/retry")
+        many_points = program.scene("paper_random_sponge")
+        many_points["study"] = {"kind": "sweep", "axes": [{"pointer": "/excitation/seed", "from": 1, "to": 3000,
+                                                           "count": 3000}]}
+        running = daemon.submit(many_points, headers={"Prefer": "respond-async"}).json()["id"]
+        for _ in range(20):
+            call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}?wait=0.05")
+            call("GET", "/v1/jobs/{id}/table.{format}", f"/v1/jobs/{running}/table.json")
+        call("GET", "/v1/jobs", "/v1/jobs")
+        daemon.request("DELETE", f"/v1/jobs/{running}")
         for value in studies.values():
             call("GET", "/v1/results/{id}", f"/v1/results/{value['id']}")
         call("GET", "/v1/compare", "/v1/compare?a=r-0&b=r-0")

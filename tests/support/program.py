@@ -28,10 +28,16 @@ def impactd():
     return os.path.join(build, "impactd")
 
 
+def sanitizer():
+    """What the build is instrumented with: "address,undefined", "thread" or nothing."""
+    with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
+        found = re.search(r"^IMPACTD_SANITIZE:\w+=(\S*)", cache.read(), re.M)
+    return found[1] if found else ""
+
+
 def is_sanitized():
     """Whether the build is an instrumented one: several times slower, so that timing says nothing."""
-    with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
-        return re.search(r"^IMPACTD_SANITIZE:\w+=\S", cache.read(), re.M) is not None
+    return sanitizer() != ""
 
 
 def run(*arguments, text="", timeout=120, environment=None):

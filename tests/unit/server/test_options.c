@@ -117,6 +117,16 @@ static void a_flag_beats_the_environment_that_the_file_that_the_default(void **s
     assert_int_equal(options.origins[4], OPTION_DEFAULT);
 }
 
+static void a_file_that_is_no_text_of_settings_is_refused(void **state) {
+    (void)state;
+    assert_int_equal(READ("TEST_", "--config", "/tmp"), STATUS_USAGE);
+    assert_string_equal(problem.faults[0].pointer, "/tmp");
+    problem_clear(&problem);
+    assert_int_equal(READ("TEST_", "--config", "/dev/zero"), STATUS_USAGE);
+    assert_string_equal(problem.faults[0].pointer, "/dev/zero:1");
+    assert_int_equal(problem.count, 1);
+}
+
 static void the_environment_is_not_read_without_a_prefix(void **state) {
     (void)state;
     setenv("TEST_QUEUE_MOST", "none", 1);
@@ -207,6 +217,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(flags_set_values_and_the_rest_are_operands, start, stop),
         cmocka_unit_test_setup_teardown(a_flag_beats_the_environment_that_the_file_that_the_default,
                                         start, stop),
+        cmocka_unit_test_setup_teardown(a_file_that_is_no_text_of_settings_is_refused, start, stop),
         cmocka_unit_test_setup_teardown(the_environment_is_not_read_without_a_prefix, start, stop),
         cmocka_unit_test_setup_teardown(every_fault_is_told_under_the_name_that_was_typed, start,
                                         stop),

@@ -74,6 +74,14 @@ static void numbers_in_queries_have_bounds(void **state) {
         assert_int_equal(request_number(&request, bad[i], 0, 10, 1, &value, &problem),
                          STATUS_USAGE);
     assert_non_null(strstr(problem.detail, "[0, 10]"));
+    size_t count = 0;
+    problem_clear(&problem);
+    assert_int_equal(request_count(&request, "g", 1, 10, 7, &count, &problem), STATUS_OK);
+    assert_int_equal(count, 10);
+    assert_int_equal(request_count(&request, "z", 1, 10, 7, &count, &problem), STATUS_OK);
+    assert_int_equal(count, 7);
+    assert_int_equal(request_count(&request, "a", 1, 10, 7, &count, &problem), STATUS_USAGE);
+    assert_non_null(strstr(problem.detail, "whole number, is \"2.5\""));
     request_close(&request);
 }
 

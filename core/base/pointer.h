@@ -1,0 +1,39 @@
+// A JSON Pointer into a struct by its Field rows: what stands there, and setting it to one value.
+// Not a reader of JSON (server/codec) and not a judge of ranges (field.h). Used by studies that run
+// a scene with some of its members changed.
+#ifndef CORE_BASE_POINTER_H
+#define CORE_BASE_POINTER_H
+
+#include "core/base/field.h"
+
+// One number, text or truth value. The text is borrowed.
+typedef enum ScalarKind { SCALAR_NUMBER, SCALAR_TEXT, SCALAR_FLAG } ScalarKind;
+typedef struct Scalar {
+    ScalarKind kind;
+    double number;
+    uint64_t whole; // the number, where it is whole and at least 0; else COUNT_ABSENT
+    const char *text;
+    bool flag;
+} Scalar;
+
+Scalar scalar_number(double number);
+
+// Reads JSON text as codec/ keeps it under FIELD_SCALARS. A text's characters go to `room`, which
+// is as long as `json`. False if it is none.
+bool scalar_read(const char *json, Scalar *value, char *room);
+
+enum { POINTER_SENTENCE = 240 };
+
+// The row of what `pointer` leads to; of an element of an array the array's. NULL, and why, where
+// there is nothing, or nothing that one value could replace. `*is_tag`: it is the name of a kind.
+const Field *pointer_find(const Field *fields, const void *item, const char *pointer, bool *is_tag,
+                          char why[POINTER_SENTENCE]);
+
+// Puts `value` there. A kind's name makes it that kind: members that both kinds have stay, the
+// others get defaults. A text in place of an item with a shorthand replaces the whole item; a
+// change of one of its members takes that name away, for it would be untrue. STATUS_INVALID with a
+// sentence, STATUS_NO_MEMORY.
+Status pointer_set(const Field *fields, void *item, const char *pointer, const Scalar *value,
+                   char why[POINTER_SENTENCE]);
+
+#endif

@@ -1,0 +1,18 @@
+// What a worker does with a computation besides running it: for those that go on after that, part
+// by part. Not the queue (intake_state.h) and not how it is saved (saving.c). Used by worker.c and
+// sweep.c.
+#ifndef SERVER_JOBS_WORKER_H
+#define SERVER_JOBS_WORKER_H
+
+#include "server/jobs/intake_state.h"
+
+void findings_fail(Findings *findings, Status status, const Problem *problem);
+
+// Without the lock. Takes both: saves what it came to, also its series where that pays.
+void computation_finish(Intake *intake, Computation *computation, Findings *findings);
+
+// Without the lock. Takes the computation: nobody waits for it any more, or the daemon ends and its
+// jobs stay unfinished in the store.
+void computation_abandon(Intake *intake, Computation *computation);
+
+#endif

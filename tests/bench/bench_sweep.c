@@ -1,0 +1,223 @@
+// A sweep of the paper's free sponge scene, summary only, through the whole jobs room (judging,
+// chunks, database, result), beside the core alone in a loop on as many threads; then what judging
+// and storing cost by themselves. Rounds of both in turn, medians.
+//
+//     bench_sweep [points [threads [rounds]]]
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#include "core/math/fourier.h"
+#include "core/study/sweep_judge.h"
+#include "server/base/clock.h"
+#include "server/jobs/sweep.h"
+
+enum { ROUNDS_MOST = 64 };
+
+static size_t points = 10000, threads = 2, rounds = 5;
+
+static void scene_text(char target[1024], size_t count, double mass) {
+    snprintf(target, 1024,
+             "{\"structure\": {\"mass\": %.17g, \"stiffness\": 865, \"damping\": 1.092},"
+             " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
+             " \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},"
+             " \"duration\": 10, \"sample_rate\": 1000,"
+             " \"output\": {\"channels\": [], \"psd\": null, \"impacts\": false},"
+             " \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.03, \"count\": %zu}]}}",
+             mass, count);
+}
+
+static int fail(const char *what, const Problem *problem) {
+    fprintf(stderr, "%s: %s\n", what, problem->detail);
+    return 1;
+}
+
+// Of all threads [s]: what a busy machine leaves alone.
+static double process_cpu(void) {
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+// The core's part: scenes made beforehand, run one after the other.
+typedef struct Loop {
+    const Simulation *scenes;
+    size_t first;
+    pthread_t thread;
+} Loop;
+
+static void *run_loop(void *context) {
+    const Loop *loop = context;
+    Workspace workspace = {0};
+    for (size_t i = loop->first; i < points; i += threads) {
+        Outcome *outcome;
+        if (simulation_run(&loop->scenes[i], NULL, NULL, &workspace, &outcome, NULL) == STATUS_OK)
+            outcome_drop(outcome);
+    }
+    workspace_clear(&workspace);
+    return NULL;
+}
+
+static double time_core(const Simulation *scenes) {
+    Loop loops[64];
+    const int64_t began_ns = clock_monotonic_ns();
+    for (size_t i = 0; i < threads; i++) {
+        loops[i] = (Loop){.scenes = scenes, .first = i};
+        pthread_create(&loops[i].thread, NULL, run_loop, &loops[i]);
+    }
+    for (size_t i = 0; i < threads; i++)
+        pthread_join(loops[i].thread, NULL);
+    return 1e-9 * (double)(clock_monotonic_ns() - began_ns);
+}
+
+// A new sweep each time: the structure's mass is another.
+static double time_room(Intake *intake, size_t round, Problem *problem) {
+    char text[1024];
+    Job *job;
+    scene_text(text, points, 1.35 + 1e-9 * (double)round);
+    const Submission submission = {.text = text, .size = strlen(text)};
+    const int64_t began_ns = clock_monotonic_ns();
+    if (intake_submit(intake, &submission, &job, problem) != STATUS_OK)
+        return -1;
+    const struct timespec nap = {0, 500000};
+    while (!job_is_finished(job))
+        nanosleep(&nap, NULL);
+    job_drop(job);
+    return 1e-9 * (double)(clock_monotonic_ns() - began_ns);
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *values, size_t count) {
+    qsort(values, count, sizeof *values, by_value);
+    return values[count / 2];
+}
+
+static int bench_judging(Store *store, Problem *problem) {
+    char text[1024];
+    Inquiry inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    SweepPlan *plan;
+    const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
+    scene_text(text, 100000, 1.35);
+    int64_t began_ns = clock_monotonic_ns();
+    if (intake_prepare(store, text, strlen(text), &limits, &inquiry, &warnings, problem) !=
+        STATUS_OK)
+        return fail("judging", problem);
+    printf("POST of 100000 points, its axes judged: %.3f s\n",
+           1e-9 * (double)(clock_monotonic_ns() - began_ns));
+    const SweepStudy *study = (const SweepStudy *)(const void *)inquiry.study;
+    if (sweep_plan_new(study, &inquiry.simulation, &limits, &plan, problem) != STATUS_OK)
+        return fail("planning", problem);
+    began_ns = clock_monotonic_ns();
+    (void)sweep_check(plan, false, &limits, NULL, problem);
+    printf("all 100000 points judged before the first run: %.3f s\n",
+           1e-9 * (double)(clock_monotonic_ns() - began_ns));
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+    return 0;
+}
+
+static int bench_rows(Store *store, Problem *problem) {
+    enum { CHUNKS = 64, ROWS = 10000, METRICS = 6 };
+    SweepRow row = {.points = (uint64_t)CHUNKS * ROWS, .metrics = METRICS, .chunks = CHUNKS};
+    strcpy(row.result, "r-bench");
+    row.scene = strdup("{}");
+    SweepChunkRow chunk = {.rows = {calloc(ROWS, 1 + 8 * METRICS), ROWS * (1 + 8 * METRICS)}};
+    if (chunk.rows.at == NULL || store_sweep_begin(store, &row, problem) != STATUS_OK)
+        return fail("rows", problem);
+    chunk.sweep = row.number;
+    const int64_t began_ns = clock_monotonic_ns();
+    for (size_t i = 0; i < CHUNKS; i++) {
+        chunk.chunk = i;
+        if (store_sweep_take(store, &chunk, problem) != STATUS_OK)
+            return fail("rows", problem);
+    }
+    const double took = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
+    printf("rows into the database, durable, a chunk of %d each: %.3g rows/s (%.2f ms a chunk)\n",
+           ROWS, CHUNKS * ROWS / took, 1e3 * took / CHUNKS);
+    free(chunk.rows.at);
+    sweep_row_clear(&row);
+    return 0;
+}
+
+int main(int argc, char **argv) {
+    static Problem problem;
+    char folder[] = "/tmp/impactd-bench-XXXXXX", text[1024];
+    if (argc > 1)
+        points = strtoul(argv[1], NULL, 10);
+    if (argc > 2)
+        threads = strtoul(argv[2], NULL, 10);
+    if (argc > 3)
+        rounds = strtoul(argv[3], NULL, 10);
+    if (points < 2 || threads < 1 || threads > 64 || rounds < 1 || rounds > ROUNDS_MOST ||
+        mkdtemp(folder) == NULL)
+        return 2;
+    Store *store;
+    Intake *intake;
+    const IntakeSettings settings = {.workers = threads,
+                                     .queue_most = 100,
+                                     .cache_bytes = 1 << 24,
+                                     .limits = {.samples = 1 << 25, .points = 1 << 24}};
+    fourier_start();
+    if (store_open(folder, &store, &problem) != STATUS_OK ||
+        intake_open(store, &settings, &intake, &problem) != STATUS_OK)
+        return fail("opening", &problem);
+    Inquiry inquiry = {0};
+    Warnings warnings = {NULL, 0};
+    SweepPlan *plan;
+    scene_text(text, points, 1.35);
+    if (intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem) !=
+            STATUS_OK ||
+        sweep_plan_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
+                       &plan, &problem) != STATUS_OK)
+        return fail("planning", &problem);
+    Simulation *scenes = calloc(points, sizeof *scenes);
+    for (size_t i = 0; scenes != NULL && i < points; i++)
+        (void)sweep_scene(plan, i, true, NULL, &scenes[i], NULL);
+    if (scenes == NULL)
+        return 1;
+
+    double core[ROUNDS_MOST], room[ROUNDS_MOST], ratio[ROUNDS_MOST];
+    double core_cpu[ROUNDS_MOST], room_cpu[ROUNDS_MOST];
+    for (size_t i = 0; i < rounds; i++) {
+        double began = process_cpu();
+        core[i] = time_core(scenes);
+        core_cpu[i] = process_cpu() - began;
+        began = process_cpu();
+        room[i] = time_room(intake, i + 1, &problem);
+        room_cpu[i] = process_cpu() - began;
+        if (room[i] < 0)
+            return fail("submitting", &problem);
+        ratio[i] = core[i] / room[i];
+    }
+    const double micro = 1e6 / (double)points;
+    printf("%zu points, %zu threads, median of %zu rounds\n", points, threads, rounds);
+    printf("core alone in a loop: %.0f points/s\n", (double)points / median(core, rounds));
+    printf("sweep, whole and durable: %.0f points/s\n", (double)points / median(room, rounds));
+    printf("sweep / core: %.2f\n", median(ratio, rounds));
+    printf("CPU a point: core %.1f us, sweep %.1f us\n", micro * median(core_cpu, rounds),
+           micro * median(room_cpu, rounds));
+    int code = bench_judging(store, &problem);
+    if (code == 0)
+        code = bench_rows(store, &problem);
+    for (size_t i = 0; i < points; i++)
+        simulation_clear(&scenes[i]);
+    free(scenes);
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+    warnings_clear(&warnings);
+    intake_close(intake);
+    store_close(store);
+    snprintf(text, sizeof text, "rm -rf '%s'", folder);
+    return system(text) != 0 ? 1 : code;
+}

@@ -1,0 +1,242 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/study/inquiry.h"
+#include "core/study/sweep_run.h"
+#include "tests/support/fields.h"
+#include "tests/support/scenes.h"
+
+static Problem problem;
+
+// The paper's scene for 1 s with a sweep that has no axes yet.
+static Inquiry inquiry_make(void) {
+    Inquiry inquiry = {0};
+    scene_with_damper(&inquiry.simulation, 0.61, 0.025);
+    inquiry.simulation.scene.duration = 1;
+    inquiry.study = variant_new(&study_sweep.kind);
+    assert_non_null(inquiry.study);
+    problem_clear(&problem);
+    return inquiry;
+}
+
+static SweepStudy *study_of(const Inquiry *inquiry) {
+    return (SweepStudy *)(void *)inquiry->study;
+}
+
+static SweepAxis *axis_add(Inquiry *inquiry, const char *pointer) {
+    SweepAxes *axes = &study_of(inquiry)->axes;
+    axes->at = realloc(axes->at, (axes->count + 1) * sizeof *axes->at);
+    assert_non_null(axes->at);
+    SweepAxis *axis = &axes->at[axes->count++];
+    *axis = (SweepAxis){.pointer = strdup(pointer),
+                        .from = (double)NAN,
+                        .to = (double)NAN,
+                        .count = COUNT_ABSENT,
+                        .spacing = CHOICE_ABSENT};
+    return axis;
+}
+
+static void range_add(Inquiry *inquiry, const char *pointer, double from, double to,
+                      uint64_t count) {
+    SweepAxis *axis = axis_add(inquiry, pointer);
+    axis->from = from;
+    axis->to = to;
+    axis->count = count;
+}
+
+static void values_add(Inquiry *inquiry, const char *pointer, size_t count,
+                       const char *const *values) {
+    axis_add(inquiry, pointer)->values = texts_of(count, values);
+}
+
+static SweepPlan *plan_of(Inquiry *inquiry) {
+    SweepPlan *plan;
+    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK ||
+        sweep_plan_new(study_of(inquiry), &inquiry->simulation, NULL, &plan, &problem) != STATUS_OK)
+        fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
+    return plan;
+}
+
+static Simulation scene_of(const SweepPlan *plan, size_t point) {
+    Simulation scene;
+    if (sweep_scene(plan, point, false, NULL, &scene, &problem) != STATUS_OK)
+        fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
+    return scene;
+}
+
+static void a_points_scene_follows_from_its_number(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    static const char *const masses[] = {"0.1", "0.2", "0.3"};
+    values_add(&inquiry, "/dampers/0/mass", 3, masses);
+    range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 5);
+    SweepPlan *plan = plan_of(&inquiry);
+    assert_int_equal(plan->points, 15);
+    for (size_t point = 0; point < 15; point++) {
+        Simulation scene = scene_of(plan, point);
+        const Damper *damper = &scene.scene.dampers.at[0];
+        assert_true(damper->mass == strtod(masses[point / 5], NULL));
+        assert_true(damper->clearance ==
+                    (point % 5 == 4 ? 0.02 : 0.01 + 0.0025 * (double)(point % 5)));
+        simulation_clear(&scene);
+    }
+    sweep_plan_free(plan);
+    study_of(&inquiry)->mode = SWEEP_LIST;
+    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/1"), "has 5 values"));
+    inquiry_clear(&inquiry);
+}
+
+static void whole_numbers_of_a_range_stay_whole(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    range_add(&inquiry, "/output/psd/segment", 1, 3000, 3000);
+    SweepPlan *plan = plan_of(&inquiry);
+    for (size_t i = 0; i < 3000; i++)
+        assert_int_equal(plan->axes[0].at[i].whole, i + 1);
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+}
+
+static void a_row_is_its_scenes_own_run(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 4);
+    SweepPlan *plan = plan_of(&inquiry);
+    const StudyTools tools = {0};
+    Variant *answer;
+    assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &answer, &problem),
+                     STATUS_OK);
+    const Sweep *sweep = (const Sweep *)(const void *)answer;
+    assert_int_equal(sweep->points, 4);
+    assert_int_equal(sweep->table.points.count, 4);
+    for (size_t point = 0; point < 4; point++) {
+        Simulation scene;
+        Outcome *outcome;
+        assert_int_equal(sweep_scene(plan, point, true, NULL, &scene, &problem), STATUS_OK);
+        assert_int_equal(simulation_run(&scene, NULL, NULL, NULL, &outcome, &problem), STATUS_OK);
+        const double *row = &sweep->table.values.at[point * sweep->metrics.count];
+        assert_true(row[0] == outcome->summary.peak_displacement);
+        assert_true(row[1] == outcome->summary.rms_displacement);
+        assert_true(row[4] == (double)outcome->summary.impacts);
+        outcome_drop(outcome);
+        simulation_clear(&scene);
+    }
+    variant_free(answer);
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+}
+
+static void faults_stand_at_their_values_and_name_the_point(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    static const char *const clearances[] = {"0.01", "-1", "\"wide\"", "-2"};
+    static const char *const masses[] = {"0.1", "0"};
+    const SimulationLimits limits = {0};
+    values_add(&inquiry, "/dampers/0/clearance", 4, clearances);
+    values_add(&inquiry, "/dampers/0/mass", 2, masses);
+    values_add(&inquiry, "/dampers/0/mas", 2, masses);
+    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/1"), "is -1"));
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/1"), "/dampers/0/clearance"));
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/2"), "is a text"));
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/3"), "is -2"));
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/1/values/1"), "point "));
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/2/pointer"), "mass"));
+    assert_int_equal(problem.count, 5);
+    inquiry_clear(&inquiry);
+}
+
+static void a_fault_of_two_values_together_is_found(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    const SimulationLimits limits = {0};
+    range_add(&inquiry, "/dampers/0/clearance", 0.03, 0.01, 3);
+    range_add(&inquiry, "/dampers/0/position", 0, 0.008, 5);
+    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/study/axes/1"), "point 13"));
+    inquiry_clear(&inquiry);
+}
+
+static void too_many_points_or_values_are_refused(void **state) {
+    (void)state;
+    const SimulationLimits limits = {.points = 100};
+    Inquiry inquiry = inquiry_make();
+    range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 11);
+    range_add(&inquiry, "/dampers/0/mass", 0.1, 0.2, 10);
+    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/study/axes"), "110 points, at most 100"));
+    study_of(&inquiry)->axes.at[0].count = study_of(&inquiry)->axes.at[1].count = SWEEP_AXIS_VALUES;
+    range_add(&inquiry, "/dampers/0/offset", 0.1, 0.2, SWEEP_AXIS_VALUES);
+    range_add(&inquiry, "/structure/mass", 0.1, 0.2, SWEEP_AXIS_VALUES);
+    problem_clear(&problem);
+    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_non_null(strstr(detail_at(&problem, "/study/axes"), "points, at most 100"));
+    inquiry_clear(&inquiry);
+}
+
+static void sides_and_materials_are_filled_from_what_is_pinned(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    static const char *const names[] = {"\"sponge@1\"", "\"steel@2\""};
+    SweepStudy *study = study_of(&inquiry);
+    study->materials.at = calloc(2, sizeof *study->materials.at);
+    assert_non_null(study->materials.at);
+    for (size_t i = 0; i < 2; i++) {
+        assert_int_equal(fields_default(buffer_fields, &study->materials.at[i]), STATUS_OK);
+        study->materials.count++;
+        study->materials.at[i].material = strdup(i == 0 ? "sponge@1" : "steel@2");
+        study->materials.at[i].restitution = 0.5 + 0.1 * (double)i;
+        study->materials.at[i].contact_time = 0.01;
+    }
+    values_add(&inquiry, "/dampers/0/left_buffer", 2, names);
+    SweepPlan *plan = plan_of(&inquiry);
+    Simulation scene = scene_of(plan, 1);
+    const Damper *damper = &scene.scene.dampers.at[0];
+    assert_true(damper->left_buffer.restitution == 0.6);
+    assert_true(damper->left_buffer.contact_time == 0.01);
+    assert_true(damper->right_buffer.restitution == 0.61);
+    simulation_clear(&scene);
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+}
+
+static bool stops(void *context, double fraction) {
+    (void)context;
+    return fraction < 0.5;
+}
+
+static void a_sweep_stops_when_it_is_told_to(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_make();
+    range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 50);
+    sweep_plan_free(plan_of(&inquiry));
+    const Watch watch = {NULL, stops};
+    const StudyTools tools = {.watch = &watch};
+    Variant *answer;
+    assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &answer, &problem),
+                     STATUS_CANCELLED);
+    assert_null(answer);
+    inquiry_clear(&inquiry);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_points_scene_follows_from_its_number),
+        cmocka_unit_test(whole_numbers_of_a_range_stay_whole),
+        cmocka_unit_test(a_row_is_its_scenes_own_run),
+        cmocka_unit_test(faults_stand_at_their_values_and_name_the_point),
+        cmocka_unit_test(a_fault_of_two_values_together_is_found),
+        cmocka_unit_test(too_many_points_or_values_are_refused),
+        cmocka_unit_test(sides_and_materials_are_filled_from_what_is_pinned),
+        cmocka_unit_test(a_sweep_stops_when_it_is_told_to),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
