@@ -177,6 +177,7 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry")
         call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{swept['id']}/retry")
         call("POST", "/v1/jobs/{id}/retry", "/v1/jobs/0/retry")
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry", headers={"Idempotency-Key": "\t"})
         many_points = program.scene("paper_random_sponge")
         many_points["study"] = {"kind": "sweep", "axes": [{"pointer": "/excitation/seed", "from": 1, "to": 3000,
                                                            "count": 3000}]}
