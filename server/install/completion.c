@@ -9,7 +9,8 @@
 
 // What `impactd get` is told to get.
 static const char parts[] =
-    "result series psd impacts energy manifest bundle job tradeoff ensemble compare sensitivity";
+    "result series psd impacts energy manifest bundle job tradeoff ensemble compare sensitivity "
+    "table";
 
 static bool has_operand(const Command *command, const char *part) {
     return command->operands != NULL && strstr(command->operands, part) != NULL;

@@ -72,6 +72,25 @@ def test_loopback_is_open_until_there_is_a_token_and_shut_from_then_on():
         assert until(lambda: daemon.get("/v1/jobs").status == 200)
 
 
+def test_a_token_beyond_its_rate_or_quota_waits():
+    """--rate and --quota: 429 with Retry-After for that token alone; a job that ends gives its place back."""
+    slow = dict(program.scene("paper_sine_aluminium"), duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+    for option, value in (("--rate", "1"), ("--quota", "1")):
+        with program.daemon(option, value) as daemon:
+            greedy, other = token(daemon.data, "greedy"), token(daemon.data, "other")
+            assert until(lambda: daemon.get("/v1/jobs").status == 401)
+
+            def submit(who, more):
+                return daemon.submit({**slow, "duration": 2e6 + more}, headers={**bearer(who), "Prefer": "respond-async"})
+            replies = [submit(greedy, i) for i in range(3)]
+            refused = next(reply for reply in replies if reply.status != 202)
+            assert refused.status == 429 and int(refused.headers["retry-after"]) >= 1, (option, refused)
+            assert submit(other, 9).status == 202, option
+            job = replies[0].json()["links"]["self"]
+            assert daemon.request("DELETE", job, headers=bearer(greedy)).status == 200
+            assert option == "--rate" or submit(greedy, 5).status == 202
+
+
 def test_every_route_asks_for_its_scope():
     """Each route of routes.c with no token, each single scope, and admin: 401, 403 naming the scope, or what it does."""
     with program.daemon() as daemon:

@@ -96,6 +96,11 @@ def test_what_another_engine_made_names_the_way_to_have_it_again():
             assert daemon.get(f"/v1/results/{old}/impacts.json").json()["count"] == made["summary"]["impacts"]
             reply = daemon.get(f"/v1/results/{old}/series.csv")
             assert reply.status == 410 and "impactd-0" in reply.json()["detail"], reply
+            for what, accept in (("series", "*/*"), ("psd.npy", "*/*"), ("psd", "application/x-npy"),
+                                 ("impacts.npz", "*/*"), ("impacts", "application/x-npy"), ("bundle.zip", "*/*"),
+                                 ("impacts/1/force.csv", "*/*"), ("impacts/1/force", "*/*")):
+                refused = daemon.get(f"/v1/results/{old}/{what}", headers={"Accept": accept})
+                assert refused.status == 410 and refused.headers["link"] == reply.headers["link"], (what, refused)
             link = reply.headers["link"]
             again = daemon.request("POST", link[link.index("<") + 1:link.index(">")])
             assert again.status == 200 and again.json()["result"] == made["result"], again

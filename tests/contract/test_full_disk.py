@@ -72,6 +72,7 @@ def test_a_full_disk_stops_writes_alone():
     with small_disk() as folder:
         with program.daemon("--workers", "2", data=folder) as daemon:
             before = daemon.submit(scene(0)).json()
+            endless = daemon.submit(long_scene(0, 2000), headers=ASYNC).json()
             ballast = fill(folder)
             refused = None
             for number in range(1, 400):
@@ -83,6 +84,8 @@ def test_a_full_disk_stops_writes_alone():
             problem = refused.json()
             assert problem["type"] == "/problems/no-room", problem
             assert folder in problem["detail"] and "bytes are free" in problem["detail"], problem
+            for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}"):
+                assert daemon.request("DELETE", path).status == 507, path
             for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
                          f"/v1/results/{before['result']}/series.npy", f"/v1/results/{before['result']}/psd.json",
                          "/health/live"):

@@ -177,6 +177,7 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry")
         call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{swept['id']}/retry")
         call("POST", "/v1/jobs/{id}/retry", "/v1/jobs/0/retry")
+        call("POST", "/v1/jobs/{id}/retry", f"/v1/jobs/{failed['id']}/retry", headers={"Idempotency-Key": "\t"})
         many_points = program.scene("paper_random_sponge")
         many_points["study"] = {"kind": "sweep", "axes": [{"pointer": "/excitation/seed", "from": 1, "to": 3000,
                                                            "count": 3000}]}
@@ -210,9 +211,15 @@ def test_real_answers_have_the_promised_shapes():
         call("POST", "/v1/results/{id}/again", "/v1/results/r-0/again")
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json=scene)
         call("POST", "/v1/cache/explain", "/v1/cache/explain", json={**scene, "duration": 61})
-        running = daemon.get("/v1/jobs").json()["jobs"][0]["id"]
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", json={})
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body="{", headers={"Content-Type": "application/json"})
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body="{}")
+        call("POST", "/v1/cache/explain", "/v1/cache/explain", body=b" " * (1 << 24) + b"x",
+             headers={"Content-Type": "application/json"})
+        running = next(one["id"] for one in daemon.get("/v1/jobs").json()["jobs"] if one["status"] in ("accepted", "running"))
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("GET", "/v1/compare", f"/v1/compare?a={running}&b={job['id']}")
+        call("POST", "/v1/compare", "/v1/compare", json={**measured, "a": running})
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", f"/v1/jobs/{running}")
         call("DELETE", "/v1/jobs/{id}", "/v1/jobs/none")

@@ -79,7 +79,7 @@ def test_octave():
 LEFT_OUT = re.compile(r"demo\.sh|run\.sh|^cmake|^ctest|^systemctl|^man |serve|example\.org|retell\.py|bench/|tests/|"
                       r"^curl --json '\{$")
 # Which scene a line is about, where it is not the first one.
-SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_frequency"}
+SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_clearance_buffer"}
 
 
 def lines():
@@ -100,6 +100,7 @@ def test_lines():
         endless = program.scene("paper_sine_aluminium")
         endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
         one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
+        swept = program.finished(daemon, program.scene("sweep_clearance_buffer"))
         for line in kept:
             name = next((scene for begin, scene in SCENES.items() if line.startswith(begin)), "paper_free_sponge")
             scene = program.scene(name)
@@ -112,7 +113,7 @@ def test_lines():
             said = re.sub(r"\bcurl ", "curl -fsS ", said)
             done = subprocess.run(["bash", "-euc", said], cwd=folder, capture_output=True, text=True, timeout=200, check=False,
                                   env={**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder, "URL": daemon.url,
-                                       "XDG_STATE_HOME": folder, "R": one["result"], "RESULT": two["result"],
+                                       "XDG_STATE_HOME": folder, "R": (swept if "points/" in line else one)["result"], "RESULT": two["result"],
                                        "JOB": job, "job": job, "other": two["id"], "PATH": program.build + os.pathsep + os.environ["PATH"]})
             assert done.returncode == 0, (line, said, done)
 
