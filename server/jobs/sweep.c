@@ -425,11 +425,12 @@ static void pause(SweepRun *run, const Problem *problem) {
 void sweep_work(Worker *worker, SweepRun *run, SweepPart *part, Problem *problem) {
     Intake *intake = worker->intake;
     const size_t place = part->place;
-    const int64_t began_ns = clock_monotonic_ns();
+    const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
     problem_clear(problem);
     Status status = part->is_computed ? STATUS_OK : make_rows(worker, run, part, problem);
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
     const bool is_parked = status == STATUS_BUSY;
+    totals_study_part(&intake->totals, clock_thread_cpu_ns() - began_cpu_ns);
     if (status == STATUS_OK)
         status = store_sweep_take(intake->store, &part->row, problem);
     pthread_mutex_lock(&intake->lock);

@@ -29,6 +29,10 @@ void totals_run(Totals *totals, const Outcome *outcome, int64_t cpu_ns) {
 
 void totals_study(Totals *totals, int64_t cpu_ns) {
     counter_add(&totals->study_runs, 1);
+    totals_study_part(totals, cpu_ns);
+}
+
+void totals_study_part(Totals *totals, int64_t cpu_ns) {
     counter_add(&totals->study_cpu_ns, cpu_ns > 0 ? (uint64_t)cpu_ns : 0);
 }
 

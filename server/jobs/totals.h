@@ -27,6 +27,7 @@ typedef struct Totals {
 void totals_ended(Totals *totals, int state, bool is_known);
 void totals_run(Totals *totals, const Outcome *outcome, int64_t cpu_ns);
 void totals_study(Totals *totals, int64_t cpu_ns);
+void totals_study_part(Totals *totals, int64_t cpu_ns); // more of a study that was counted
 // In the Prometheus text format.
 void totals_write(const Totals *totals, Bytes *bytes);
 

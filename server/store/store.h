@@ -207,8 +207,6 @@ Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChun
 void sweep_chunk_row_clear(SweepChunkRow *row);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
 Status store_sweep_reopen(Store *store, const char *result, Problem *problem);
-// Forgets a sweep whose result was never finished.
-Status store_sweep_forget(Store *store, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.
 Status store_sweep_tidy(Store *store, Problem *problem);
 

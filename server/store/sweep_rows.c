@@ -83,7 +83,7 @@ Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem
 }
 
 Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem) {
-    static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :result";
+    static const char sql[] = "SELECT result, scene FROM jobs WHERE id = :result AND scene <> ''";
     const SweepRow key = key_of(job);
     bool is_found;
     memset(row, 0, sizeof *row);
@@ -148,17 +148,6 @@ static Status reopen(Database *database, const void *work, Problem *problem) {
 Status store_sweep_reopen(Store *store, const char *result, Problem *problem) {
     const SweepRow key = key_of(result);
     return store_write(store, reopen, &key, problem);
-}
-
-static Status forget(Database *database, const void *work, Problem *problem) {
-    static const char sql[] =
-        "DELETE FROM sweeps WHERE result = :result AND result NOT IN (SELECT id FROM results)";
-    return database_change(database, sql, sweep_columns, work, NULL, problem);
-}
-
-Status store_sweep_forget(Store *store, const char *result, Problem *problem) {
-    const SweepRow key = key_of(result);
-    return store_write(store, forget, &key, problem);
 }
 
 static Status tidy(Database *database, const void *work, Problem *problem) {

@@ -4,6 +4,7 @@
 import csv
 import io
 import json
+import sqlite3
 import os
 import sys
 import time
@@ -204,6 +205,46 @@ def test_failed_points_are_rows_with_a_reason_and_can_be_made_again():
         fine = made(daemon, sweep(CLEARANCES))
         assert daemon.request("POST", f"/v1/jobs/{fine['id']}/retry").status == 409
         assert daemon.request("POST", "/v1/jobs/j-nothing/retry").status == 404
+
+
+def test_a_retry_is_never_answered_from_what_is_known():
+    """The body is answered at once, a retry computes; with a key it is that retry once more."""
+    with Daemon(program.build) as daemon:
+        scene = sweep(values("/dampers/0/buffer", "sponge", "aluminium"),
+                      changes={"accuracy": {"solver": "rk4", "step": 1e-3}})
+        job = made(daemon, scene)
+        for _ in range(3):
+            known = daemon.submit(scene)
+            assert known.status == 200 and known.json()["cached"] and known.json()["result"] == job["result"]
+            assert table(daemon, known.json())["failed"] == 1
+        for key in ({}, {"Idempotency-Key": "one"}, {"Idempotency-Key": "two"}):
+            # Of a job that was answered from what is known, too.
+            again = daemon.request("POST", f"/v1/jobs/{known.json()['id']}/retry", headers=key)
+            assert again.status == 202, again
+            done = daemon.finished(again.json()["id"])
+            assert done["status"] == "successful" and not done["cached"] and done["result"] == job["result"]
+            if key:
+                same = daemon.request("POST", f"/v1/jobs/{known.json()['id']}/retry", headers=key)
+                assert same.json()["id"] == again.json()["id"] and same.headers["idempotency-replayed"] == "true"
+                assert daemon.request("POST", f"/v1/jobs/{job['id']}/retry", headers=key).status == 422
+                assert daemon.submit(scene, headers=key).status == 422
+        assert table(daemon, job)["status"] == "complete" and table(daemon, job)["failed"] == 1
+
+
+def test_with_its_result_a_sweep_goes():
+    """Deleted, there is neither table nor chunk nor a retry; submitted again it is made anew."""
+    with Daemon(program.build) as daemon:
+        job = made(daemon, sweep(CLEARANCES))
+        document = table(daemon, job)
+        assert daemon.request("DELETE", f"/v1/results/{job['result']}").status == 204
+        assert daemon.get(f"/v1/results/{job['result']}/table.json").status == 404
+        assert daemon.get(f"/v1/jobs/{job['id']}/table.json").status == 404
+        assert daemon.request("POST", f"/v1/jobs/{job['id']}/retry").status == 404
+        base = sqlite3.connect(f"file:{daemon.data}/impactd.db?mode=ro", uri=True)
+        assert base.execute("SELECT (SELECT count(*) FROM sweeps), (SELECT count(*) FROM sweep_chunks)").fetchone() == (0, 0)
+        base.close()
+        new = made(daemon, sweep(CLEARANCES))
+        assert not new["cached"] and table(daemon, new) == document
 
 
 def test_the_table_reads_the_same_in_every_format():

@@ -35,8 +35,8 @@ def scene(number=None):
 
 
 def slow(number):
-    """Many seconds of steps, and nothing to keep."""
-    return {**scene(number), "duration": 2000, "output": {"channels": [], "psd": None},
+    """Long enough to be left alone, nothing to keep, and soon over where nobody gets round to cancelling it."""
+    return {**scene(number), "duration": 20, "output": {"channels": [], "psd": None},
             "accuracy": {"solver": "rk4", "step": 1e-5}}
 
 
@@ -256,7 +256,7 @@ MIX = [
     (20, Asker.keyed, {200, 202, 503}),
     (30, Asker.cancelled, {200, 409, 503}),
     (20, Asker.watched, {200, 503}),
-    (5, Asker.left, {200, 503}),
+    (5, Asker.left, {200, 409, 503}),
     (20, Asker.deleted, {202, 204, 503}),
     (70, Asker.window, {200, 503}),
     (30, Asker.part, {206, 503}),

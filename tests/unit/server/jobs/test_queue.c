@@ -73,6 +73,35 @@ static void a_turn_is_counted_in_time_not_in_jobs(void **state) {
     queue_free(queue);
 }
 
+static void turns_of_long_work_go_between_the_ordinary_jobs_of_their_client(void **state) {
+    (void)state;
+    Queue *queue = queue_new();
+    QueueEntry turn = {.seconds = 0.01, .is_turn = true}, jobs[20], other;
+    for (size_t i = 0; i < 20; i++)
+        put(queue, &jobs[i], "", 0.01, 100);
+    Client *client = queue_client(queue, "");
+    queue_put(queue, &turn, client, 0);
+    // The spare worker leaves them alone; the others take one of six.
+    assert_ptr_equal(queue_take(queue, true), &jobs[0]);
+    for (size_t i = 1; i < 5; i++)
+        assert_ptr_equal(queue_take(queue, false), &jobs[i]);
+    assert_ptr_equal(queue_take(queue, false), &turn);
+    queue_put(queue, &turn, client, 0);
+    // Another client has its share all the same.
+    put(queue, &other, "other", 5, 1000);
+    assert_ptr_equal(queue_take(queue, false), &other);
+    for (size_t i = 5; i < 10; i++)
+        assert_ptr_equal(queue_take(queue, false), &jobs[i]);
+    assert_ptr_equal(queue_take(queue, false), &turn);
+    for (size_t i = 10; i < 20; i++)
+        assert_ptr_equal(queue_take(queue, false), &jobs[i]);
+    queue_put(queue, &turn, client, 0);
+    assert_null(queue_take(queue, true));
+    assert_ptr_equal(queue_take(queue, false), &turn);
+    assert_int_equal(queue_count(queue), 0);
+    queue_free(queue);
+}
+
 static void nobody_saves_turns_up_by_being_away(void **state) {
     (void)state;
     Queue *queue = queue_new();
@@ -161,6 +190,7 @@ int main(void) {
         cmocka_unit_test(the_quick_pass_the_slow_until_these_have_waited_long_enough),
         cmocka_unit_test(clients_are_served_in_turn_however_much_one_of_them_sends),
         cmocka_unit_test(a_turn_is_counted_in_time_not_in_jobs),
+        cmocka_unit_test(turns_of_long_work_go_between_the_ordinary_jobs_of_their_client),
         cmocka_unit_test(nobody_saves_turns_up_by_being_away),
         cmocka_unit_test(the_kept_worker_takes_quick_ones_alone),
         cmocka_unit_test(what_others_want_too_moves_to_whoever_waits_less),
