@@ -104,6 +104,8 @@ void gate_header(Gate *gate, const char *name, size_t name_size, const char *val
             gate->has_bad_length = true;
         else
             gate->length = strtoull(value, NULL, 10);
+    } else if (is_name(name, name_size, "Authorization")) {
+        gate->authorizations++;
     } else if (is_name(name, name_size, "Transfer-Encoding")) {
         gate->encodings++;
         gate->is_chunked = is_name(value_size > 0 ? value : "", value_size, "chunked");
@@ -189,6 +191,8 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
     }
     if (gate->lengths > 1)
         return refuse(problem, 400, "more than one Content-Length");
+    if (gate->authorizations > 1)
+        return refuse(problem, 400, "more than one Authorization");
     if (gate->has_bad_length)
         return refuse(problem, 400, "Content-Length must be a plain number");
     if (gate->lengths > 0 && gate->encodings > 0)

@@ -20,7 +20,7 @@ extern const GateHosts gate_loopback; // localhost, 127.0.0.1 and [::1]
 // Facts gathered header by header; all zero to begin with, but for `names`.
 typedef struct Gate {
     const GateHosts *names; // NULL: gate_loopback
-    size_t hosts, lengths, encodings;
+    size_t hosts, lengths, encodings, authorizations;
     unsigned long long length; // of the body, as told
     bool is_chunked, is_foreign_host, has_bad_length, has_control;
     char fault_name[40]; // the header that has_control is about
