@@ -14,6 +14,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 SANITIZED = True
+WAITS = True
 HOST = b"Host: localhost\r\n"
 GET = b"GET /version HTTP/1.1\r\n"
 POST = b"POST /v1/jobs HTTP/1.1\r\n" + HOST + b"Content-Type: application/json\r\n"
