@@ -1,24 +1,44 @@
 // Wakes a thread that polls: a descriptor that is readable from the first ring until it is
-// silenced. Carries no news. Used by listener.c and exchange.c.
+// answered. Carries no news. Used by listener.c and exchange.c.
 #ifndef SERVER_HTTP_BELL_H
 #define SERVER_HTTP_BELL_H
 
+#include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-static inline int bell_new(void) { // -1 and errno if it fails; to be closed
-    return eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+typedef struct Bell {
+    int descriptor;
+    atomic_bool is_rung; // since it was answered last: whoever rings again need not
+} Bell;
+
+// False and errno if it fails. To be closed.
+static inline bool bell_open(Bell *bell) {
+    atomic_init(&bell->is_rung, false);
+    bell->descriptor = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    return bell->descriptor >= 0;
 }
 
-static inline void bell_ring(int bell) {
+static inline void bell_close(Bell *bell) { // one that is not open: no harm
+    close(bell->descriptor);
+    bell->descriptor = -1;
+}
+
+static inline void bell_ring(Bell *bell) {
     const uint64_t one = 1;
-    (void)!write(bell, &one, sizeof one);
+    if (!atomic_exchange(&bell->is_rung, true))
+        (void)!write(bell->descriptor, &one, sizeof one);
 }
 
-static inline void bell_silence(int bell) {
+// Whether it was rung. One who rings meanwhile is heard now or is_rung next time.
+static inline bool bell_answer(Bell *bell) {
     uint64_t count;
-    (void)!read(bell, &count, sizeof count);
+    if (!atomic_exchange(&bell->is_rung, false))
+        return false;
+    (void)!read(bell->descriptor, &count, sizeof count);
+    return true;
 }
 
 #endif

@@ -15,7 +15,6 @@
 
 #include "server/base/clock.h"
 #include "server/codec/write.h"
-#include "server/http/bell.h"
 #include "server/http/body.h"
 #include "server/http/reply.h"
 #include "server/http/sending.h"
@@ -166,7 +165,7 @@ static void note_wake(Exchange *exchange) {
 // Another thread's word: the loop does not hear of it by itself. The exchange may be gone when this
 // returns.
 static void resume(Exchange *exchange) {
-    const int bell = exchange->loop->bell;
+    Bell *bell = &exchange->loop->bell;
     MHD_resume_connection(exchange->connection);
     bell_ring(bell);
 }
@@ -305,8 +304,9 @@ void *exchange_open(void *context, const char *target, struct MHD_Connection *co
 enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, const char *url,
                                const char *method, const char *version, const char *data,
                                size_t *size, void **state) {
-    (void)loop, (void)url; // the url is decoded and cut at a NUL; the target is what counts
+    (void)url; // the url is decoded and cut at a NUL; the target is what counts
     Exchange *exchange = *state;
+    ((Loop *)loop)->turns++;
     if (exchange == NULL)
         return MHD_NO;
     if (!exchange->is_begun)

@@ -9,6 +9,7 @@
 #include <stdatomic.h>
 
 #include "server/base/bytes.h"
+#include "server/http/bell.h"
 #include "server/http/gate.h"
 #include "server/http/listener.h"
 #include "server/http/pool.h"
@@ -32,7 +33,8 @@ typedef struct Loop {
     Desk *desk;
     struct MHD_Daemon *daemon;
     pthread_t thread;
-    int bell; // eventfd: there are arrivals, or it is to stop
+    Bell bell;    // there are arrivals, or connections to go on with, or it is to stop
+    size_t turns; // calls of exchange_go_on
     pthread_mutex_t lock;
     int *arrivals; // descriptors, locked
     size_t arrival_count, arrival_room;

@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 #include "server/base/clock.h"
-#include "server/http/bell.h"
 #include "server/http/exchange.h"
 
 enum {
@@ -24,6 +23,7 @@ enum {
     THREADS = 16,            // that answer what takes a while
     CONNECTIONS_MOST = 8192, // over all loops, where as many files may be open
     FILES_KEPT = 64,         // for everything else
+    TOGETHER = 12,           // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
 };
@@ -31,7 +31,8 @@ enum {
 struct Listener {
     Desk desk;
     char url[96];
-    int descriptor, bell; // the listening socket; rung to end the accepting thread
+    int descriptor; // the listening socket
+    Bell bell;      // rung to end the accepting thread
     pthread_t acceptor;
     bool is_accepting;
     size_t connections_most;
@@ -66,19 +67,23 @@ static void *run_loop(void *context) {
     Loop *loop = context;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
-                              {.fd = loop->bell, .events = POLLIN}};
+                              {.fd = loop->bell.descriptor, .events = POLLIN}};
+    bool is_idle = true;
     while (!atomic_load(&loop->is_stopping)) {
-        // What is ready in memory shows in no descriptor.
-        MHD_UNSIGNED_LONG_LONG left_ms;
-        int wait_ms = -1;
-        if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
-            wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
-        (void)poll(events, 2, wait_ms);
-        if (events[1].revents != 0) {
-            bell_silence(loop->bell);
-            take_arrivals(loop);
+        // Where there was something to do there mostly is more: no call to wait for it, then.
+        if (is_idle && !atomic_load(&loop->bell.is_rung)) {
+            // What is ready in memory shows in no descriptor.
+            MHD_UNSIGNED_LONG_LONG left_ms;
+            int wait_ms = -1;
+            if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
+                wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
+            (void)poll(events, 2, wait_ms);
         }
+        if (bell_answer(&loop->bell))
+            take_arrivals(loop);
+        const size_t turns = loop->turns;
         MHD_run(loop->daemon);
+        is_idle = loop->turns == turns;
     }
     return NULL;
 }
@@ -91,8 +96,10 @@ size_t listener_connections(const Listener *listener) {
 }
 
 static void hand_on(Listener *listener, int descriptor) {
+    // A few together wake a loop less often for each.
     Loop *least = &listener->loops[0];
-    for (size_t i = 1; i < listener->loop_count; i++)
+    for (size_t i = 1; i < listener->loop_count && atomic_load(&least->connections) >= TOGETHER;
+         i++)
         if (atomic_load(&listener->loops[i].connections) < atomic_load(&least->connections))
             least = &listener->loops[i];
     pthread_mutex_lock(&least->lock);
@@ -110,14 +117,14 @@ static void hand_on(Listener *listener, int descriptor) {
     least->arrivals[least->arrival_count++] = descriptor;
     atomic_fetch_add(&least->connections, 1);
     pthread_mutex_unlock(&least->lock);
-    bell_ring(least->bell);
+    bell_ring(&least->bell);
 }
 
 static void *accept_all(void *context) {
     Listener *listener = context;
     const struct timespec moment = {.tv_nsec = 5000000};
     struct pollfd events[] = {{.fd = listener->descriptor, .events = POLLIN},
-                              {.fd = listener->bell, .events = POLLIN}};
+                              {.fd = listener->bell.descriptor, .events = POLLIN}};
     for (;;) {
         (void)poll(events, 2, -1);
         if (events[1].revents != 0)
@@ -156,13 +163,13 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
     if (loop->daemon == NULL)
         return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                            is_tls ? " with this certificate and key" : "");
-    loop->bell = bell_new();
+    const bool has_bell = bell_open(&loop->bell);
     pthread_mutex_init(&loop->lock, NULL);
-    if (loop->bell >= 0 && pthread_create(&loop->thread, NULL, run_loop, loop) == 0)
+    if (has_bell && pthread_create(&loop->thread, NULL, run_loop, loop) == 0)
         return STATUS_OK;
     MHD_stop_daemon(loop->daemon);
     pthread_mutex_destroy(&loop->lock);
-    close(loop->bell);
+    bell_close(&loop->bell);
     return problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
                        strerror(errno));
 }
@@ -170,7 +177,7 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
 // No callback runs any more.
 static void loop_halt(Loop *loop) {
     atomic_store(&loop->is_stopping, true);
-    bell_ring(loop->bell);
+    bell_ring(&loop->bell);
     pthread_join(loop->thread, NULL);
 }
 
@@ -181,7 +188,7 @@ static void loop_end(Loop *loop) {
     MHD_stop_daemon(loop->daemon);
     sending_forget(loop->sent_again);
     pthread_mutex_destroy(&loop->lock);
-    close(loop->bell);
+    bell_close(&loop->bell);
 }
 
 // As many files as we may, and how many connections that allows.
@@ -215,9 +222,8 @@ static Status start(Listener *listener, Problem *problem) {
     for (; listener->loop_count < most; listener->loop_count++)
         TRY(loop_start(&listener->loops[listener->loop_count], desk, listener->connections_most,
                        problem));
-    listener->bell = bell_new();
-    listener->is_accepting =
-        listener->bell >= 0 && pthread_create(&listener->acceptor, NULL, accept_all, listener) == 0;
+    listener->is_accepting = bell_open(&listener->bell) &&
+                             pthread_create(&listener->acceptor, NULL, accept_all, listener) == 0;
     if (!listener->is_accepting)
         return problem_set(problem, STATUS_INTERNAL, "the accepting thread cannot be started: %s",
                            strerror(errno));
@@ -230,7 +236,7 @@ Status listener_open(const ListenerSettings *settings, Listener **listener, Prob
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the listener");
     made->desk.settings = *settings;
-    made->descriptor = made->bell = -1;
+    made->descriptor = made->bell.descriptor = -1;
     const Status status = start(made, problem);
     if (status != STATUS_OK) {
         listener_free(made);
@@ -249,7 +255,7 @@ void listener_stop(Listener *listener, int grace_ms) {
         return;
     Desk *desk = &listener->desk;
     if (listener->is_accepting) {
-        bell_ring(listener->bell);
+        bell_ring(&listener->bell);
         pthread_join(listener->acceptor, NULL);
         listener->is_accepting = false;
     }
@@ -267,8 +273,7 @@ void listener_stop(Listener *listener, int grace_ms) {
     desk->pool = NULL;
     while (listener->loop_count > 0)
         loop_end(&listener->loops[--listener->loop_count]);
-    close(listener->bell);
-    listener->bell = -1;
+    bell_close(&listener->bell);
 }
 
 void listener_free(Listener *listener) {
