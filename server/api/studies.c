@@ -41,9 +41,8 @@ static Status answer_read(const ResultRow *row, const StudyKind *kind, StudyAnsw
     return answer->study->kind == kind->answer ? STATUS_OK : refuse_other(kind, problem);
 }
 
-// By the extension in the path, else by Accept.
-static Status choose_format(const Request *request, const AnswerFormat *formats, Reply *reply,
-                            const AnswerFormat **format, Problem *problem) {
+Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
+                    const AnswerFormat **format, Problem *problem) {
     const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
     char names[64];
     answer_formats_name(formats, "", names, sizeof names);
@@ -69,7 +68,7 @@ static Status choose_format(const Request *request, const AnswerFormat *formats,
 static Status show(App *app, const Request *request, const StudyKind *kind, Reply *reply,
                    Problem *problem) {
     const AnswerFormat *format;
-    TRY(choose_format(request, answer_formats(kind->answer), reply, &format, problem));
+    TRY(study_format(request, answer_formats(kind->answer), reply, &format, problem));
     ResultRow row = {0};
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};

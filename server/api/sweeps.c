@@ -5,11 +5,11 @@
 
 #include "server/api/app.h"
 #include "server/api/job_document.h"
+#include "server/api/studies.h"
 #include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
 #include "server/encode/sweep_table.h"
-#include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep_rows.h"
@@ -18,32 +18,6 @@
 static bool is_of_job(const Request *request) {
     static const char jobs[] = "/v1/jobs/";
     return strncmp(link_inside(request->path), jobs, sizeof jobs - 1) == 0;
-}
-
-// By the extension in the path, else by Accept.
-static Status choose_format(const Request *request, Reply *reply, const AnswerFormat **format,
-                            Problem *problem) {
-    const AnswerFormat *formats = answer_formats(study_sweep.answer);
-    const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
-    char names[64];
-    answer_formats_name(formats, "", names, sizeof names);
-    reply->varies_by_accept = extension == NULL;
-    if (extension != NULL) {
-        *format = answer_format_find(formats, extension);
-        return *format != NULL
-                   ? STATUS_OK
-                   : problem_set(problem, STATUS_NOT_FOUND,
-                                 "there is no format \"%.20s\"; there are %s", extension, names);
-    }
-    for (size_t i = 0; formats[i].extension != NULL; i++)
-        types[i] = formats[i].content_type;
-    const int choice = header_accept(request->accept, types);
-    if (choice < 0)
-        return problem_set(problem, STATUS_NOT_ACCEPTABLE,
-                           "none of the formats fits Accept; there are %s, by extension too",
-                           names);
-    *format = &formats[choice];
-    return STATUS_OK;
 }
 
 // Rows come, and failed ones may be made again: only a table without either never changes.
@@ -64,7 +38,7 @@ static bool is_known(const Request *request, Reply *reply, const SweepShow *show
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
     const AnswerFormat *format;
     SweepShow show = {.sweep = NULL};
-    TRY(choose_format(request, reply, &format, problem));
+    TRY(study_format(request, answer_formats(study_sweep.answer), reply, &format, problem));
     Status status = sweep_show_load(app->store, request->parameters[0], is_of_job(request), true,
                                     &show, problem);
     if (status == STATUS_OK && !is_known(request, reply, &show, format->extension)) {

@@ -66,6 +66,13 @@ void sweeps_resume(Intake *intake);
 void sweep_wait(SweepRun *run, SweepPart *part, bool is_first);
 void sweep_part_free(SweepPart *part);
 
+// Without it: makes the part's rows. STATUS_BUSY: others are to have their turn, the rest comes
+// later.
+enum { SWEEP_TURN_MS = 10 }; // that is not interrupted for others
+Status sweep_part_make(Worker *worker, SweepRun *run, SweepPart *part, Problem *problem);
+// A Watch's advance: whether the sweep, a SweepRun, is still wanted.
+bool sweep_goes_on(void *run, double fraction);
+
 // How a chunk's rows lie in its bytes.
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);
 size_t sweep_row_size(const SweepRow *row);
