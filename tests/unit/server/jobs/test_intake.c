@@ -19,9 +19,10 @@
 #include "server/jobs/intake.h"
 #include "server/store/database.h"
 #include "server/store/job_search.h"
+#include "tests/support/scratch.h"
 
 typedef struct Room {
-    char directory[64];
+    char directory[SCRATCH_SIZE];
     Store *store;
     Intake *intake;
     IntakeSettings settings;
@@ -48,17 +49,14 @@ static Room room_make(size_t workers) {
                               .queue_most = 1000,
                               .cache_bytes = 1 << 24,
                               .limits = {.samples = 1 << 25, .impacts = 1 << 20}}};
-    strcpy(room.directory, "/tmp/impactd-test-XXXXXX");
-    assert_non_null(mkdtemp(room.directory));
+    scratch_make(room.directory);
     room_open(&room);
     return room;
 }
 
 static void room_end(Room *room) {
-    char command[128];
     room_close(room);
-    snprintf(command, sizeof command, "rm -rf '%s'", room->directory);
-    assert_int_equal(system(command), 0);
+    scratch_remove(room->directory);
 }
 
 // The paper's scene; `displacement` makes scenes differ, `duration` makes them long.

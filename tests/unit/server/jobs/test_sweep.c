@@ -14,9 +14,10 @@
 #include "core/math/fourier.h"
 #include "server/jobs/sweep.h"
 #include "server/jobs/sweep_rows.h"
+#include "tests/support/scratch.h"
 
 typedef struct Room {
-    char directory[64];
+    char directory[SCRATCH_SIZE];
     Store *store;
     Intake *intake;
     size_t workers;
@@ -42,17 +43,14 @@ static void room_close(Room *room) {
 
 static Room room_make(size_t workers) {
     Room room = {.workers = workers};
-    strcpy(room.directory, "/tmp/impactd-test-XXXXXX");
-    assert_non_null(mkdtemp(room.directory));
+    scratch_make(room.directory);
     room_open(&room);
     return room;
 }
 
 static void room_end(Room *room) {
-    char command[128];
     room_close(room);
-    snprintf(command, sizeof command, "rm -rf '%s'", room->directory);
-    assert_int_equal(system(command), 0);
+    scratch_remove(room->directory);
 }
 
 static Job *submit(const Room *room, size_t points, double duration) {
