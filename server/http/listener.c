@@ -187,6 +187,7 @@ static void loop_end(Loop *loop) {
     free(loop->arrivals);
     MHD_stop_daemon(loop->daemon);
     sending_forget(loop->sent_again);
+    exchange_forget(loop);
     pthread_mutex_destroy(&loop->lock);
     bell_close(&loop->bell);
 }

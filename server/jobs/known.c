@@ -4,7 +4,6 @@
 
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -182,7 +181,7 @@ bool known_answer(Known *known, Store *store, const Submission *submission, uint
         const JobSlots *slots = &entry->slots;
         JobRow row = entry->row;
         row.client = (char *)submission->client; // borrowed
-        char time[32], took[JOB_SLOT_TOTAL + 1];
+        char time[32], took[JOB_SLOT_TOTAL];
         memcpy(text, entry->text, entry->size);
         text[entry->size] = '\0';
         row.created_unix_ms = row.started_unix_ms = row.finished_unix_ms = clock_unix_ms();
@@ -190,7 +189,9 @@ bool known_answer(Known *known, Store *store, const Submission *submission, uint
         // In whole microseconds, so that it is as wide as the place for it.
         int64_t took_us = (clock_monotonic_ns() - began_ns) / 1000;
         took_us = took_us < 999999 ? took_us : 999999;
-        snprintf(took, sizeof took, "0.%06d", (int)took_us);
+        memcpy(took, "0.000000", JOB_SLOT_TOTAL);
+        for (int64_t i = JOB_SLOT_TOTAL - 1, left = took_us; left > 0; i--, left /= 10)
+            took[i] = (char)('0' + left % 10);
         row.total = (double)took_us / 1e6; // to the bit what its text reads back to
         if (job_id_make(row.id)) {
             memcpy(text + slots->id, row.id, JOB_ID_LENGTH);
