@@ -143,6 +143,8 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
 
 // How long the client would wait, told in the reply.
 static double read_wait(const Request *request, Reply *reply) {
+    if (request->prefer == NULL)
+        return wait_initial;
     const Prefer prefer = header_prefer(request->prefer);
     double wait = prefer.responds_async ? 0 : wait_initial;
     char applied[24] = "";
