@@ -94,7 +94,8 @@ void request_close(Request *request) {
     request->storage = NULL;
 }
 
-#define KEPT(name, member) {name, offsetof(Request, member)}
+#define KEPT(name, member)                                                                         \
+    { name, offsetof(Request, member) }
 static const struct {
     const char *name;
     size_t offset;
