@@ -143,6 +143,8 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
 
 // How long the client would wait, told in the reply.
 static double read_wait(const Request *request, Reply *reply) {
+    if (request->prefer == NULL)
+        return wait_initial;
     const Prefer prefer = header_prefer(request->prefer);
     double wait = prefer.responds_async ? 0 : wait_initial;
     char applied[24] = "";
@@ -198,8 +200,22 @@ static Status answer_job(App *app, const Request *request, Reply *reply, Job *jo
     return reply_job(app, reply, job, 0, problem);
 }
 
-Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
+static Submission submission_of(const Request *request, Reply *reply) {
+    return (Submission){.text = request->body,
+                        .size = request->body_size,
+                        .client = request->client,
+                        .idempotency_key = request->idempotency_key,
+                        .is_replayed = &reply->is_replayed};
+}
+
+static Status create(App *app, const Request *request, const Submission *submission, Reply *reply,
+                     Problem *problem) {
     Job *job = NULL;
+    TRY(submit(app, request, submission, reply, &job, problem));
+    return answer_job(app, request, reply, job, problem);
+}
+
+Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     if (request->kept != NULL)
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     bool is_dry = false;
@@ -208,15 +224,10 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
     if (is_dry)
         return dry_run(app, request, reply, problem);
     TRY(refuse_stopping(app, problem));
-    const Submission submission = {.text = request->body,
-                                   .size = request->body_size,
-                                   .client = request->client,
-                                   .idempotency_key = request->idempotency_key,
-                                   .is_replayed = &reply->is_replayed};
+    const Submission submission = submission_of(request, reply);
     if (answer_known(app, request, &submission, reply))
         return STATUS_OK;
-    TRY(submit(app, request, &submission, reply, &job, problem));
-    return answer_job(app, request, reply, job, problem);
+    return create(app, request, &submission, reply, problem);
 }
 
 // The scene of a result, once more: what another engine's version made is made by this one.
@@ -254,20 +265,16 @@ static bool is_light(const Request *request) {
 }
 
 Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Submission submission = {.text = request->body,
-                                   .size = request->body_size,
-                                   .client = request->client,
-                                   .idempotency_key = request->idempotency_key};
     if (request->kept != NULL)
         return jobs_create(app, request, reply, problem);
     if (request->query_count > 0 || request->idempotency_key != NULL)
         return STATUS_OK;
-    if (is_light(request))
-        return jobs_create(app, request, reply, problem);
     TRY(body_require_json(request, problem));
-    if (!atomic_load(&app->is_stopping))
-        (void)answer_known(app, request, &submission, reply);
-    return STATUS_OK;
+    TRY(refuse_stopping(app, problem));
+    const Submission submission = submission_of(request, reply);
+    if (answer_known(app, request, &submission, reply) || !is_light(request))
+        return STATUS_OK;
+    return create(app, request, &submission, reply, problem);
 }
 
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -73,7 +73,9 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
                      const RouteSpan *spans, size_t count, Request *request, Reply *reply,
                      Problem *problem) {
     char scratch[512];
-    TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
+    if (!request->is_admitted)
+        TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
+    request->is_admitted = false; // whoever sleeps is judged again
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
     const uint64_t age = dispatcher->hot != NULL ? hot_age(dispatcher->hot) : 0;
@@ -148,7 +150,8 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
     const Status status = route != NULL
                               ? doorman_admit(dispatcher->doorman, route->scope, request, &problem)
                               : refuse(dispatcher, request, allow, reply, &problem);
-    if (status == STATUS_OK)
+    request->is_admitted = status == STATUS_OK;
+    if (request->is_admitted)
         return true;
     close_up(dispatcher, request, status, &problem, reply);
     return false;

@@ -278,24 +278,44 @@ void exchange_connection(void *context, struct MHD_Connection *connection, void 
     atomic_fetch_sub(&loop->connections, 1);
 }
 
+// A few are kept for the next requests: they are too large for the allocator's quick ways.
+static Exchange *exchange_take(Loop *loop) {
+    if (loop->spare_count == 0)
+        return calloc(1, sizeof(Exchange));
+    Exchange *exchange = loop->spare[--loop->spare_count];
+    memset(exchange, 0, sizeof *exchange);
+    return exchange;
+}
+
+static void exchange_put(Loop *loop, Exchange *exchange) {
+    if (loop->spare_count < EXCHANGES_KEPT)
+        loop->spare[loop->spare_count++] = exchange;
+    else
+        free(exchange);
+}
+
+void exchange_forget(Loop *loop) {
+    while (loop->spare_count > 0)
+        free(loop->spare[--loop->spare_count]);
+}
+
 // The request line is in; `target` is as sent.
 void *exchange_open(void *context, const char *target, struct MHD_Connection *connection) {
     Loop *loop = context;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     Seat *seat = info != NULL ? info->socket_context : NULL;
-    Exchange *exchange = seat != NULL ? calloc(1, sizeof *exchange) : NULL;
+    Exchange *exchange = seat != NULL ? exchange_take(loop) : NULL;
     if (exchange == NULL)
         return NULL;
     exchange->target = strdup(target);
     if (exchange->target == NULL) {
-        free(exchange);
+        exchange_put(loop, exchange);
         return NULL;
     }
     exchange->loop = loop;
     exchange->desk = loop->desk;
     exchange->seat = seat;
-    reply_default(&exchange->reply);
     atomic_fetch_add(&loop->desk->exchanges, 1);
     seat_limit(seat, HEAD_MS);
     return exchange;
@@ -329,13 +349,15 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     *state = NULL;
     if (exchange->forget != NULL)
         exchange->forget(exchange->request.kept);
-    // The client left before its answer was there.
-    exchange->reply.forget = NULL;
-    reply_clear(&exchange->reply);
+    if (exchange->is_answered) {
+        // The client may have left before it was sent.
+        exchange->reply.forget = NULL;
+        reply_clear(&exchange->reply);
+    }
     drop_body(exchange);
     request_close(&exchange->request);
     seat_limit(exchange->seat, IDLE_MS);
     free(exchange->target);
-    free(exchange);
+    exchange_put(loop, exchange);
     atomic_fetch_sub(&loop->desk->exchanges, 1);
 }

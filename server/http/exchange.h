@@ -28,6 +28,8 @@ typedef struct Desk {
     atomic_size_t held;      // bytes of bodies
 } Desk;
 
+enum { EXCHANGES_KEPT = 32 };
+
 // An event loop: its daemon and its thread alone, but for what is locked.
 typedef struct Loop {
     Desk *desk;
@@ -41,6 +43,8 @@ typedef struct Loop {
     atomic_bool is_stopping;
     atomic_size_t connections; // with the arrivals
     SentAgain sent_again[SENT_AGAIN];
+    struct Exchange *spare[EXCHANGES_KEPT];
+    size_t spare_count;
 } Loop;
 
 typedef struct Exchange {
@@ -74,5 +78,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
                                size_t *size, void **exchange);
 void exchange_close(void *loop, struct MHD_Connection *connection, void **exchange,
                     enum MHD_RequestTerminationCode code);
+// Frees what the loop kept for the next requests.
+void exchange_forget(Loop *loop);
 
 #endif

@@ -23,7 +23,7 @@ enum {
     THREADS = 16,            // that answer what takes a while
     CONNECTIONS_MOST = 8192, // over all loops, where as many files may be open
     FILES_KEPT = 64,         // for everything else
-    TOGETHER = 12,           // connections that one loop takes before another does
+    TOGETHER = 16,           // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
 };
@@ -187,6 +187,7 @@ static void loop_end(Loop *loop) {
     free(loop->arrivals);
     MHD_stop_daemon(loop->daemon);
     sending_forget(loop->sent_again);
+    exchange_forget(loop);
     pthread_mutex_destroy(&loop->lock);
     bell_close(&loop->bell);
 }

@@ -60,6 +60,8 @@ static bool tag(Reply *reply, const Request *request, const char *text, const ch
 }
 
 bool reply_is_known(Reply *reply, const Request *request) {
+    if (request->if_none_match == NULL)
+        return false;
     char packed[sizeof reply->etag + 8];
     // The client may have it as it is, or packed.
     snprintf(packed, sizeof packed, "%.*s" PACKED "\"", (int)strlen(reply->etag) - 1, reply->etag);

@@ -45,6 +45,7 @@ typedef struct Request {
     char client_name[TOKEN_NAME_SIZE]; // `client` points here
     char id[REQUEST_ID_SIZE];          // the client's own or ours; for the client and the journal
     const struct Route *route;         // that fits; NULL before and where there is none
+    bool is_admitted;                  // it was judged just now, before its body
     int64_t started_ns;                // monotonic
     bool is_woken;                     // the handler asked to wait and is called again
     bool is_expired;                   // ... because the time was up

@@ -25,7 +25,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from daemon import Daemon  # noqa: E402
 
 TICK = os.sysconf("SC_CLK_TCK")
-TOKEN = "0123456789abcdef" * 4
+TOKEN = "0123456789abcdef" * 4  # means nothing where no token is asked for; see guard()
 SECONDS, ROUNDS = 3, 5
 
 NGINX = """
@@ -145,10 +145,18 @@ def submit(daemon, scene):
     return reply.json()
 
 
+def guard(daemon):
+    """From now on the daemon asks for a token, which wrk has."""
+    global TOKEN
+    TOKEN = subprocess.run([daemon.program, "token", "create", "--name", "bench", "--scopes", "read,submit", "--data", daemon.data],
+                           check=True, capture_output=True, text=True).stdout.split()[0]
+
+
 def cached(daemon):
     result = submit(daemon, sponge(output={"channels": [], "psd": None}))["result"]
     path = f"/v1/results/{result}"
     body = daemon.request("GET", path).body
+    guard(daemon)
     with Nginx({"r.json": body}) as nginx:
         for connections in (16, 128):
             rivals(f"cached result, {len(body)} B, {connections} connections",
@@ -169,6 +177,7 @@ def post(daemon):
     text = json.dumps(scene)
     submit(daemon, scene)
     size = len(daemon.request("POST", "/v1/jobs", json=scene).body)
+    guard(daemon)
     with tempfile.TemporaryDirectory() as folder, Nginx({"post": b"x" * size}) as nginx:
         lua = script(folder, "post.lua", LUA_POST + f"wrk.body = [==[{text}]==]\n")
         for connections in (16, 64):
