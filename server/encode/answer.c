@@ -42,7 +42,9 @@ static void sweep_archive(const Variant *answer, Bytes *bytes) {
 }
 
 static void sweep_chart(const Variant *answer, Bytes *bytes) {
-    chart_sweep((const Sweep *)(const void *)answer, bytes);
+    const Sweep *sweep = (const Sweep *)(const void *)answer;
+    const SweepSource source = sweep_source(sweep);
+    (void)chart_sweep(sweep, &source, bytes);
 }
 
 static void sweep_table(const Variant *answer, Bytes *bytes) {

@@ -1,10 +1,25 @@
 // A sweep's table as NumPy's archive: an array for each column under its name; pointers without
-// their first slash, texts as bytes. Not JSON or CSV (sweep_table.h). Used by answer.c.
+// their first slash, texts as bytes. Not JSON or CSV (sweep_table.h). Used by answer.c and
+// api/sweeps.c.
 #ifndef SERVER_ENCODE_SWEEP_NPZ_H
 #define SERVER_ENCODE_SWEEP_NPZ_H
 
-#include "core/study/sweep.h"
 #include "server/base/bytes.h"
+#include "server/encode/layout.h"
+#include "server/encode/sweep_source.h"
+
+// What a layout reads from. Set `sweep` and `source`; all else is zero.
+typedef struct SweepArchive {
+    const Sweep *sweep;
+    const SweepSource *source;
+    LayoutSource columns;
+    size_t axis_widths[SWEEP_AXES]; // of texts; 0: numbers
+    size_t status_width;
+    bool is_broken; // the source was: bytes read since are none of the archive's
+} SweepArchive;
+
+// `layout` borrows `archive`.
+Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem);
 
 void sweep_npz(const Sweep *sweep, Bytes *bytes);
 

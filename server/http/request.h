@@ -80,10 +80,11 @@ Status request_count(const Request *request, const char *name, size_t least, siz
 // A body made piece by piece while it is sent, for what is too long to hold and for what is not
 // known yet. `next` writes up to `size` bytes and returns how many, STREAM_END behind the last, or
 // STREAM_WAIT to be called again when the request's waker (which the context may keep) is called or
-// after `wait_ms`. It is called from one thread at a time, must be quick, and knows no Request:
+// after `wait_ms`, or STREAM_BROKEN where the rest cannot be had: the client sees that it is cut
+// off. It is called from one thread at a time, must be quick, and knows no Request:
 // that is gone once the handler has returned. `release(context)` is called once, also if the client
 // leaves early.
-enum { STREAM_END = -1, STREAM_WAIT = -2 };
+enum { STREAM_END = -1, STREAM_WAIT = -2, STREAM_BROKEN = -3 };
 typedef struct Stream {
     ptrdiff_t (*next)(void *context, char *target, size_t size);
     uint64_t size; // of the whole body; UINT64_MAX: not known

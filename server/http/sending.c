@@ -25,6 +25,8 @@ static ssize_t send_next(void *context, uint64_t position, char *target, size_t 
         const ptrdiff_t count = sending->stream.next(sending->context, target, size);
         if (count == STREAM_END)
             return MHD_CONTENT_READER_END_OF_STREAM;
+        if (count == STREAM_BROKEN)
+            return MHD_CONTENT_READER_END_WITH_ERROR;
         if (count != STREAM_WAIT)
             return count;
         if (hall_is_closing(exchange->desk->hall))

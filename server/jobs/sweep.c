@@ -178,7 +178,7 @@ Status sweep_open(Worker *worker, Computation *computation, Findings *findings, 
 // Chunks that the store has not and that nobody is at.
 static Status submit_missing(SweepRun *run, Problem *problem) {
     SweepChunkRows there = {NULL, 0};
-    TRY(store_sweep_chunks(run->intake->store, run->row.number, false, &there, problem));
+    TRY(store_sweep_chunks(run->intake->store, run->row.number, &there, problem));
     size_t *missing = calloc(run->row.chunks, sizeof *missing);
     size_t count = 0, next = 0, left = 0;
     for (size_t chunk = 0; missing != NULL && chunk < run->row.chunks; chunk++) {

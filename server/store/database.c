@@ -158,6 +158,19 @@ void statement_end(Statement *statement) {
     sqlite3_clear_bindings(statement);
 }
 
+Status database_read_part(Database *database, const char *table, const char *column, int64_t number,
+                          size_t offset, size_t size, void *target, Problem *problem) {
+    sqlite3_blob *blob = NULL;
+    int code = sqlite3_blob_open(database->connection, "main", table, column, number, 0, &blob);
+    const size_t bytes = code == SQLITE_OK ? (size_t)sqlite3_blob_bytes(blob) : 0;
+    const size_t left = bytes > offset ? bytes - offset : 0;
+    if (code == SQLITE_OK)
+        code = sqlite3_blob_read(blob, target, (int)(left < size ? left : size), (int)offset);
+    (void)sqlite3_blob_close(blob);
+    return code == SQLITE_OK ? STATUS_OK
+                             : report(database->connection, "reading the database", problem);
+}
+
 Status database_change(Database *database, const char *sql, const RowColumn *columns,
                        const void *item, int *changes, Problem *problem) {
     Statement *statement;

@@ -177,6 +177,7 @@ void sweep_row_clear(SweepRow *row);
 
 // The rows of one chunk, all of them.
 typedef struct SweepChunkRow {
+    int64_t number; // the store's
     int64_t sweep;
     uint64_t chunk, failed;
     bool is_open;  // those that failed are to be tried again
@@ -198,13 +199,17 @@ Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem
 Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
 Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem);
-// All that are there, by chunk; `has_rows` false: without reasons and rows.
-Status store_sweep_chunks(Store *store, int64_t sweep, bool has_rows, SweepChunkRows *chunks,
-                          Problem *problem);
+// All that are there, by chunk, without reasons and rows.
+Status store_sweep_chunks(Store *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
 // One of them. STATUS_NOT_FOUND.
 Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
                          Problem *problem);
 void sweep_chunk_row_clear(SweepChunkRow *row);
+// Bytes `offset` ... of the rows of each of these chunks, `size` or as many as there are: those of
+// chunk i at target + i size. STATUS_CONFLICT where sweep or chunk is not what it was when it was
+// loaded.
+Status store_sweep_read(Store *store, const SweepRow *sweep, const SweepChunkRows *chunks,
+                        size_t offset, size_t size, unsigned char *target, Problem *problem);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
 Status store_sweep_reopen(Store *store, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.

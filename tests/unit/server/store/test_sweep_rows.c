@@ -77,7 +77,7 @@ static void a_chunk_comes_once_and_is_made_again_only_where_it_is_open(void **st
     assert_int_equal(store_sweep_reopen(store, "r-3", NULL), STATUS_CONFLICT);
     take(row.number, 0, 0, false, "zero");
     SweepChunkRows rows;
-    assert_int_equal(store_sweep_chunks(store, row.number, false, &rows, NULL), STATUS_OK);
+    assert_int_equal(store_sweep_chunks(store, row.number, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_true(rows.at[0].chunk == 0 && rows.at[1].chunk == 2);
     assert_null(rows.at[0].rows.at);
