@@ -73,10 +73,10 @@ static void opened(void *context, Status status, const char *detail) {
 }
 
 // With the lock held.
-static Status post(Intake *intake, Job *job, Problem *problem) {
+static Status post(Intake *intake, Job *job, StoreTurn turn, Problem *problem) {
     const StoreDone done = {opened, job_hold(job)};
     job->opening = job->row;
-    const Status status = store_job_post(intake->store, &job->opening, &done, &job->ticket);
+    const Status status = store_job_post(intake->store, &job->opening, turn, &done, &job->ticket);
     if (status == STATUS_OK) {
         intake->posted++;
         return STATUS_OK;
@@ -100,7 +100,7 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
         return STATUS_OK;
     }
     pthread_mutex_lock(&intake->lock);
-    const Status status = post(intake, job, problem);
+    const Status status = post(intake, job, STORE_NOW, problem);
     pthread_mutex_unlock(&intake->lock);
     if (status == STATUS_OK)
         totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
@@ -145,6 +145,9 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
+    // Mostly it has run before anyone must be told that it was accepted, and is then written once.
+    // But a sweep's rows need their job beside them.
+    const StoreTurn turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
     // It may have become known meanwhile.
     if (other == NULL && !is_retry &&
         (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
@@ -154,7 +157,7 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
     }
     Status status = find_room(intake, job, problem);
     if (status == STATUS_OK)
-        status = post(intake, job, problem);
+        status = post(intake, job, turn, problem);
     if (status == STATUS_OK) {
         intake_admit(intake, job);
         if (other == NULL)

@@ -57,9 +57,9 @@ Status store_result_save(Store *store, const ResultRow *result, const JobRow *co
 }
 
 Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, const StoreDone *done) {
+                         size_t job_count, StoreTurn turn, const StoreDone *done) {
     const Finish work = {result, jobs, job_count};
-    return store_post(store, finish, &work, sizeof work, done, NULL);
+    return store_post(store, finish, &work, sizeof work, turn, done, NULL);
 }
 
 typedef struct Key {
