@@ -17,6 +17,7 @@
 #include "server/store/job_rows.h"
 #include "server/store/late.h"
 #include "server/store/material_memory.h"
+#include "server/store/result_filter.h"
 #include "server/store/writer.h"
 
 enum { READERS = 4 };
@@ -27,6 +28,7 @@ struct Store {
     Writer *writer;
     Late *late;
     MaterialMemory *materials;
+    ResultFilter *results;
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t evictions;  // of series
     pthread_mutex_t lock;
@@ -74,10 +76,15 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
     made->materials = material_memory_new();
-    Status status = made->materials == NULL
+    made->results = result_filter_new();
+    Status status = made->materials == NULL || made->results == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the store")
                     : directory != NULL ? open_files(made, directory, is_beside, problem)
                                         : open_memory(made, problem);
+    // Beside a daemon there are others who write.
+    if (status == STATUS_OK && !is_beside)
+        status = result_filter_fill(made->results, made->own != NULL ? made->own : made->readers[0],
+                                    problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
     if (status == STATUS_OK && directory != NULL && !is_beside) {
@@ -113,6 +120,7 @@ void store_close(Store *store) {
     database_close(store->own);
     folder_unlock(store->lock_file);
     material_memory_free(store->materials);
+    result_filter_free(store->results);
     pthread_cond_destroy(&store->some);
     pthread_mutex_destroy(&store->lock);
     free(store);
@@ -149,6 +157,10 @@ Late *store_late(Store *store) {
 
 MaterialMemory *store_material_memory(Store *store) {
     return store->materials;
+}
+
+ResultFilter *store_result_filter(Store *store) {
+    return store->results;
 }
 
 uint64_t store_generation(Store *store) {
