@@ -388,21 +388,3 @@ Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     free(fault);
     return status;
 }
-
-void dry_run_clear(DryRun *dry_run) {
-    inquiry_clear(&dry_run->inquiry);
-    warnings_clear(&dry_run->warnings);
-    fields_clear(plan_report_fields, &dry_run->plan);
-}
-
-Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
-                      Problem *problem) {
-    memset(dry_run, 0, sizeof *dry_run);
-    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->inquiry,
-                       &dry_run->warnings, problem));
-    intake_result_id(&dry_run->inquiry, dry_run->result);
-    TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
-    TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
-    return STATUS_OK;
-}
