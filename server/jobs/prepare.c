@@ -1,5 +1,5 @@
 // A scene's text made ready: read, its materials' names turned into numbers, judged and completed,
-// and its id.
+// and its id; the same for who only asks what it would be.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 #include "server/base/bytes.h"
 #include "server/base/digest.h"
 #include "server/codec/read.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/intake_state.h"
 
 // "slug" or "slug@revision"; false if what stands behind @ is no revision.
 static bool split_name(const char *name, char slug[128], uint64_t *revision) {
