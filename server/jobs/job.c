@@ -160,6 +160,8 @@ Status job_kept(Job *job, bool *is_kept, Problem *problem) {
     Status status = STATUS_OK;
     if (!job->is_kept && job->refusal != STATUS_OK)
         status = problem_set(problem, job->refusal, "%s", job->refused);
+    if (job->ticket != NULL)
+        store_hurry(job->intake->store, job->ticket);
     unlock(job);
     return status;
 }

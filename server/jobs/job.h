@@ -57,8 +57,8 @@ void job_show_clear(JobShow *show);
 JobState job_glance(Job *job, double *progress);
 
 // Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
-// told of it before. STATUS_OK with *is_kept false while that is under way; otherwise why it could
-// not be kept. A job that could not be accepted never was.
+// told of it before. STATUS_OK with *is_kept false while that is under way, which asking hurries;
+// otherwise why it could not be kept. A job that could not be accepted never was.
 Status job_kept(Job *job, bool *is_kept, Problem *problem);
 
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.

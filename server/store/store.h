@@ -24,15 +24,25 @@ Status store_open_beside(const char *directory, Store **store, Problem *problem)
 void store_close(Store *store);
 
 // Writes are called "posted" where nobody waits for them. They are done in the order in which they
-// were posted, some at a time. `call` comes once, from the writer's thread, when the write is
-// durable or has failed (then with the reason), and must be quick; it may post.
+// were posted, some at a time, as far as they are of the same turn. `call` comes once, from the
+// writer's thread, when the write is durable or has failed (then with the reason), and must be
+// quick; it may post.
 typedef struct StoreDone {
     void (*call)(void *context, Status status, const char *detail);
     void *context;
 } StoreDone;
+typedef enum StoreTurn {
+    STORE_NOW,
+    STORE_SOON,  // a few milliseconds later, or with what else is written until then
+    STORE_LATER, // a quarter of a second later; until then it may be withdrawn, or hurried
+    STORE_LOW,   // when nothing else is queued, by itself
+    STORE_TURNS
+} StoreTurn;
 typedef struct StoreTicket StoreTicket; // lives until `call` returns
 // True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
 bool store_withdraw(Store *store, StoreTicket *ticket);
+// What was to come later comes now.
+void store_hurry(Store *store, StoreTicket *ticket);
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
 // material's head, a review, a record. Whoever writes those calls store_catalogue_changed once it
@@ -89,7 +99,8 @@ bool job_row_copy(const JobRow *row, JobRow *copy);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
 // The same, posted; `row` is borrowed until then.
-Status store_job_post(Store *store, const JobRow *row, const StoreDone *done, StoreTicket **ticket);
+Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
+                      StoreTicket **ticket);
 // The same behind the answer, for a finished job that computed nothing: found by its id at once, in
 // the database some 20 ms later. A killed process loses none, a power failure may lose the last
 // ones. False where there is no room for it now: it is to be added the usual way.
@@ -132,7 +143,7 @@ Status store_result_save(Store *store, const ResultRow *result, const JobRow *co
                          size_t job_count, Problem *problem);
 // The same, posted; all of it is borrowed until then.
 Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, const StoreDone *done);
+                         size_t job_count, StoreTurn turn, const StoreDone *done);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);

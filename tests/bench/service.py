@@ -275,10 +275,10 @@ def counted(folder, scene):
     return script(folder, "counted.lua", COUNTED.format(template=json.dumps(scene), first=next(numbers)))
 
 
-def core_rate(build, kind):
-    """Runs a second of the core alone, on all processors."""
-    text = subprocess.run([os.path.join(build, "tests", "bench_core"), kind, str(os.cpu_count()), "2"], check=True,
-                          capture_output=True, text=True).stdout
+def core_rate(build, scene):
+    """Runs a second of the core alone, on all processors, and CPU microseconds a run."""
+    text = subprocess.run([os.path.join(build, "tests", "bench_core"), json.dumps(scene), str(os.cpu_count()), str(SECONDS)],
+                          check=True, capture_output=True, text=True).stdout
     return float(text.split()[0]), float(text.split()[1])
 
 
@@ -308,13 +308,13 @@ def jobs(daemon, build):
             rates.append(new[0])
             beside.append(none[0])
             costs.append(new[1])
-        core = core_rate(build, "free")
+        core = core_rate(build, free)
         print(f"new jobs, free sponge 10 s, summary only, 64 clients: {statistics.median(ratios):.2f} of what is acknowledged "
               f"without computing ({statistics.median(rates):.0f} to {statistics.median(beside):.0f} /s); "
               f"{statistics.median(costs):.0f} us of CPU a job, the core's {core[1]:.0f}", flush=True)
         ratios, costs, rates = [], [], []
         for _ in range(ROUNDS):
-            alone = core_rate(build, "random")
+            alone = core_rate(build, shaken)
             new = rate(shaken)
             ratios.append(new[0] / alone[0])
             costs.append(new[1])
