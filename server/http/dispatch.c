@@ -95,9 +95,10 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
     }
     if (route_nearest(dispatcher->table, request->path, near, sizeof near))
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is nothing at this path; did you mean %s?", near);
+                           "there is nothing at this path; did you mean %s%s?", link_base(), near);
     return problem_set(problem, STATUS_NOT_FOUND,
-                       "there is nothing at this path; GET /openapi.json lists what there is");
+                       "there is nothing at this path; GET %s/openapi.json lists what there is",
+                       link_base());
 }
 
 // Turns a fault into its problem document, and has the answer noted if it is one.

@@ -236,6 +236,9 @@ def test_behind_a_base_url_every_link_begins_with_it():
         assert 'href="/impactd/v1/jobs"' in html
         assert daemon.get("/impactd/openapi.json").json()["servers"] == [{"url": base}]
         assert daemon.get("/impactdx/v1/jobs").status == 404
+        for path in ("/v1/jobz", "/impactd/v1/jobz"):
+            assert "did you mean /impactd/v1/jobs?" in daemon.get(path).json()["detail"], path
+        assert "GET /impactd/openapi.json" in daemon.get("/impactd/none/at/all").json()["detail"]
         # What a proxy says is not believed.
         forwarded = daemon.get("/", headers={"X-Forwarded-Host": "evil.example.org", "X-Forwarded-Proto": "gopher",
                                              "X-Forwarded-Prefix": "/evil", "Forwarded": "host=evil.example.org"})
@@ -306,6 +309,8 @@ def test_settings_that_contradict_each_other_do_not_start():
                 (("--workers", "9", "--queue", "8"), ("--queue", "--workers", "9")),
                 (("--base-url", "sim.example.org"), ("--base-url", "http://")),
                 (("--base-url", "http://a/v1"), ("/v1",)),
+                (("--base-url", "http://a:99999/b"), ("--base-url", "65535", "a:99999")),
+                (("--base-url", "http://a:0"), ("--base-url", "65535")),
                 (("--tls-cert", plain), ("--tls-cert", "--tls-key")),
                 (("--tls-key", plain), ("--tls-key", "--tls-cert")),
                 (("--tls-cert", "/none", "--tls-key", "/none"), ("--tls-cert", "--tls-key", "/none")),
