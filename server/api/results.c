@@ -13,6 +13,7 @@
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
+#include "server/http/doorman.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
@@ -286,7 +287,19 @@ Status results_document(App *app, const Request *request, Reply *reply, Document
     return answered;
 }
 
+// Its jobs' clients share it: no one of them may take it from the others.
+static Status require_own(App *app, const Request *request, Problem *problem) {
+    char owner[72], what[128];
+    if (request->client == NULL || request->holder.is_admin)
+        return STATUS_OK;
+    store_job_settle(app->store);
+    TRY(store_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
+    snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
+    return doorman_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);
+}
+
 Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
+    TRY(require_own(app, request, problem));
     TRY(intake_delete(app->intake, request->parameters[0], problem));
     reply_borrow(reply, 204, NULL, NULL, 0);
     return STATUS_OK;

@@ -179,6 +179,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                              .answer_at_once = dispatch_at_once,
                              .answer = dispatch,
                              .admits = dispatch_admits,
+                             .still_admits = dispatch_still_admits,
                              .note = dispatch_note,
                              .context = &dispatcher};
     const IntakeSettings work = {.workers = settings->workers,

@@ -155,6 +155,12 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
     return false;
 }
 
+bool dispatch_still_admits(void *context, Request *request) {
+    const Dispatcher *dispatcher = context;
+    return request->route == NULL ||
+           doorman_admit(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
+}
+
 void dispatch_note(void *context, const Request *request, const Reply *reply) {
     const Dispatcher *dispatcher = context;
     doorman_note(dispatcher->doorman, request, reply);

@@ -21,6 +21,9 @@ typedef struct ListenerSettings {
     void (*answer)(void *context, Request *request, Reply *reply);
     // Asked before a body is taken, on the event loop: false and a refusal in `reply`. May be NULL.
     bool (*admits)(void *context, Request *request, Reply *reply);
+    // Asked now and then while a body is made piece by piece, on the event loop: false ends it. May
+    // be NULL.
+    bool (*still_admits)(void *context, Request *request);
     // Told of refusals that none of them made. May be NULL.
     void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;

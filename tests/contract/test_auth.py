@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tokens and scopes, Host names, base URL, request ids, headers, settings together, the daemon's end: as clients meet them."""
 
+import http.client
 import json
 import os
 import re
@@ -89,6 +90,96 @@ def test_a_token_beyond_its_rate_or_quota_waits():
             job = replies[0].json()["links"]["self"]
             assert daemon.request("DELETE", job, headers=bearer(greedy)).status == 200
             assert option == "--rate" or submit(greedy, 5).status == 202
+
+
+SLOW = dict(program.scene("paper_sine_aluminium"), duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+
+
+def test_a_job_is_cancelled_by_its_owner_or_an_admin_alone():
+    """Another's DELETE and retry: 403 with the owner's name, and the job goes on; its sender stands in the job and the list."""
+    with program.daemon() as daemon:
+        nobodys = daemon.submit({**SLOW, "duration": 1.9e6}, headers={"Prefer": "respond-async"}).json()
+        names = {name: bearer(token(daemon.data, name, scopes)) for name, scopes in
+                 (("ann", "read,submit"), ("bob", "read,submit"), ("chief", "read,admin"))}
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+
+        def submit(who, more):
+            reply = daemon.submit({**SLOW, "duration": 2e6 + more}, headers={**names[who], "Prefer": "respond-async"})
+            assert reply.status == 202 and "client" not in reply.json(), reply
+            return reply.json()["links"]["self"]
+        for i, (who, other) in enumerate((("ann", "bob"), ("bob", "ann"))):
+            job = submit(who, i)
+            for method, path in (("DELETE", job), ("POST", job + "/retry")):
+                refused = daemon.request(method, path, headers=names[other])
+                assert refused.status == 403 and f'the token "{who}"' in refused.json()["detail"], refused
+            shown = daemon.get(job, headers=names[other]).json()
+            assert shown["status"] in ("accepted", "running") and shown["client"] == who, shown
+            listed = daemon.get("/v1/jobs", headers=names[other]).json()["jobs"]
+            assert {one["id"]: one.get("client") for one in listed}[shown["id"]] == who, listed
+            dismissed = daemon.request("DELETE", job, headers=names[who])
+            assert dismissed.status == 200 and dismissed.json()["client"] == who, dismissed
+            again = daemon.request("DELETE", job, headers=names[other])
+            assert again.status == 403, again
+        assert daemon.request("DELETE", submit("ann", 5), headers=names["chief"]).status == 200
+        # What was sent before anybody had a name is anybody's.
+        assert "client" not in daemon.get(f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).json()
+        assert daemon.request("DELETE", f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).status == 200
+        assert daemon.request("DELETE", "/v1/jobs/j-none", headers=names["ann"]).status == 404
+
+
+def test_a_result_that_others_share_is_not_one_clients_to_delete():
+    """403 naming the other client, by whom the result is still read; alone with it, or as admin, it goes."""
+    with program.daemon() as daemon:
+        names = {name: bearer(token(daemon.data, name, scopes)) for name, scopes in
+                 (("ann", "read,submit"), ("bob", "read,submit"), ("chief", "read,admin"))}
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        for scene, deleter in ((SCENE, "chief"), ({**SCENE, "duration": 3}, "ann")):
+            for who in ("ann", "bob") if deleter == "chief" else ("ann", "ann"):
+                # Known to the byte the second time, so that its row comes behind the answer.
+                result = daemon.submit(scene, headers={**names[who], "Prefer": "wait=30"}).json()["result"]
+            path = f"/v1/results/{result}"
+            if deleter == "chief":
+                for who, other in (("ann", "bob"), ("bob", "ann")):
+                    refused = daemon.request("DELETE", path, headers=names[who])
+                    assert refused.status == 403 and f'the token "{other}"' in refused.json()["detail"], refused
+            assert daemon.get(path, headers=names["bob"]).status == 200
+            assert daemon.request("DELETE", path, headers=names[deleter]).status == 204, deleter
+            assert daemon.get(path, headers=names["bob"]).status == 404
+        assert daemon.request("DELETE", "/v1/results/r-none", headers=names["ann"]).status == 404
+
+
+def test_what_is_sent_piece_by_piece_ends_with_its_token():
+    """Events and a long series under way when their token is revoked are cut off; those of another token go on."""
+    with program.daemon() as daemon:
+        ann, bob = token(daemon.data, "ann"), token(daemon.data, "bob")
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        scene = {**SCENE, "duration": 1000, "output": {"psd": None}}
+        done = daemon.submit(scene, headers={**bearer(ann), "Prefer": "wait=30"}).json()
+        series = f"/v1/results/{done['result']}/series.npy"
+        slow = daemon.submit(SLOW, headers={**bearer(ann), "Prefer": "respond-async"}).json()
+        open_now = {}
+        for who, key in (("ann", ann), ("bob", bob)):
+            for path in (series, slow["links"]["self"] + "/events"):
+                connection = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=60)
+                connection.request("GET", path, headers=bearer(key))
+                reply = connection.getresponse()
+                assert reply.status == 200 and len(reply.read(10)) == 10, (who, path)
+                open_now[who, path] = reply
+        assert impactd("token", "revoke", "ann", "--data", daemon.data).returncode == 0
+        assert until(lambda: daemon.get("/v1/jobs", headers=bearer(ann)).status == 401)
+        time.sleep(0.6)
+        for path in (series, slow["links"]["self"] + "/events"):
+            try:
+                rest = open_now["ann", path].read()
+                raise AssertionError(f"{path} was sent to its end, {len(rest)} bytes")
+            except (http.client.IncompleteRead, ConnectionError):
+                pass
+        assert len(open_now["bob", series].read()) > 40e6
+        events = open_now["bob", slow["links"]["self"] + "/events"]
+        assert daemon.request("DELETE", slow["links"]["self"], headers=bearer(bob)).status == 403
+        chief = token(daemon.data, "chief", "admin")
+        assert until(lambda: daemon.request("DELETE", slow["links"]["self"], headers=bearer(chief)).status == 200)
+        assert b"event: finished" in events.read()
 
 
 def test_every_route_asks_for_its_scope():
