@@ -47,7 +47,8 @@ static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const
     Differences differences = {0};
     Bytes bytes = {.most = app->reply_most};
     for (int i = 0; i < 2; i++)
-        TRY(report_read(rows[i].summary, summary_fields, &summaries[i], problem));
+        TRY(report_read(rows[i].summary, strlen(rows[i].summary), summary_fields, &summaries[i],
+                        problem));
     // A study asks more of a scene; what is compared is the scene's own run.
     Status status = differ_json(rows[0].scene, rows[1].scene, "study", &differences, problem);
     if (status == STATUS_OK) {
