@@ -33,10 +33,11 @@ static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const Summ
     }
     const Outcome *a = outcomes[0], *b = outcomes[1];
     bytes_text(bytes, ", ");
-    compare_put_motions(bytes, &a->response, &b->response, horizons);
+    const size_t motions = compare_put_motions(bytes, &a->response, &b->response, horizons);
     bytes_text(bytes, ", \"psd\": ");
-    compare_put_spectra(bytes, &a->spectrum, &b->spectrum);
+    const size_t spectra = compare_put_spectra(bytes, &a->spectrum, &b->spectrum);
     bytes_text(bytes, ", \"warnings\": [");
+    compare_warn_left(bytes, motions, spectra);
     compare_warn(bytes, &a->response, &b->response, &a->spectrum, &b->spectrum);
     bytes_text(bytes, "]");
 }
