@@ -5,6 +5,7 @@
 #ifndef SERVER_HTTP_LISTENER_H
 #define SERVER_HTTP_LISTENER_H
 
+#include "server/base/certificate.h"
 #include "server/http/address.h"
 #include "server/http/gate.h"
 #include "server/http/request.h"
@@ -28,7 +29,7 @@ typedef struct ListenerSettings {
     void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
     const GateHosts *hosts;         // NULL: gate_loopback
-    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
+    CertificateSource *certificate; // NULL: no TLS
 } ListenerSettings;
 
 // Fails as address_open does.

@@ -121,7 +121,7 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        add_headers(response, reply, exchange->desk->settings.tls_cert != NULL);
+        add_headers(response, reply, exchange->desk->settings.certificate != NULL);
     return response;
 }
 

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Tokens and scopes, Host names, base URL, request ids, headers, settings together, the daemon's end: as clients meet them."""
 
+import fcntl
 import http.client
 import json
 import os
+import pty
 import re
 import shutil
 import signal
@@ -12,6 +14,7 @@ import ssl
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
 import urllib.request
@@ -449,6 +452,83 @@ def test_tls_serves_and_refuses_bad_files():
         finally:
             process.terminate()
             process.wait(20)
+            process.stdout.close()
+
+
+def test_a_renewed_certificate_is_used_without_an_end():
+    """SIGHUP: new connections see the new certificate, old ones go on; faulty files change nothing and are told."""
+    if shutil.which("openssl") is None:
+        raise program.Skipped("openssl is not installed")
+    with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
+        cert, key = certificate(folder)
+        other_cert, other_key = certificate(folder, 3)
+        journal = os.path.join(folder, "journal")
+        with open(journal, "w", encoding="utf-8") as errors:
+            process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", cert,
+                                        "--tls-key", key], stdout=subprocess.PIPE, stderr=errors, text=True)
+        try:
+            port = int(re.search(r"listens on https://\S+:(\d+)", process.stdout.readline())[1])
+
+            def said():
+                with open(journal, encoding="utf-8") as file:
+                    return file.read()
+
+            def seen():
+                return ssl.get_server_certificate(("127.0.0.1", port), timeout=20)
+
+            def wanted(path):
+                with open(path, encoding="utf-8") as file:
+                    return file.read()
+            first = wanted(cert)
+            assert seen().split() == first.split()
+            old = http.client.HTTPSConnection("127.0.0.1", port, context=ssl._create_unverified_context(), timeout=20)
+            old.request("GET", "/version")
+            assert old.getresponse().read()
+            # A key of another: told, and nothing changes.
+            shutil.copy(other_key, key)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: "the certificate stays as it was" in said() and "not that of the certificate" in said()), said()
+            assert seen().split() == first.split()
+            shutil.copy(other_cert, cert)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: f"the certificate in {cert} is used from now on" in said()), said()
+            assert seen().split() == wanted(other_cert).split() != first.split()
+            with urllib.request.urlopen(f"https://localhost:{port}/version", context=ssl.create_default_context(cafile=other_cert), timeout=20) as reply:
+                assert reply.status == 200
+            old.request("GET", "/version")
+            assert old.getresponse().read(), "the connection from before has ended"
+            os.remove(cert)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: said().count("stays as it was") == 2 and f"cannot be read: {cert}" in said()), said()
+            assert seen().split() == wanted(other_cert).split()
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0
+            process.stdout.close()
+
+
+def test_a_hangup_ends_what_has_lost_its_terminal_alone():
+    """SIGHUP without TLS is told and nothing else; where the terminal it was started in is gone it ends well."""
+    with Daemon(program.build) as daemon:
+        daemon.process.send_signal(signal.SIGHUP)
+        assert until(lambda: "nothing to read anew" in daemon.stderr()), daemon.stderr()
+        assert daemon.get("/health/ready").status == 200
+    with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
+        terminal, inside = pty.openpty()
+        process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder], stdin=inside,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True,
+                                   preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+        os.close(inside)
+        try:
+            assert "listens on" in process.stdout.readline()
+            process.send_signal(signal.SIGHUP)
+            time.sleep(0.2)
+            assert process.poll() is None, "it has its terminal still"
+            os.close(terminal)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+            process.wait()
             process.stdout.close()
 
 
