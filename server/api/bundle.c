@@ -81,12 +81,12 @@ static Status put_series(Zip *zip, const Response *response, Sheet *sheet, Probl
     return status;
 }
 
-static Status put_spectra(Zip *zip, const char *document, Outcome *outcome, Problem *problem) {
+static Status put_spectra(Zip *zip, const char *document, Problem *problem) {
     Bytes bytes = {.most = 0};
-    Sheet sheet = {.outcome = outcome_hold(outcome)};
+    Sheet sheet = {.encoding = NULL};
     Status status = put_document(zip, "psd.json", document, problem);
     if (status == STATUS_OK)
-        status = sheet_psd(&sheet, problem);
+        status = sheet_psd(&sheet, document, problem);
     if (status == STATUS_OK)
         status = encoding_write(&encoder_csv, &sheet.table, &bytes, problem);
     if (status == STATUS_OK)
@@ -112,8 +112,9 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, Sheet *sheet
     TRY(put_text(zip, "result.json", &result, problem));
     TRY(put_text(zip, "manifest.json", manifest, problem));
     TRY(put_series(zip, response, sheet, problem));
-    if (row->psd != NULL)
-        TRY(put_spectra(zip, row->psd, sheet->outcome, problem));
+    const char *spectra = results_document(row, DOCUMENT_PSD);
+    if (spectra != NULL)
+        TRY(put_spectra(zip, spectra, problem));
     if (response->is_unlisted)
         return STATUS_OK;
     impacts_csv(&response->impacts, &impacts);

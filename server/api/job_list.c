@@ -29,7 +29,7 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
         job_drop(job);
         if (status == STATUS_OK && is_meant) {
             bytes_text(bytes, separator);
-            job_put(bytes, &show, JOB_PUT_LINKS);
+            job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
         }
         job_show_clear(&show);
         if (status == STATUS_OK)
@@ -50,11 +50,12 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
                      .title = row->title,
                      .labels = row->labels,
                      .study = row->study,
+                     .client = row->client,
                      .is_result_deleted = !row->has_result};
     text_fit(show.id, sizeof show.id, row->id);
     text_fit(show.result, sizeof show.result, row->result);
     bytes_text(bytes, separator);
-    job_put(bytes, &show, JOB_PUT_LINKS); // borrows the row's texts
+    job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
     return true;
 }
 

@@ -9,6 +9,7 @@
 #include "server/api/job_document.h"
 #include "server/base/clock.h"
 #include "server/http/body.h"
+#include "server/http/doorman.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 
@@ -16,7 +17,8 @@ static const double wait_initial = 2, wait_most = 30; // [s]
 
 enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
 
-// Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
+// Drops the hold on `job`. `code` 0: to its sender, 200 if it is finished, else 202 and where to
+// look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
     JobShow show = {0};
     const Status status = job_show(job, &show);
@@ -26,6 +28,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
         return problem_set(problem, status, "the job cannot be shown");
     }
     const bool is_finished = job_state_is_final((int)show.state);
+    const int parts = JOB_PUT_WHOLE | JOB_PUT_LINKS | (code == 200 ? JOB_PUT_SENDER : 0);
     if (code == 0)
         code = is_finished ? 200 : 202;
     if (code == 202)
@@ -33,7 +36,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     if (!is_finished)
         reply->retry_after = 1;
     Bytes bytes = {.most = app->reply_most};
-    job_put(&bytes, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS);
+    job_put(&bytes, &show, parts);
     bytes_text(&bytes, "\n");
     job_show_clear(&show);
     return reply_bytes(reply, code, type_json, &bytes, problem);
@@ -290,13 +293,26 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     return reply_job(app, reply, job, 200, problem);
 }
 
+// Whether the request may change what the job of that id came to.
+static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
+    Job *job = NULL;
+    char what[64];
+    TRY(intake_find(app->intake, id, &job, problem));
+    snprintf(what, sizeof what, "the job %.40s", id);
+    const Status status = doorman_owns(request, job_client(job), what, problem);
+    job_drop(job);
+    return status;
+}
+
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     bool is_paused;
-    if (request->kept != NULL)
+    if (request->kept != NULL) {
         job = pause_end(request->kept, reply);
-    else
+    } else {
+        TRY(require_own(app, request, request->parameters[0], problem));
         TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)
         return STATUS_OK;
@@ -314,6 +330,7 @@ Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *probl
                                        .idempotency_key = request->idempotency_key,
                                        .is_replayed = &reply->is_replayed};
         TRY(refuse_stopping(app, problem));
+        TRY(require_own(app, request, request->parameters[0], problem));
         TRY(submit(app, request, &submission, reply, &job, problem));
     }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));

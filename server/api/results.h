@@ -8,9 +8,8 @@
 
 typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Document;
 
-// The JSON as it was saved, of the result in the request's first parameter; immutable.
-Status results_document(App *app, const Request *request, Reply *reply, Document document,
-                        Problem *problem);
+// The JSON as it was saved; NULL where the scene asked for none.
+const char *results_document(const ResultRow *row, Document document);
 
 // Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
 Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);

@@ -40,6 +40,18 @@ Status sheet_own(Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
+Status sheet_own_axis(Sheet *sheet, Problem *problem) {
+    TRY(sheet_own(sheet, problem));
+    Table *table = &sheet->table;
+    const Column *axis = &sheet->own.at[0];
+    table->axis_name = axis->name;
+    table->axis_unit = axis->unit;
+    table->axis = axis->values;
+    table->columns = sheet->chosen + 1;
+    table->column_count--;
+    return STATUS_OK;
+}
+
 Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
                       const Encoder **encoder, Problem *problem) {
     const char *extension = request->parameters[parameter];

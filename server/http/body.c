@@ -17,6 +17,10 @@ Status body_require_json(const Request *request, Problem *problem) {
             "the body must be application/json, is %.60s; with curl use --json @scene.json, or "
             "-H 'Content-Type: application/json'",
             request->content_type != NULL ? request->content_type : "of no given type");
+    return body_require(request, problem);
+}
+
+Status body_require(const Request *request, Problem *problem) {
     if (request->is_too_large)
         return problem_set(problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes",
                            request->body_most);

@@ -97,9 +97,10 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
     }
     if (route_nearest(dispatcher->table, request->path, near, sizeof near))
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is nothing at this path; did you mean %s?", near);
+                           "there is nothing at this path; did you mean %s%s?", link_base(), near);
     return problem_set(problem, STATUS_NOT_FOUND,
-                       "there is nothing at this path; GET /openapi.json lists what there is");
+                       "there is nothing at this path; GET %s/openapi.json lists what there is",
+                       link_base());
 }
 
 // Turns a fault into its problem document, and has the answer noted if it is one.
@@ -155,6 +156,12 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
         return true;
     close_up(dispatcher, request, status, &problem, reply);
     return false;
+}
+
+bool dispatch_still_admits(void *context, Request *request) {
+    const Dispatcher *dispatcher = context;
+    return request->route == NULL ||
+           doorman_admit(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
 }
 
 void dispatch_note(void *context, const Request *request, const Reply *reply) {

@@ -341,7 +341,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
 
 void exchange_close(void *context, struct MHD_Connection *connection, void **state,
                     enum MHD_RequestTerminationCode code) {
-    (void)connection, (void)code;
+    (void)connection;
     Loop *loop = context;
     Exchange *exchange = *state;
     if (exchange == NULL)
@@ -356,7 +356,8 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     }
     drop_body(exchange);
     request_close(&exchange->request);
-    seat_limit(exchange->seat, IDLE_MS);
+    // One that ended in an error the library closes only when its client is heard of again.
+    seat_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
     free(exchange->target);
     exchange_put(loop, exchange);
     atomic_fetch_sub(&loop->desk->exchanges, 1);

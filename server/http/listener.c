@@ -143,12 +143,10 @@ static void *accept_all(void *context) {
 static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) {
     const ListenerSettings *settings = &desk->settings;
     loop->desk = desk;
-    const bool is_tls = settings->tls_key != NULL;
+    const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
     const struct MHD_OptionItem tls[] = {
-        {MHD_OPTION_HTTPS_MEM_KEY, 0, (void *)(uintptr_t)settings->tls_key},
-        {MHD_OPTION_HTTPS_MEM_CERT, 0, (void *)(uintptr_t)settings->tls_cert},
         {MHD_OPTION_HTTPS_PRIORITIES, 0,
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3"},
         {MHD_OPTION_END, 0, NULL}};
@@ -159,7 +157,9 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S, MHD_OPTION_STRICT_FOR_CLIENT, 0,
         MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop, MHD_OPTION_NOTIFY_CONNECTION,
         exchange_connection, loop, MHD_OPTION_NOTIFY_COMPLETED, exchange_close, loop,
-        MHD_OPTION_ARRAY, is_tls ? tls : none, MHD_OPTION_END);
+        MHD_OPTION_ARRAY, is_tls ? tls : none,
+        is_tls ? MHD_OPTION_HTTPS_CERT_CALLBACK : MHD_OPTION_END, settings->certificate,
+        MHD_OPTION_END);
     if (loop->daemon == NULL)
         return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                            is_tls ? " with this certificate and key" : "");
@@ -212,7 +212,7 @@ static Status start(Listener *listener, Problem *problem) {
     TRY(hall_open(&exchange_calls, &desk->hall, problem));
     TRY(pool_open(THREADS, &desk->pool, problem));
     TRY(address_open(&settings->address, &listener->descriptor, problem));
-    address_url(&settings->address, settings->tls_key != NULL, listener->url);
+    address_url(&settings->address, settings->certificate != NULL, listener->url);
     desk->url = listener->url;
     desk->first_id = (uint64_t)clock_unix_ms() << 16;
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);

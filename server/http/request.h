@@ -40,18 +40,18 @@ typedef struct Request {
         *range; // NULL if absent
     const char *expect, *authorization, *accept_encoding, *if_match, *idempotency_key,
         *last_event_id;
-    char prefers[128];  // all Prefer headers in one: `prefer` points here
-    const char *client; // the name of the token it came with; NULL: none was asked for
-    char client_name[TOKEN_NAME_SIZE]; // `client` points here
-    char id[REQUEST_ID_SIZE];          // the client's own or ours; for the client and the journal
-    const struct Route *route;         // that fits; NULL before and where there is none
-    bool is_admitted;                  // it was judged just now, before its body
-    int64_t started_ns;                // monotonic
-    bool is_woken;                     // the handler asked to wait and is called again
-    bool is_expired;                   // ... because the time was up
-    void *kept;                        // what the handler kept when it asked to wait; see Reply
-    const Waker *waker; // wakes this request; outlives it, so that a late call does no harm
-    char *storage;      // what the texts above point into
+    char prefers[128];         // all Prefer headers in one: `prefer` points here
+    const char *client;        // the name of the token it came with; NULL: none was asked for
+    Holder holder;             // `client` points here
+    char id[REQUEST_ID_SIZE];  // the client's own or ours; for the client and the journal
+    const struct Route *route; // that fits; NULL before and where there is none
+    bool is_admitted;          // it was judged just now, before its body
+    int64_t started_ns;        // monotonic
+    bool is_woken;             // the handler asked to wait and is called again
+    bool is_expired;           // ... because the time was up
+    void *kept;                // what the handler kept when it asked to wait; see Reply
+    const Waker *waker;        // wakes this request; outlives it, so that a late call does no harm
+    char *storage;             // what the texts above point into
 } Request;
 
 // Takes `target` apart: path, queries, percent-decoded. The rest of `request` stays. STATUS_USAGE

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "server/base/clock.h"
 #include "server/http/exchange.h"
 #include "server/http/reply.h"
 #include "server/http/shield.h"
@@ -10,16 +11,31 @@
 // What a streamed body needs while it is sent.
 typedef struct Sending {
     Exchange *exchange;
+    int64_t admitted_ns; // when its client was last looked at
     Stream stream;
     void (*release)(void *context);
     void *context;
 } Sending;
+
+// A body that takes long outlives what its client may do.
+static bool is_still_admitted(Sending *sending) {
+    enum { LOOK_MS = 500 };
+    const ListenerSettings *settings = &sending->exchange->desk->settings;
+    const int64_t now_ns = clock_monotonic_ns();
+    if (settings->still_admits == NULL || now_ns - sending->admitted_ns < LOOK_MS * 1000000LL)
+        return true;
+    sending->admitted_ns = now_ns;
+    return settings->still_admits(settings->context, &sending->exchange->request);
+}
 
 static ssize_t send_next(void *context, uint64_t position, char *target, size_t size) {
     (void)position;
     Sending *sending = context;
     Exchange *exchange = sending->exchange;
     for (;;) {
+        // Cut off, so that nobody takes it for whole.
+        if (!is_still_admitted(sending))
+            return MHD_CONTENT_READER_END_WITH_ERROR;
         // Forgotten before looking: whoever wakes it from here on has it look again.
         (void)seat_was_woken(exchange->seat);
         const ptrdiff_t count = sending->stream.next(sending->context, target, size);
@@ -48,7 +64,8 @@ static struct MHD_Response *stream_response(Exchange *exchange, const Reply *rep
     Sending *sending = malloc(sizeof *sending);
     if (sending == NULL)
         return NULL;
-    *sending = (Sending){exchange, reply->stream, reply->release, reply->context};
+    *sending =
+        (Sending){exchange, clock_monotonic_ns(), reply->stream, reply->release, reply->context};
     struct MHD_Response *response = MHD_create_response_from_callback(
         reply->stream.size == UINT64_MAX ? MHD_SIZE_UNKNOWN : reply->stream.size, PIECE, send_next,
         sending, sending_free);
@@ -106,7 +123,7 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        add_headers(response, reply, exchange->desk->settings.tls_cert != NULL);
+        add_headers(response, reply, exchange->desk->settings.certificate != NULL);
     return response;
 }
 

@@ -108,6 +108,27 @@ bool store_result_exists(Store *store, const char *id) {
     return load(store, sql, id, &row, NULL) == STATUS_OK;
 }
 
+typedef struct Sharer {
+    char *id, *client;
+    char sharer[72];
+} Sharer;
+static const RowColumn sharer_columns[] = {ROW_COLUMN(Sharer, id, COLUMN_TEXT),
+                                           ROW_COLUMN(Sharer, client, COLUMN_TEXT),
+                                           ROW_COLUMN(Sharer, sharer, COLUMN_NAME), ROW_END};
+
+Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
+                           Problem *problem) {
+    static const char sql[] =
+        "SELECT client AS sharer FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
+        "AND result = :id AND state = 2 AND client <> :client LIMIT 1";
+    const Sharer key = {(char *)id, (char *)client, ""};
+    Sharer found = {0};
+    bool is_found;
+    TRY(store_first(store, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
+    text_fit(sharer, sizeof found.sharer, is_found ? found.sharer : "");
+    return STATUS_OK;
+}
+
 static Status delete (Database *database, const void *work, Problem *problem) {
     static const char sql[] = "DELETE FROM results WHERE id = :id";
     const Key *key = work;

@@ -150,6 +150,9 @@ Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
+// A client other than `client` of whose finished jobs it is the result; "" if there is none.
+Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
+                           Problem *problem);
 Status store_result_delete(Store *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
 // Id, engine and scene of the newest ones, newest first, without scenes longer than that.
 typedef struct ResultRows {
