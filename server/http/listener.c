@@ -26,7 +26,7 @@ enum {
     TOGETHER = 12,           // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
-    IN_VAIN = 64,   // runs in a row that called nothing
+    IN_VAIN = 16,   // runs in a row that called nothing, before a pause
 };
 
 struct Listener {
@@ -78,8 +78,10 @@ static void *run_loop(void *context) {
             int wait_ms = -1;
             if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
                 wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
-            // A chunk's head that fills the connection's memory stays ready until its time is up.
-            if (wait_ms == 0 && idle > IN_VAIN && loop->reading > 0)
+            // A chunk's head that fills the connection's memory stays ready until its time is up,
+            // and nothing comes of it. An answer that is being sent calls nothing either: no long
+            // pauses, therefore.
+            if (wait_ms == 0 && loop->reading > 0 && idle % IN_VAIN == 0)
                 wait_ms = 1;
             (void)poll(events, 2, wait_ms);
         }
