@@ -274,9 +274,12 @@ def test_progress_bar_on_a_terminal():
 
 
 def test_version():
-    """`version` and --version print the engine's name and version."""
+    """`version` and --version print the versions that the daemon tells."""
     code, out, errors = program.run("version")
-    assert (code, errors) == (0, "") and out == program.run("--version")[1] and len(out.split()) >= 1, out
+    assert (code, errors) == (0, "") and out == program.run("--version")[1], (code, out, errors)
+    with program.daemon() as daemon:
+        told = daemon.get("/version").json()
+    assert out == f"impactd {told['version']} (engine {told['engine']})\n", (out, told)
 
 
 if __name__ == "__main__":
