@@ -358,10 +358,10 @@ static void value_print(const Field *row, const void *item, FILE *file) {
 }
 
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file) {
-    bool is_for_file = true; // "config" and what stands behind it say how settings are read
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
-        is_for_file = is_for_file && strcmp(row->name, "config") != 0;
+        // "config" and "print_config" are about the file, not of it.
+        const bool is_for_file = strstr(row->name, "config") == NULL;
         fprintf(file, "%s%s = ", is_set && is_for_file ? "" : "# ", row->name);
         if (is_set)
             value_print(row, item, file);
