@@ -109,8 +109,15 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
             return sending_queue(exchange, &refusal, true);
     }
     exchange->body.most = most;
+    exchange->is_reading = has_body;
+    exchange->loop->reading += has_body;
     seat_limit(exchange->seat, has_body ? BODY_MS : 0);
     return MHD_YES;
+}
+
+static void end_reading(Exchange *exchange) {
+    exchange->loop->reading -= exchange->is_reading;
+    exchange->is_reading = false;
 }
 
 static void drop_body(Exchange *exchange) {
@@ -205,6 +212,7 @@ static enum MHD_Result hand_over(Exchange *exchange) {
 }
 
 static enum MHD_Result answer(Exchange *exchange) {
+    end_reading(exchange);
     const ListenerSettings *settings = &exchange->desk->settings;
     Request *request = &exchange->request;
     if (exchange->is_answered) {
@@ -355,6 +363,7 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
         reply_clear(&exchange->reply);
     }
     drop_body(exchange);
+    end_reading(exchange);
     request_close(&exchange->request);
     // One that ended in an error the library closes only when its client is heard of again.
     seat_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);

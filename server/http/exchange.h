@@ -35,8 +35,9 @@ typedef struct Loop {
     Desk *desk;
     struct MHD_Daemon *daemon;
     pthread_t thread;
-    Bell bell;    // there are arrivals, or connections to go on with, or it is to stop
-    size_t turns; // calls of exchange_go_on
+    Bell bell;      // there are arrivals, or connections to go on with, or it is to stop
+    size_t turns;   // calls of exchange_go_on
+    size_t reading; // exchanges whose body is still to come
     pthread_mutex_t lock;
     int *arrivals; // descriptors, locked
     size_t arrival_count, arrival_room;
@@ -60,7 +61,7 @@ typedef struct Exchange {
     char *target;
     Reply reply; // once it is answered in the pool
     void (*forget)(void *kept);
-    bool is_begun, is_counted, is_busy;
+    bool is_begun, is_reading, is_counted, is_busy;
     bool is_asleep;   // the handler asked to wait
     bool is_in_pool;  // it is answered there, its connection suspended
     bool is_answered; // there, with `reply`

@@ -26,6 +26,7 @@ enum {
     TOGETHER = 16,           // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
+    IN_VAIN = 16,   // runs in a row that called nothing, before a pause
 };
 
 struct Listener {
@@ -68,22 +69,27 @@ static void *run_loop(void *context) {
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
                               {.fd = loop->bell.descriptor, .events = POLLIN}};
-    bool is_idle = true;
+    size_t idle = 1; // runs in a row that called nothing
     while (!atomic_load(&loop->is_stopping)) {
         // Where there was something to do there mostly is more: no call to wait for it, then.
-        if (is_idle && !atomic_load(&loop->bell.is_rung)) {
+        if (idle > 0 && !atomic_load(&loop->bell.is_rung)) {
             // What is ready in memory shows in no descriptor.
             MHD_UNSIGNED_LONG_LONG left_ms;
             int wait_ms = -1;
             if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
                 wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
+            // A chunk's head that fills the connection's memory stays ready until its time is up,
+            // and nothing comes of it. An answer that is being sent calls nothing either: no long
+            // pauses, therefore.
+            if (wait_ms == 0 && loop->reading > 0 && idle % IN_VAIN == 0)
+                wait_ms = 1;
             (void)poll(events, 2, wait_ms);
         }
         if (bell_answer(&loop->bell))
             take_arrivals(loop);
         const size_t turns = loop->turns;
         MHD_run(loop->daemon);
-        is_idle = loop->turns == turns;
+        idle = loop->turns == turns ? idle + 1 : 0;
     }
     return NULL;
 }

@@ -2,6 +2,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "server/base/clock.h"
 #include "server/http/exchange.h"
@@ -87,6 +88,8 @@ static const char *vary(const Reply *reply) {
 
 // All headers but those of one request alone.
 static void add_headers(struct MHD_Response *response, const Reply *reply, bool has_tls) {
+    const bool is_events =
+        reply->content_type != NULL && strcmp(reply->content_type, "text/event-stream") == 0;
     char retry_after[16] = "";
     if (reply->retry_after >= 0)
         snprintf(retry_after, sizeof retry_after, "%d", reply->retry_after);
@@ -102,6 +105,8 @@ static void add_headers(struct MHD_Response *response, const Reply *reply, bool 
     add_header(response, MHD_HTTP_HEADER_ALLOW, reply->allow);
     add_header(response, MHD_HTTP_HEADER_CONTENT_RANGE, reply->content_range);
     add_header(response, MHD_HTTP_HEADER_RETRY_AFTER, retry_after);
+    // A proxy that gathers an answer would hold events back.
+    add_header(response, "X-Accel-Buffering", is_events ? "no" : NULL);
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     add_header(response, MHD_HTTP_HEADER_VARY, vary(reply));
     add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);

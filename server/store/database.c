@@ -79,6 +79,13 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     if (is_full(connection))
         return report_full(path, problem);
     const bool has_path = path != NULL && path[0] != '\0';
+    const int code = sqlite3_errcode(connection) & 0xFF;
+    if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT))
+        return problem_set(
+            problem, status,
+            "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
+            "move it away, with the files beside it, to begin anew",
+            path, sqlite3_errmsg(connection));
     return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
                        has_path ? ", in " : "", has_path ? path : "");
 }

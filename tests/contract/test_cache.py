@@ -82,6 +82,21 @@ def test_a_miss_is_explained_by_the_nearest_known_scene():
         assert len(daemon.get("/v1/jobs").json()["jobs"]) == 2, "explaining made a job"
 
 
+def test_each_layer_tells_its_own_bytes():
+    """A result without channels takes documents and next to no series; one with channels its samples beside."""
+    scene = program.scene("paper_free_sponge")
+    with program.daemon() as daemon:
+        program.finished(daemon, {**scene, "output": {"channels": [], "psd": None}})
+        bare = daemon.get("/v1/cache").json()
+        assert 0 < bare["documents"]["bytes"] < 1 << 14 > bare["series"]["bytes"], bare
+        program.finished(daemon, {**scene, "output": {"channels": ["displacement"], "psd": None}})
+        both = daemon.get("/v1/cache").json()
+        grown = {layer: both[layer]["bytes"] - bare[layer]["bytes"] for layer in ("documents", "series")}
+        assert grown["series"] > 8 * 10001 and 0 < grown["documents"] < 1 << 14, (bare, both)
+        ready = daemon.get("/health/ready").json()
+        assert ready["cached_bytes"] == both["documents"]["bytes"] + both["series"]["bytes"], (ready, both)
+
+
 def test_what_another_engine_made_names_the_way_to_have_it_again():
     """Summary, impacts, psd and energy stay in every format, to the byte; the series answers 410 with a link, and POST there makes it by this engine."""
     old = "r-" + 64 * "0"

@@ -179,6 +179,7 @@ def test_events_tell_a_job_to_its_end():
         job = daemon.submit(slow(1, duration), headers=ASYNC).json()["id"]
         connection, reply = stream(daemon, job)
         assert reply.status == 200 and reply.headers["Content-Type"] == "text/event-stream"
+        assert reply.headers["X-Accel-Buffering"] == "no", "a proxy may hold the events back"
         text = reply.read()
         connection.close()
         assert text.startswith(b"retry: "), text[:80]
