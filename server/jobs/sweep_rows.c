@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "server/codec/read.h"
+#include "server/jobs/job.h"
 #include "server/jobs/sweep.h"
 
 static Status no_memory(Problem *problem) {

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "core/math/fourier.h"
+#include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"
 #include "server/jobs/sweep_rows.h"
 #include "tests/support/scratch.h"
