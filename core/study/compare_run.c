@@ -244,14 +244,6 @@ static Status fold_entry(StudyWork *of, size_t index, void *part, Problem *probl
     return STATUS_OK;
 }
 
-// The numbers are all there.
-static Status end_entries(StudyWork *of, const StudyTools *tools, Problem *problem) {
-    (void)of;
-    (void)tools;
-    (void)problem;
-    return STATUS_OK;
-}
-
 static void free_entries(StudyWork *of) {
     CompareWork *work = (CompareWork *)(void *)of;
     outcome_drop(work->reference);
@@ -330,6 +322,5 @@ const StudyMembers compare_members = {
     .make = make_entry,
     .fold = fold_entry,
     .drop = drop_entry,
-    .end = end_entries,
     .free = free_entries,
 };

@@ -22,6 +22,11 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
     return status;
 }
 
+Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem) {
+    const StudyMembers *members = work->kind->members;
+    return members->end != NULL ? members->end(work, tools, problem) : STATUS_OK;
+}
+
 void study_free(StudyWork *work) {
     if (work != NULL)
         work->kind->members->free(work);
@@ -54,7 +59,7 @@ static Status make_all(const Variant *study, const Simulation *simulation, const
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
         status = make_member(work, i, tools, &whole, problem);
     if (status == STATUS_OK)
-        status = work->kind->members->end(work, tools, problem);
+        status = study_end(work, tools, problem);
     study_free(work);
     return status;
 }

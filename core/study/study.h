@@ -46,7 +46,7 @@ typedef struct StudyMembers {
     // Takes what it needs out of a part, member after member. May change what is wanted.
     Status (*fold)(StudyWork *work, size_t member, void *part, Problem *problem);
     void (*drop)(void *part); // NULL is fine, as is one that could not be made
-    // All that were wanted are folded: what remains to be told.
+    // All that were wanted are folded: what remains to be told. NULL: nothing.
     Status (*end)(StudyWork *work, const StudyTools *tools, Problem *problem);
     void (*free)(StudyWork *work);
 } StudyMembers;
@@ -96,6 +96,7 @@ Status study_run(const Variant *study, const Simulation *simulation, const Study
 // work borrows all three, the answer too. NULL both after a failure.
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem);
+Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem);
 void study_free(StudyWork *work); // NULL is fine
 
 #endif

@@ -190,14 +190,6 @@ static Status fold_point(StudyWork *of, size_t point, void *made, Problem *probl
     return added == STATUS_OK ? added : problem_set(problem, added, "no memory for a point");
 }
 
-// The rows are all there.
-static Status end_points(StudyWork *of, const StudyTools *tools, Problem *problem) {
-    (void)of;
-    (void)tools;
-    (void)problem;
-    return STATUS_OK;
-}
-
 static void free_points(StudyWork *of) {
     SweepWork *work = (SweepWork *)(void *)of;
     sweep_plan_free(work->plan);
@@ -239,6 +231,5 @@ const StudyMembers sweep_members = {
     .make = make_point,
     .fold = fold_point,
     .drop = drop_point,
-    .end = end_points,
     .free = free_points,
 };

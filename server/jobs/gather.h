@@ -13,18 +13,18 @@ typedef struct Gather {
     Status (*open)(Worker *worker, StudyRun *run, Problem *problem);
     // Hands chunks to the executor: those that are not there and that nobody is at.
     Status (*submit)(StudyRun *run, Problem *problem);
-    // Before the first member of a chunk.
+    // Takes the part that the shift's next member came to, in any case.
+    Status (*take)(StudyRun *run, Shift *shift, void *part, Problem *problem);
+    void (*free)(StudyRun *run);
+    // What follows is NULL where there is nothing to be done. Before the first member of a chunk:
     Status (*begin)(StudyRun *run, Shift *shift, Problem *problem);
     // Whether the shift's next member is there already.
     bool (*has)(const StudyRun *run, const Shift *shift);
-    // Takes the part that the shift's next member came to, in any case.
-    Status (*take)(StudyRun *run, Shift *shift, void *part, Problem *problem);
     // After the last member of a chunk, again where there was no room.
     Status (*end)(StudyRun *run, Shift *shift, Problem *problem);
     // When all that was wanted is there: what remains to be told.
     Status (*finish)(StudyRun *run, const StudyTools *tools, Problem *problem);
     void (*drop)(Shift *shift); // what it holds of a chunk
-    void (*free)(StudyRun *run);
 } Gather;
 
 extern const Gather gather_rows, gather_fold;

@@ -19,7 +19,8 @@
 void shift_free(StudyRun *run, Shift *shift) {
     if (shift == NULL)
         return;
-    run->gather->drop(shift);
+    if (run->gather->drop != NULL)
+        run->gather->drop(shift);
     free(shift);
 }
 
@@ -151,7 +152,7 @@ void study_launch(Worker *worker, Computation *computation, Findings *findings, 
     const bool is_ended = let_go(run);
     pthread_mutex_unlock(&intake->lock);
     if (is_ended)
-        study_end(worker, run, problem);
+        study_finish(worker, run, problem);
 }
 
 Shift *study_take(StudyRun *run, bool *is_ended) {
@@ -210,7 +211,7 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
     const bool is_parked = status == STATUS_BUSY;
     totals_study_part(&intake->totals, clock_thread_cpu_ns() - began_cpu_ns);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && run->gather->end != NULL)
         status = run->gather->end(run, shift, problem);
     pthread_mutex_lock(&intake->lock);
     worker->study = NULL;
@@ -232,7 +233,7 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
     pthread_mutex_unlock(&intake->lock);
     shift_free(run, shift);
     if (is_ended)
-        study_end(worker, run, problem);
+        study_finish(worker, run, problem);
 }
 
 static bool is_wanted(void *context, double fraction) {
@@ -242,23 +243,24 @@ static bool is_wanted(void *context, double fraction) {
 }
 
 // What remains to be told, and the study's document.
-static Status finish(Worker *worker, StudyRun *run, Problem *problem) {
+static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
     const Watch watch = {run->computation, is_wanted};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .watch = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
-    TRY(run->gather->finish(run, &tools, problem));
+    if (run->gather->finish != NULL)
+        TRY(run->gather->finish(run, &tools, problem));
     return findings_tell_study(&run->findings, problem);
 }
 
-void study_end(Worker *worker, StudyRun *run, Problem *problem) {
+void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
     Intake *intake = worker->intake;
     Computation *computation = run->computation;
     run->executor->cancel(run);
     if (!run->is_failed && !atomic_load(&computation->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
-        const Status status = finish(worker, run, problem);
+        const Status status = tell_end(worker, run, problem);
         totals_study_part(&intake->totals, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
             findings_fail(&run->findings, status, problem);

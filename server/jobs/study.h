@@ -28,7 +28,8 @@ struct StudyRun {
     const Executor *executor;
     const struct Gather *gather;
     StudyWork *work;
-    struct FoldOrder *order;              // of what is folded
+    struct Fold *fold;                    // of what is folded in memory
+    size_t bytes;                         // that it holds, about
     SweepRow row;                         // of a sweep
     atomic_size_t rows_done, rows_failed; // of a sweep; the failed ones are done too
     Findings findings;
@@ -61,7 +62,7 @@ Shift *study_take(StudyRun *run, bool *is_ended);
 // may be no more.
 void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem);
 // Ends it: successful, failed or abandoned. Frees it with its computation.
-void study_end(Worker *worker, StudyRun *run, Problem *problem);
+void study_finish(Worker *worker, StudyRun *run, Problem *problem);
 // With the lock held: nobody wants it any more.
 void study_stop(StudyRun *run);
 // With the lock held: those that wait for room try again.

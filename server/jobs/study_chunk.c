@@ -55,7 +55,7 @@ static Status make_member(Worker *worker, StudyRun *run, Shift *shift, Problem *
                               .watch = &watch,
                               .workspace = &worker->workspace};
     void *part = NULL;
-    if (run->gather->has(run, shift))
+    if (run->gather->has != NULL && run->gather->has(run, shift))
         return STATUS_OK;
     const Status status = members->make(run->work, chunk->first + shift->done * chunk->stride,
                                         &tools, &part, problem);
@@ -79,7 +79,7 @@ Status study_chunk_make(Worker *worker, StudyRun *run, Shift *shift, Problem *pr
     const int64_t turn_ns = (int64_t)STUDY_TURN_MS * 1000000;
     const int64_t began_ns = clock_monotonic_ns();
     int64_t looked_ns = began_ns;
-    if (!shift->is_begun)
+    if (!shift->is_begun && run->gather->begin != NULL)
         TRY(run->gather->begin(run, shift, problem));
     shift->is_begun = true;
     Status status = STATUS_OK;

@@ -182,14 +182,6 @@ static Status rows_end(StudyRun *run, Shift *shift, Problem *problem) {
     return STATUS_OK;
 }
 
-// The store has them all.
-static Status rows_finish(StudyRun *run, const StudyTools *tools, Problem *problem) {
-    (void)run;
-    (void)tools;
-    (void)problem;
-    return STATUS_OK;
-}
-
 static void rows_drop(Shift *shift) {
     sweep_chunk_row_clear(&shift->row);
     bytes_clear(&shift->reasons);
@@ -207,7 +199,6 @@ const Gather gather_rows = {
     .has = rows_has,
     .take = rows_take,
     .end = rows_end,
-    .finish = rows_finish,
     .drop = rows_drop,
     .free = rows_free,
 };

@@ -302,7 +302,7 @@ void *worker_main(void *context) {
         else if (task.shift != NULL)
             study_work(worker, task.study, task.shift, &problem);
         else
-            study_end(worker, task.study, &problem);
+            study_finish(worker, task.study, &problem);
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);
