@@ -55,6 +55,10 @@ void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
              STATUS_OK)
         cost.cpu_seconds = queue_quick; // the run will tell
     computation->queued.seconds = cost.cpu_seconds;
+    // The members of a study have turns of their own.
+    computation->queued.charge = study_is_shared(computation)
+                                     ? simulation_cost(&computation->inquiry.simulation).cpu_seconds
+                                     : 0;
     if (client == NULL)
         queue_urge(intake->queue, &computation->queued);
     else

@@ -101,17 +101,18 @@ struct Intake {
     size_t slow_running;
     double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;                 // not yet finished
-    Index *in_flight;            // computations
-    Queue *queue;                // of computations
-    struct StudyRun *studies;    // under way
-    Computation *stalled;        // sweeps that could not be written down for want of room
-    size_t live;                 // jobs not yet finished
-    size_t scene_bytes;          // of them all
-    size_t posted;               // writes that the store has yet to answer
-    size_t saving, saving_bytes; // computations that have run and are not yet saved
-    struct Saving *delayed;      // of these, what waits for room in the store
-    Job *undismissed;            // held: dismissed, but the store could not be told
+    Index *jobs;                     // not yet finished
+    Index *in_flight;                // computations
+    Queue *queue;                    // of computations
+    struct StudyRun *studies;        // under way
+    size_t study_count, study_bytes; // of them, and that they hold
+    Computation *stalled;            // studies that could not begin for want of room
+    size_t live;                     // jobs not yet finished
+    size_t scene_bytes;              // of them all
+    size_t posted;                   // writes that the store has yet to answer
+    size_t saving, saving_bytes;     // computations that have run and are not yet saved
+    struct Saving *delayed;          // of these, what waits for room in the store
+    Job *undismissed;                // held: dismissed, but the store could not be told
     Cache *cache;
     Known *known;
     LayerTally rows, stored;            // results and series found in the database

@@ -16,6 +16,14 @@
 #include "server/base/clock.h"
 #include "server/jobs/gather.h"
 
+// Each that is under way holds its scene's outcome and what it folds.
+enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };
+
+bool study_is_shared(const Computation *computation) {
+    const Variant *study = computation->inquiry.study;
+    return study != NULL && !computation->is_again && study_kind(study)->members != NULL;
+}
+
 void shift_free(StudyRun *run, Shift *shift) {
     if (shift == NULL)
         return;
@@ -47,6 +55,7 @@ static void enqueue(StudyRun *run) {
         return;
     entry->is_turn = true;
     entry->seconds = fmax(run->turn, 1e-3 * STUDY_TURN_MS);
+    entry->charge = 0;
     Client *client = computation->jobs != NULL ? computation->jobs->client : entry->client;
     queue_put(intake->queue, entry, client, 1e-9 * (double)clock_monotonic_ns());
     intake_call_worker(intake);
@@ -114,6 +123,22 @@ static void fail(StudyRun *run, Status status, const Problem *problem) {
     findings_fail(&run->findings, status, problem);
 }
 
+bool study_must_wait(const Intake *intake, const Computation *computation) {
+    return study_is_shared(computation) &&
+           intake->study_count >= STUDIES_PER_WORKER * intake->settings.workers &&
+           intake->study_bytes >= STUDIES_BYTES;
+}
+
+// With the lock held.
+static void resume_stalled(Intake *intake) {
+    while (intake->stalled != NULL) {
+        Computation *computation = intake->stalled;
+        intake->stalled = computation->next_stalled;
+        queue_urge(intake->queue, &computation->queued);
+        intake_call_worker(intake);
+    }
+}
+
 static bool is_over(StudyRun *run) {
     return !study_goes_on(run, 0);
 }
@@ -127,6 +152,9 @@ static bool let_go(StudyRun *run) {
     }
     Intake *intake = run->intake;
     queue_remove(intake->queue, &run->computation->queued);
+    intake->study_count--;
+    intake->study_bytes -= run->bytes;
+    resume_stalled(intake);
     for (StudyRun **at = &intake->studies; *at != NULL; at = &(*at)->next)
         if (*at == run) {
             *at = run->next;
@@ -143,6 +171,9 @@ void study_launch(Worker *worker, Computation *computation, Findings *findings, 
     pthread_mutex_lock(&intake->lock);
     run->next = intake->studies;
     intake->studies = run;
+    run->bytes += outcome_bytes(run->findings.outcome);
+    intake->study_count++;
+    intake->study_bytes += run->bytes;
     pthread_mutex_unlock(&intake->lock);
     problem_clear(problem);
     const Status status = run->gather->submit(run, problem);
@@ -180,12 +211,7 @@ void study_stop(StudyRun *run) {
 }
 
 void studies_resume(Intake *intake) {
-    while (intake->stalled != NULL) {
-        Computation *computation = intake->stalled;
-        intake->stalled = computation->next_stalled;
-        queue_urge(intake->queue, &computation->queued);
-        intake_call_worker(intake);
-    }
+    resume_stalled(intake);
     for (StudyRun *run = intake->studies; run != NULL; run = run->next)
         if (run->is_paused) {
             run->is_paused = false;

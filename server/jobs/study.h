@@ -46,6 +46,9 @@ struct StudyRun {
     bool is_failed;      // findings say how
 };
 
+// Whether its study has members, which are shared out.
+bool study_is_shared(const Computation *computation);
+
 // Makes ready: a worker's part of the way, until there are members to be shared out. Fills
 // findings->answer and computation->study. Stops when `watch` says so.
 Status study_open(Worker *worker, Computation *computation, Findings *findings, const Watch *watch,
@@ -65,6 +68,8 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem);
 void study_finish(Worker *worker, StudyRun *run, Problem *problem);
 // With the lock held: nobody wants it any more.
 void study_stop(StudyRun *run);
+// With the lock held: whether those that are under way hold so much that this one is to wait.
+bool study_must_wait(const Intake *intake, const Computation *computation);
 // With the lock held: those that wait for room try again.
 void studies_resume(Intake *intake);
 

@@ -110,7 +110,7 @@ static Status run_study(Worker *worker, Computation *computation, Findings *find
                               .cpu = thread_cpu};
     // What has members goes on chunk by chunk, on all threads. What measures CPU times has none: it
     // is made here, by itself.
-    if (study_kind(computation->inquiry.study)->members != NULL)
+    if (study_is_shared(computation))
         return study_open(worker, computation, findings, &watch, problem);
     return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
                      &findings->answer.study, problem);
@@ -221,6 +221,17 @@ static void begin_computation(Worker *worker, Computation *computation) {
     }
 }
 
+static void leave(Worker *worker, const Computation *computation) {
+    worker->running = NULL;
+    worker->intake->slow_running -= is_slow(computation);
+}
+
+// It waits for room, of whatever kind, and then begins anew.
+static void stall(Intake *intake, Computation *computation) {
+    computation->next_stalled = intake->stalled;
+    intake->stalled = computation;
+}
+
 static QueueEntry *wait_for_entry(Worker *worker) {
     Intake *intake = worker->intake;
     QueueEntry *entry = NULL;
@@ -240,8 +251,13 @@ static bool next_task(Worker *worker, Task *task) {
             return false;
         Computation *computation = computation_of(entry);
         if (computation->study == NULL) {
-            task->computation = computation;
             begin_computation(worker, computation);
+            if (study_must_wait(worker->intake, computation)) {
+                leave(worker, computation);
+                stall(worker->intake, computation);
+                continue;
+            }
+            task->computation = computation;
             return true;
         }
         task->study = computation->study;
@@ -271,14 +287,11 @@ static void compute(Worker *worker, Computation *computation, Problem *problem) 
     const bool is_launched = findings.status == STATUS_OK && computation->study != NULL;
     const bool is_stalled = findings.status == STATUS_FULL;
     pthread_mutex_lock(&intake->lock);
-    worker->running = NULL;
-    intake->slow_running -= is_slow(computation);
+    leave(worker, computation);
     if (findings.status == STATUS_OK && !is_launched)
         keep_pace(intake, computation, &findings);
-    if (is_stalled) {
-        computation->next_stalled = intake->stalled;
-        intake->stalled = computation;
-    }
+    if (is_stalled)
+        stall(intake, computation);
     pthread_mutex_unlock(&intake->lock);
     if (findings.status == STATUS_CANCELLED)
         computation_abandon(intake, computation);
