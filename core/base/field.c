@@ -336,6 +336,12 @@ bool field_is_absent(const Field *field, const void *item) {
     }
 }
 
+bool reals_make(Reals *reals, size_t count) {
+    reals->at = calloc(count + 1, sizeof *reals->at);
+    reals->count = reals->at != NULL ? count : 0;
+    return reals->at != NULL;
+}
+
 Variant *variant_new(const Kind *kind) {
     Variant *variant = calloc(1, kind->size);
     if (variant == NULL)

@@ -233,6 +233,9 @@ Status fields_copy(const Field *fields, const void *source, void *target);
 // whatever their presence (its flags do not count).
 bool field_is_absent(const Field *field, const void *item);
 
+// So many zeros, of its own; false without memory, and then it has none.
+bool reals_make(Reals *reals, size_t count);
+
 // Makes a new default value of `kind`; NULL without memory. Freed by variant_free.
 Variant *variant_new(const Kind *kind);
 void variant_free(Variant *variant);

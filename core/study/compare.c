@@ -207,12 +207,6 @@ static Status study_cost(const Study *asked, const Simulation *simulation,
     return status;
 }
 
-static Status study_make(const Study *asked, const Simulation *simulation, const StudyTools *tools,
-                         Variant *answer, Problem *problem) {
-    return compare_make((const CompareStudy *)(const void *)asked, simulation, tools,
-                        (Comparison *)(void *)answer, problem);
-}
-
 static const Kind compare_answer = {"compare", "what contact models and rules came to",
                                     answer_fields, sizeof(Comparison)};
 
@@ -223,5 +217,5 @@ const StudyKind study_compare = {
     .lessen = "ask for fewer models",
     .complete = study_complete,
     .cost = study_cost,
-    .run = study_make,
+    .members = &compare_members,
 };

@@ -12,28 +12,23 @@
 
 enum { BUCKETS = 400 }; // of a trace
 
-// What a study has at hand while it runs.
-typedef struct Session {
+// What the study has at hand. Its members are the entries after the first.
+typedef struct CompareWork {
+    StudyWork work;
     const CompareStudy *study;
     const Simulation *simulation;
-    const StudyTools *tools;
     Comparison *answer;
     Outcome *reference;
-    double *steps;    // foretold, of each entry
-    double done, all; // of those
-    Problem *fault;   // of an entry
-} Session;
+} CompareWork;
 
 static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
 }
 
 static bool copy_reals(Reals *target, const double *values, size_t count) {
-    target->at = calloc(count + 1, sizeof *target->at);
-    if (target->at == NULL)
+    if (!reals_make(target, count))
         return false;
     memcpy(target->at, values, count * sizeof *values);
-    target->count = count;
     return true;
 }
 
@@ -101,13 +96,13 @@ static Signal displacement_of(const Outcome *outcome) {
     return (Signal){response->series.at[0].values, response->count, response->sample_rate, 0};
 }
 
-static Status tell_divergence(const Session *session, const Outcome *outcome, CompareEntry *entry,
+static Status tell_divergence(const CompareWork *work, const Outcome *outcome, CompareEntry *entry,
                               Problem *problem) {
     CompareDivergence *told = &entry->divergence;
-    const double percent = 100 * session->study->part;
+    const double percent = 100 * work->study->part;
     char text[240];
     told->time = entry->displacement.parting;
-    told->horizon = fmin(session->reference->summary.trust_horizon, outcome->summary.trust_horizon);
+    told->horizon = fmin(work->reference->summary.trust_horizon, outcome->summary.trust_horizon);
     told->is_trusted = !isnan(told->time) && !(told->time > told->horizon);
     if (isnan(told->time))
         snprintf(text, sizeof text,
@@ -133,9 +128,7 @@ static Status tell_trace(const Outcome *outcome, uint64_t bucket, CompareEntry *
     const Signal signal = displacement_of(outcome);
     const size_t count = (signal.count + (size_t)bucket - 1) / (size_t)bucket;
     CompareTrace *trace = &entry->trace;
-    trace->minimum.at = calloc(count + 1, sizeof(double));
-    trace->maximum.at = calloc(count + 1, sizeof(double));
-    if (trace->minimum.at == NULL || trace->maximum.at == NULL)
+    if (!reals_make(&trace->minimum, count) || !reals_make(&trace->maximum, count))
         return no_memory(problem);
     for (size_t i = 0; i < count; i++) {
         double least = INFINITY, most = -INFINITY;
@@ -146,14 +139,13 @@ static Status tell_trace(const Outcome *outcome, uint64_t bucket, CompareEntry *
         trace->minimum.at[i] = least;
         trace->maximum.at[i] = most;
     }
-    trace->minimum.count = trace->maximum.count = count;
     return STATUS_OK;
 }
 
 // What all entries have in common is the reference's.
-static Status tell_reference(Session *session, Problem *problem) {
-    Comparison *answer = session->answer;
-    const Outcome *reference = session->reference;
+static Status tell_reference(CompareWork *work, Problem *problem) {
+    Comparison *answer = work->answer;
+    const Outcome *reference = work->reference;
     const Spectrum *spectrum = &reference->spectrum;
     const size_t count = reference->response.count;
     answer->trace_samples = (count + BUCKETS - 1) / BUCKETS;
@@ -168,10 +160,10 @@ static Status tell_reference(Session *session, Problem *problem) {
                : no_memory(problem);
 }
 
-static Status tell(const Session *session, const Outcome *outcome, CompareEntry *entry,
+static Status tell(const CompareWork *work, const Outcome *outcome, CompareEntry *entry,
                    Problem *problem) {
-    const Outcome *reference = session->reference;
-    const Reals *band = &session->study->band;
+    const Outcome *reference = work->reference;
+    const Reals *band = &work->study->band;
     const Signal from = displacement_of(reference), to = displacement_of(outcome);
     const Spectrum *spectrum = &outcome->spectrum;
     entry->status = COMPARE_RUN;
@@ -183,53 +175,99 @@ static Status tell(const Session *session, const Outcome *outcome, CompareEntry 
                                   spectrum, spectrum->densities.at[0].values,
                                   band->count == 2 ? band->at[0] : (double)NAN,
                                   band->count == 2 ? band->at[1] : (double)NAN);
-    entry->displacement = likeness_measure(&from, &to, session->study->part);
-    TRY(tell_divergence(session, outcome, entry, problem));
+    entry->displacement = likeness_measure(&from, &to, work->study->part);
+    TRY(tell_divergence(work, outcome, entry, problem));
     if (!copy_derived(&outcome->plan.derived, &entry->derived) ||
         !copy_reals(&entry->density, spectrum->densities.at[0].values, spectrum->densities.rows))
         return no_memory(problem);
-    return tell_trace(outcome, session->answer->trace_samples, entry, problem);
+    return tell_trace(outcome, work->answer->trace_samples, entry, problem);
 }
 
-static Status set_aside(CompareEntry *entry, int as, const Problem *fault, Problem *problem) {
-    if (member_ends_all(fault->status))
-        return problem_set(problem, fault->status, "%s", fault->detail);
-    entry->status = as;
-    entry->why = member_why(fault);
-    return entry->why != NULL ? STATUS_OK : no_memory(problem);
-}
-
-static Status make_entry(Session *session, size_t index, Problem *problem) {
-    CompareEntry *entry = &session->answer->entries.at[index];
-    const StudyTools *tools = session->tools;
-    Stage stage =
-        stage_of(tools->watch, session->done / session->all, session->steps[index] / session->all);
-    const Watch watch = stage_watch(&stage);
+// Runs an entry, whose name is the answer's and whose numbers are `told`.
+static Status run_entry(const CompareWork *work, size_t index, const StudyTools *tools,
+                        Outcome **outcome, CompareEntry *told, Problem *problem) {
     Simulation member = {0};
-    Outcome *outcome = NULL;
-    problem_clear(session->fault);
-    int as = COMPARE_REFUSED;
-    Status status = variant_apply(session->study, session->simulation, entry, tools->limits,
-                                  &member, session->fault);
+    *outcome = NULL;
+    told->status = COMPARE_REFUSED;
+    Status status = variant_apply(work->study, work->simulation, &work->answer->entries.at[index],
+                                  tools->limits, &member, problem);
     if (status == STATUS_OK) {
-        as = COMPARE_FAILED;
-        status = simulation_run(&member, tools->limits, &watch, tools->workspace, &outcome,
-                                session->fault);
+        told->status = COMPARE_FAILED;
+        status = simulation_run(&member, tools->limits, tools->watch, tools->workspace, outcome,
+                                problem);
     }
     simulation_clear(&member);
-    session->done += session->steps[index];
-    // A failure to come to a reference is the study's own.
-    if (status != STATUS_OK && index == 0)
-        return problem_set(problem, status, "the scene itself: %s", session->fault->detail);
-    if (status != STATUS_OK)
-        return set_aside(entry, as, session->fault, problem);
-    if (index == 0) {
-        session->reference = outcome_hold(outcome);
-        status = tell_reference(session, problem);
+    return status;
+}
+
+static void drop_entry(void *part) {
+    if (part == NULL)
+        return;
+    fields_clear(compare_entry_fields, part);
+    free(part);
+}
+
+static Status make_entry(const StudyWork *of, size_t index, const StudyTools *tools, void **made,
+                         Problem *problem) {
+    const CompareWork *work = (const CompareWork *)(const void *)of;
+    CompareEntry *part = calloc(1, sizeof *part);
+    Outcome *outcome;
+    *made = part;
+    if (part == NULL)
+        return no_memory(problem);
+    (void)fields_default(compare_entry_fields, part); // absent and 0: nothing to allocate
+    Status status = run_entry(work, index + 1, tools, &outcome, part, problem);
+    if (status == STATUS_OK) {
+        status = tell(work, outcome, part, problem);
+    } else if (!member_ends_all(status)) {
+        part->why = member_why(problem);
+        problem_clear(problem);
+        status = part->why != NULL ? STATUS_OK : no_memory(problem);
     }
-    if (status == STATUS_OK)
-        status = tell(session, outcome, entry, problem);
     outcome_drop(outcome);
+    return status;
+}
+
+// Numbers of a part; its name and contact stay the entry's own.
+static void take_entry(CompareEntry *entry, CompareEntry *part) {
+    const CompareEntry named = *entry;
+    *entry = *part;
+    entry->name = named.name;
+    entry->contact_model = named.contact_model;
+    entry->separation = named.separation;
+    (void)fields_default(compare_entry_fields, part);
+}
+
+static Status fold_entry(StudyWork *of, size_t index, void *part, Problem *problem) {
+    (void)problem;
+    take_entry(&((CompareWork *)(void *)of)->answer->entries.at[index + 1], part);
+    return STATUS_OK;
+}
+
+static void free_entries(StudyWork *of) {
+    CompareWork *work = (CompareWork *)(void *)of;
+    outcome_drop(work->reference);
+    free(work);
+}
+
+// A failure to come to a reference is the study's own.
+static Status make_reference(CompareWork *work, const StudyTools *tools, Problem *problem) {
+    CompareEntry told;
+    Problem *fault = calloc(1, sizeof *fault);
+    if (fault == NULL)
+        return no_memory(problem);
+    (void)fields_default(compare_entry_fields, &told);
+    Status status = run_entry(work, 0, tools, &work->reference, &told, fault);
+    if (status != STATUS_OK)
+        (void)problem_set(problem, status, "the scene itself: %s", fault->detail);
+    else
+        status = tell_reference(work, problem);
+    if (status == STATUS_OK)
+        status = tell(work, work->reference, &told, problem);
+    if (status == STATUS_OK)
+        take_entry(&work->answer->entries.at[0], &told);
+    fields_clear(compare_entry_fields, &told);
+    free(fault);
     return status;
 }
 
@@ -249,33 +287,40 @@ Status compare_foretell(const CompareStudy *study, const Simulation *simulation,
     return status == STATUS_NO_MEMORY ? no_memory(problem) : STATUS_OK;
 }
 
-Status compare_make(const CompareStudy *study, const Simulation *simulation,
-                    const StudyTools *tools, Comparison *answer, Problem *problem) {
-    Session session = {.study = study,
-                       .simulation = simulation,
-                       .tools = tools,
-                       .answer = answer,
-                       .steps = calloc(COMPARE_VARIANTS, sizeof(double)),
-                       .fault = calloc(1, sizeof(Problem))};
+static Status begin_entries(const Study *asked, const Simulation *simulation,
+                            const StudyTools *tools, Variant *told, StudyWork **made,
+                            Problem *problem) {
+    const CompareStudy *study = (const CompareStudy *)(const void *)asked;
+    Comparison *answer = (Comparison *)(void *)told;
+    CompareWork *work = calloc(1, sizeof *work);
+    if (work == NULL)
+        return no_memory(problem);
+    *work = (CompareWork){.study = study, .simulation = simulation, .answer = answer};
     answer->storey = study->storey;
     answer->part = study->part;
-    Status status = session.steps == NULL || session.fault == NULL
-                        ? no_memory(problem)
-                        : variants_make(study, simulation, &answer->entries, problem);
-    for (size_t i = 0; i < answer->entries.count && status == STATUS_OK; i++) {
-        status = compare_foretell(study, simulation, &answer->entries.at[i], tools->limits,
-                                  &session.steps[i], problem);
-        session.all += session.steps[i];
+    Status status = variants_make(study, simulation, &answer->entries, problem);
+    if (status == STATUS_OK)
+        status = make_reference(work, tools, problem);
+    if (status != STATUS_OK) {
+        free_entries(&work->work);
+        return status;
     }
-    session.all = fmax(session.all, 1);
-    for (size_t i = 0; i < answer->entries.count && status == STATUS_OK; i++) {
-        if (!watch_advance(tools->watch, session.done / session.all))
-            status = problem_set(problem, STATUS_CANCELLED, "the study was stopped");
-        else
-            status = make_entry(&session, i, problem);
-    }
-    outcome_drop(session.reference);
-    free(session.steps);
-    free(session.fault);
-    return status;
+    const size_t members = answer->entries.count - 1, rows = answer->frequency.count;
+    work->work =
+        (StudyWork){.kind = &study_compare,
+                    .members = members,
+                    .wanted = members,
+                    .expected = members,
+                    .bytes = outcome_bytes(work->reference),
+                    .part_bytes = sizeof(CompareEntry) + sizeof(double) * (rows + 2 * BUCKETS)};
+    *made = &work->work;
+    return STATUS_OK;
 }
+
+const StudyMembers compare_members = {
+    .begin = begin_entries,
+    .make = make_entry,
+    .fold = fold_entry,
+    .drop = drop_entry,
+    .free = free_entries,
+};

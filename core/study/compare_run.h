@@ -4,8 +4,7 @@
 
 #include "core/study/compare.h"
 
-Status compare_make(const CompareStudy *study, const Simulation *simulation,
-                    const StudyTools *tools, Comparison *answer, Problem *problem);
+extern const StudyMembers compare_members;
 
 // What a variant is foretold to take in solver steps; 0 for one that is refused.
 Status compare_foretell(const CompareStudy *study, const Simulation *simulation,

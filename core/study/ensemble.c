@@ -201,12 +201,6 @@ static Status study_cost(const Study *asked, const Simulation *simulation,
     return STATUS_OK;
 }
 
-static Status study_make(const Study *asked, const Simulation *simulation, const StudyTools *tools,
-                         Variant *answer, Problem *problem) {
-    return ensemble_make((const EnsembleStudy *)(const void *)asked, simulation, tools,
-                         (Ensemble *)(void *)answer, problem);
-}
-
 static const Kind ensemble_answer = {"ensemble", "what many seeds came to", answer_fields,
                                      sizeof(Ensemble)};
 
@@ -217,5 +211,5 @@ const StudyKind study_ensemble = {
     .lessen = "ask for fewer runs",
     .complete = study_complete,
     .cost = study_cost,
-    .run = study_make,
+    .members = &ensemble_members,
 };

@@ -13,20 +13,18 @@
 #include "core/study/member.h"
 #include "core/study/tradeoff_ladder.h"
 
-// What a study has at hand while it runs.
-typedef struct Session {
+// What the study has at hand.
+typedef struct EnsembleWork {
+    StudyWork work;
     const EnsembleStudy *study;
-    const StudyTools *tools;
     Simulation member; // the scene; its seed is each run's
-    Ensemble *answer;  // whose table has room for all runs
-    Status *statuses;  // of the table's rows
+    bool has_force;
+    Ensemble *answer; // whose table has room for all runs
+    Status *statuses; // of the table's rows
     SpectraFold fold;
-    Outcome *like;   // any that ended: the shape of its spectra
-    size_t look;     // ended runs at which the target is looked at next
-    double expected; // runs, for the progress
-    double told;     // progress
-    Problem *fault;  // of a run
-} Session;
+    Spectrum like; // of any run that ended: the shape
+    size_t look;   // ended runs at which the target is looked at next
+} EnsembleWork;
 
 Status ensemble_member(const Simulation *simulation, uint64_t seed, Simulation *target,
                        Problem *problem) {
@@ -35,87 +33,75 @@ Status ensemble_member(const Simulation *simulation, uint64_t seed, Simulation *
     return STATUS_OK;
 }
 
-static bool has_target(const Session *session) {
-    return !isnan(session->study->target);
+static bool has_target(const EnsembleWork *work) {
+    return !isnan(work->study->target);
 }
 
-static size_t ended(const Session *session) {
-    return (size_t)(session->answer->made - session->answer->failed);
+static size_t ended(const EnsembleWork *work) {
+    return (size_t)(work->answer->made - work->answer->failed);
 }
 
 // Runs that could end: those that failed are of no population.
-static size_t population(const Session *session) {
-    return (size_t)(session->study->runs - session->answer->failed);
+static size_t population(const EnsembleWork *work) {
+    return (size_t)(work->study->runs - work->answer->failed);
 }
 
-static Status note_failure(Session *session, EnsembleRun *run, Status status, Problem *problem) {
-    const Problem *fault = session->fault;
-    if (status == STATUS_CANCELLED || status == STATUS_NO_MEMORY)
-        return problem_set(problem, status, "%s", fault->detail);
-    session->answer->failed++;
-    run->steps = (double)NAN;
-    run->why = strdup(fault->detail);
-    return run->why != NULL ? STATUS_OK
-                            : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+static Status no_memory(Problem *problem) {
+    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
-static Status note_outcome(Session *session, EnsembleRun *run, const Outcome *outcome,
-                           Problem *problem) {
-    run->summary = outcome->summary;
-    run->steps = outcome->steps;
-    session->answer->steps += outcome->steps;
-    if (!ladder_has_force(&session->member))
-        run->summary.peak_contact_force = (double)NAN;
-    return spectra_add(&session->fold, &outcome->spectrum,
-                       has_target(session) && session->study->metric == ENSEMBLE_PSD, problem);
+static uint64_t seed_of(const EnsembleWork *work, size_t index) {
+    return work->study->first_seed + index;
 }
 
-static Status make_run(Session *session, Problem *problem) {
-    Ensemble *answer = session->answer;
-    const StudyTools *tools = session->tools;
-    const size_t index = (size_t)answer->made;
-    EnsembleRun *run = &answer->table.at[index];
-    // What was foretold may change; what was told may not fall.
-    const double share = (1 - session->told) / fmax(session->expected - (double)index, 1);
-    Stage stage = stage_of(tools->watch, session->told, share);
-    const Watch watch = stage_watch(&stage);
-    Outcome *outcome = NULL;
-    problem_clear(session->fault);
-    run->seed = session->study->first_seed + index;
-    ((ExcitationRandom *)(void *)session->member.scene.excitation)->seed = run->seed;
-    Status status = simulation_run(&session->member, tools->limits, &watch, tools->workspace,
-                                   &outcome, session->fault);
-    session->told += share;
-    session->statuses[index] = status;
-    answer->made++;
-    answer->table.count++;
-    status = status == STATUS_OK ? note_outcome(session, run, outcome, problem)
-                                 : note_failure(session, run, status, problem);
-    if (session->like == NULL && session->fold.count > 0)
-        session->like = outcome;
-    else
-        outcome_drop(outcome);
-    return status;
+static Status make_run(const StudyWork *of, size_t index, const StudyTools *tools, void **made,
+                       Problem *problem) {
+    const EnsembleWork *work = (const EnsembleWork *)(const void *)of;
+    // A view of the scene that all share, with an excitation of its own.
+    Simulation member = work->member;
+    ExcitationRandom random =
+        *(const ExcitationRandom *)(const void *)scene_excitation(&member.scene);
+    random.seed = seed_of(work, index);
+    member.scene.excitation = (Variant *)(void *)&random;
+    MemberPart *part = calloc(1, sizeof *part);
+    *made = part;
+    return part != NULL ? member_run(&member, tools, part, problem) : no_memory(problem);
 }
 
-static Status measure_spread(Session *session, Spread *spread, Problem *problem) {
-    if (session->study->metric != ENSEMBLE_PSD)
-        return statistics_spread(&session->answer->table, session->study->metric, spread, problem);
-    *spread = spectra_spread(&session->fold, population(session));
+static void drop_run(void *part) {
+    if (part == NULL)
+        return;
+    member_clear(part);
+    free(part);
+}
+
+static Status take_spectrum(EnsembleWork *work, MemberPart *part, Problem *problem) {
+    TRY(spectra_add(&work->fold, &part->spectrum,
+                    has_target(work) && work->study->metric == ENSEMBLE_PSD, problem));
+    if (work->like.densities.count == 0) {
+        work->like = part->spectrum;
+        part->spectrum = (Spectrum){0};
+    }
     return STATUS_OK;
 }
 
-// Looks at the error, and foretells how many runs it will take.
-static Status look(Session *session, bool *is_enough, Problem *problem) {
-    EnsembleTarget *target = &session->answer->target;
-    const size_t count = ended(session), all = population(session);
+static Status measure_spread(EnsembleWork *work, Spread *spread, Problem *problem) {
+    if (work->study->metric != ENSEMBLE_PSD)
+        return statistics_spread(&work->answer->table, work->study->metric, spread, problem);
+    *spread = spectra_spread(&work->fold, population(work));
+    return STATUS_OK;
+}
+
+// Looks at the error, and foretells how many runs it will take. Those are then made ahead.
+static Status look(EnsembleWork *work, Problem *problem) {
+    EnsembleTarget *target = &work->answer->target;
+    const size_t count = ended(work), all = population(work);
     Spread spread;
-    TRY(measure_spread(session, &spread, problem));
+    TRY(measure_spread(work, &spread, problem));
     // A statistic that no run knows has no mean.
     target->estimated_error = spread.count > 0 ? rule_error(&spread, count, all) : (double)NAN;
-    *is_enough = target->estimated_error <= session->study->target;
     // It ends where it is looked at.
-    const size_t fewest = rule_predict(&spread, all, session->study->target);
+    const size_t fewest = rule_predict(&spread, all, work->study->target);
     size_t foretold = count;
     while (foretold < fewest)
         foretold = rule_next_look(foretold);
@@ -124,35 +110,60 @@ static Status look(Session *session, bool *is_enough, Problem *problem) {
         target->pilot = count;
         target->predicted_runs = foretold;
     }
-    session->expected = (double)(foretold + session->answer->failed);
-    session->look = rule_next_look(count);
+    work->look = rule_next_look(count);
+    const bool is_enough = target->estimated_error <= work->study->target;
+    work->work.wanted = (is_enough ? count : foretold) + (size_t)work->answer->failed;
+    work->work.expected = work->work.wanted;
     return STATUS_OK;
 }
 
-static Status make_runs(Session *session, Problem *problem) {
-    const uint64_t runs = session->study->runs;
-    bool is_enough = false;
-    while (session->answer->made < runs && !is_enough) {
-        if (!watch_advance(session->tools->watch, session->told))
-            return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
-        TRY(make_run(session, problem));
-        const bool is_last = session->answer->made == runs;
-        if (has_target(session) && (is_last || ended(session) >= session->look))
-            TRY(look(session, &is_enough, problem));
+// Runs that failed put off the next look: more are wanted until then.
+static void want_look(EnsembleWork *of) {
+    StudyWork *work = &of->work;
+    const size_t made = (size_t)of->answer->made, until = made + of->look - ended(of);
+    if (work->wanted > made)
+        return;
+    work->wanted = until < work->members ? until : work->members;
+    if (work->expected < work->wanted)
+        work->expected = work->wanted;
+}
+
+static Status fold_run(StudyWork *of, size_t index, void *made, Problem *problem) {
+    EnsembleWork *work = (EnsembleWork *)(void *)of;
+    Ensemble *answer = work->answer;
+    MemberPart *part = made;
+    EnsembleRun *run = &answer->table.at[index];
+    *run = (EnsembleRun){seed_of(work, index), part->why, part->steps, part->summary};
+    part->why = NULL;
+    work->statuses[index] = part->status;
+    answer->table.count = index + 1;
+    answer->made++;
+    if (run->why != NULL) {
+        answer->failed++;
+    } else {
+        answer->steps += run->steps;
+        if (!work->has_force)
+            run->summary.peak_contact_force = (double)NAN;
+        TRY(take_spectrum(work, part, problem));
     }
+    if (!has_target(work))
+        return STATUS_OK;
+    if (answer->made == answer->runs || ended(work) >= work->look)
+        return look(work, problem);
+    want_look(work);
     return STATUS_OK;
 }
 
-static Status tell_target(const Session *session, Problem *problem) {
-    EnsembleTarget *target = &session->answer->target;
-    if (!has_target(session))
+static Status tell_target(const EnsembleWork *work, Problem *problem) {
+    EnsembleTarget *target = &work->answer->target;
+    if (!has_target(work))
         return STATUS_OK;
-    const char *name = ensemble_metric_names[session->study->metric];
-    const unsigned long long made = (unsigned long long)session->answer->made,
-                             all = (unsigned long long)session->study->runs;
+    const char *name = ensemble_metric_names[work->study->metric];
+    const unsigned long long made = (unsigned long long)work->answer->made,
+                             all = (unsigned long long)work->study->runs;
     char text[320];
-    target->error = session->study->target;
-    target->metric = session->study->metric;
+    target->error = work->study->target;
+    target->metric = work->study->metric;
     target->confidence = ENSEMBLE_CONFIDENCE;
     target->is_kept = target->estimated_error <= target->error;
     if (isnan(target->estimated_error))
@@ -167,52 +178,81 @@ static Status tell_target(const Session *session, Problem *problem) {
                  "%g %% confidence",
                  made, all, name, target->error, target->estimated_error, 100 * target->confidence);
     target->why = strdup(text);
-    return target->why != NULL ? STATUS_OK
-                               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+    return target->why != NULL ? STATUS_OK : no_memory(problem);
 }
 
-static Status tell(const Session *session, Problem *problem) {
-    Ensemble *answer = session->answer;
-    TRY(tell_target(session, problem));
+static Status end_runs(StudyWork *of, const StudyTools *tools, Problem *problem) {
+    const EnsembleWork *work = (const EnsembleWork *)(const void *)of;
+    Ensemble *answer = work->answer;
+    (void)tools;
+    TRY(tell_target(work, problem));
     for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
         TRY(statistics_fold(&answer->table, metric, ensemble_statistic(&answer->statistics, metric),
                             problem));
     statistics_trust(&answer->table, &answer->trust);
-    TRY(statistics_failures(&answer->table, session->statuses, &answer->failures, problem));
-    return session->like == NULL
-               ? STATUS_OK
-               : spectra_tell(&session->fold, &session->like->spectrum, answer, problem);
+    TRY(statistics_failures(&answer->table, work->statuses, &answer->failures, problem));
+    return spectra_tell(&work->fold, &work->like, answer, problem);
 }
 
-Status ensemble_make(const EnsembleStudy *study, const Simulation *simulation,
-                     const StudyTools *tools, Ensemble *answer, Problem *problem) {
+static void free_runs(StudyWork *of) {
+    EnsembleWork *work = (EnsembleWork *)(void *)of;
+    spectrum_clear(&work->like);
+    spectra_clear(&work->fold);
+    simulation_clear(&work->member);
+    free(work->statuses);
+    free(work);
+}
+
+// Bytes of the densities of one run, nearly.
+static size_t density_bytes(const Simulation *simulation) {
+    const SpectrumRequest *psd = &simulation->output.psd;
+    return psd->channels.count == 0
+               ? 0
+               : sizeof(double) * (psd->channels.count + 1) * ((size_t)psd->segment / 2 + 1);
+}
+
+static Status begin_runs(const Study *asked, const Simulation *simulation, const StudyTools *tools,
+                         Variant *told, StudyWork **made, Problem *problem) {
+    const EnsembleStudy *study = (const EnsembleStudy *)(const void *)asked;
+    Ensemble *answer = (Ensemble *)(void *)told;
     const size_t runs = (size_t)study->runs;
-    Session session = {.study = study,
-                       .tools = tools,
-                       .answer = answer,
-                       .statuses = calloc(runs, sizeof(Status)),
-                       .look = ENSEMBLE_PILOT,
-                       .expected = (double)runs,
-                       .fault = calloc(1, sizeof(Problem))};
+    EnsembleWork *work = calloc(1, sizeof *work);
+    (void)tools;
+    if (work == NULL)
+        return no_memory(problem);
+    *work = (EnsembleWork){.work = {.kind = &study_ensemble,
+                                    .members = runs,
+                                    .wanted = runs,
+                                    .expected = runs,
+                                    .part_bytes = sizeof(MemberPart) + density_bytes(simulation)},
+                           .study = study,
+                           .has_force = ladder_has_force(simulation),
+                           .answer = answer,
+                           .statuses = calloc(runs, sizeof(Status)),
+                           .look = ENSEMBLE_PILOT};
+    if (has_target(work) && runs > ENSEMBLE_PILOT)
+        work->work.wanted = ENSEMBLE_PILOT;
     answer->runs = study->runs;
     answer->first_seed = study->first_seed;
     answer->confidence = ENSEMBLE_INTERVAL;
     answer->table.at = calloc(runs, sizeof *answer->table.at);
-    for (size_t i = 0; i < runs && answer->table.at != NULL; i++)
-        (void)fields_default(summary_fields, &answer->table.at[i].summary);
     Status status = STATUS_OK;
-    if (session.statuses == NULL || session.fault == NULL || answer->table.at == NULL)
+    if (work->statuses == NULL || answer->table.at == NULL)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu runs", runs);
     if (status == STATUS_OK)
-        status = ensemble_member(simulation, study->first_seed, &session.member, problem);
+        status = ensemble_member(simulation, study->first_seed, &work->member, problem);
     if (status == STATUS_OK)
-        status = make_runs(&session, problem);
-    if (status == STATUS_OK)
-        status = tell(&session, problem);
-    outcome_drop(session.like);
-    spectra_clear(&session.fold);
-    simulation_clear(&session.member);
-    free(session.statuses);
-    free(session.fault);
+        *made = &work->work;
+    else
+        free_runs(&work->work);
     return status;
 }
+
+const StudyMembers ensemble_members = {
+    .begin = begin_runs,
+    .make = make_run,
+    .fold = fold_run,
+    .drop = drop_run,
+    .end = end_runs,
+    .free = free_runs,
+};

@@ -107,12 +107,6 @@ Spread spectra_spread(const SpectraFold *fold, size_t all) {
     return worst;
 }
 
-static bool reals_make(Reals *reals, size_t count) {
-    reals->at = calloc(count + 1, sizeof *reals->at);
-    reals->count = reals->at != NULL ? count : 0;
-    return reals->at != NULL;
-}
-
 static Status tell_channel(const SpectraFold *fold, size_t channel, const Column *like,
                            EnsembleSpectrum *told, Problem *problem) {
     const double *mean = fold->mean + channel * fold->rows;

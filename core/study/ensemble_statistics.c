@@ -88,6 +88,10 @@ static int by_size(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+void statistics_sort(double *values, size_t count) {
+    qsort(values, count, sizeof *values, by_size);
+}
+
 double statistics_quantile(const double *sorted, size_t count, double share) {
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
@@ -118,7 +122,7 @@ static void statistic_fill(const EnsembleRuns *table, int metric, Values *values
         statistic->low = values->mean - half;
         statistic->high = values->mean + half;
     }
-    qsort(values->at, values->count, sizeof *values->at, by_size);
+    statistics_sort(values->at, values->count);
     statistic->minimum = values->at[0];
     statistic->q05 = statistics_quantile(values->at, values->count, 0.05);
     statistic->q25 = statistics_quantile(values->at, values->count, 0.25);

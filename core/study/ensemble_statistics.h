@@ -11,6 +11,8 @@
 // The number that a statistic is of; NAN: not known.
 double statistics_value(const Summary *summary, int metric);
 
+void statistics_sort(double *values, size_t count); // the smallest first
+
 // Below it lies that share of so many sorted numbers, at least one, as NumPy's.
 double statistics_quantile(const double *sorted, size_t count, double share);
 

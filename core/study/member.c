@@ -38,3 +38,38 @@ char *member_why(const Problem *fault) {
         snprintf(text, sizeof text, "%s", fault->detail);
     return strdup(text);
 }
+
+// What the fold needs; the ledger and all else goes at once.
+static void keep(Outcome *outcome, MemberPart *part) {
+    part->steps = outcome->steps;
+    part->summary = outcome->summary;
+    part->spectrum = outcome->spectrum;
+    outcome->spectrum = (Spectrum){0};
+    outcome_drop(outcome);
+}
+
+Status member_run(const Simulation *member, const StudyTools *tools, MemberPart *part,
+                  Problem *problem) {
+    Outcome *outcome = NULL;
+    *part = (MemberPart){.steps = (double)NAN};
+    (void)fields_default(summary_fields, &part->summary); // absent: nothing to allocate
+    part->status =
+        simulation_run(member, tools->limits, tools->watch, tools->workspace, &outcome, problem);
+    if (part->status == STATUS_OK) {
+        keep(outcome, part);
+        return STATUS_OK;
+    }
+    if (member_ends_all(part->status))
+        return part->status;
+    part->why = member_why(problem);
+    problem_clear(problem);
+    return part->why != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
+}
+
+void member_clear(MemberPart *part) {
+    free(part->why);
+    spectrum_clear(&part->spectrum);
+    *part = (MemberPart){.why = NULL};
+}

@@ -3,7 +3,7 @@
 #ifndef CORE_STUDY_MEMBER_H
 #define CORE_STUDY_MEMBER_H
 
-#include "core/simulation/simulation.h"
+#include "core/study/study.h"
 
 // The scene without sampled channels; spectra and ledger as there. `target` is cleared by
 // simulation_clear in any case.
@@ -20,5 +20,20 @@ static inline bool member_ends_all(Status status) {
 
 // What a fault says, with its place, as a text of the caller's. NULL without memory.
 char *member_why(const Problem *fault);
+
+// All of a run that is folded. All zero is empty.
+typedef struct MemberPart {
+    Status status;
+    char *why;    // it failed; NULL: it did not
+    double steps; // solver steps; NAN where it failed, as all of the summary is absent
+    Summary summary;
+    Spectrum spectrum;
+} MemberPart;
+
+// Runs a member. One that fails is a part too, unless that ends all. `part` is cleared by
+// member_clear in any case; `problem` is not NULL.
+Status member_run(const Simulation *member, const StudyTools *tools, MemberPart *part,
+                  Problem *problem);
+void member_clear(MemberPart *part);
 
 #endif

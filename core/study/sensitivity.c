@@ -214,12 +214,6 @@ static Status study_cost(const Study *asked, const Simulation *simulation,
     return status;
 }
 
-static Status study_make(const Study *asked, const Simulation *simulation, const StudyTools *tools,
-                         Variant *answer, Problem *problem) {
-    return sensitivity_make((const SensitivityStudy *)(const void *)asked, simulation, tools,
-                            (Sensitivity *)(void *)answer, problem);
-}
-
 static const Kind sensitivity_answer = {"sensitivity", "what errors of a buffer's numbers do",
                                         answer_fields, sizeof(Sensitivity)};
 
@@ -231,5 +225,5 @@ const StudyKind study_sensitivity = {
     .lessen = "ask for fewer runs or parameters",
     .complete = study_complete,
     .cost = study_cost,
-    .run = study_make,
+    .members = &sensitivity_members,
 };

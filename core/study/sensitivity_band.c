@@ -7,6 +7,8 @@
 
 #include "core/study/ensemble_statistics.h"
 
+enum { LOOK = 64 }; // frequencies between looks at the watch
+
 static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
 }
@@ -30,11 +32,6 @@ Status band_keep(BandDensities *kept, const Spectrum *spectrum, size_t most, Pro
 void band_clear(BandDensities *kept) {
     free(kept->at);
     *kept = (BandDensities){0};
-}
-
-static int by_size(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 static Status tell_statistics(const EnsembleRuns *table, const Summary *own, bool has_force,
@@ -64,29 +61,27 @@ static Status tell_statistics(const EnsembleRuns *table, const Summary *own, boo
     return STATUS_OK;
 }
 
-static bool make(Reals *reals, size_t count) {
-    reals->at = calloc(count + 1, sizeof *reals->at);
-    reals->count = reals->at != NULL ? count : 0;
-    return reals->at != NULL;
-}
-
+// `values` has room for all runs.
 static Status tell_spectrum(const BandDensities *kept, size_t channel, const Column *own,
-                            double *values, SensitivitySpectrum *told, Problem *problem) {
+                            const Watch *watch, double *values, SensitivitySpectrum *told,
+                            Problem *problem) {
     const size_t rows = kept->rows, runs = kept->runs;
     told->channel = strdup(own->name);
     told->unit = strdup(own->unit);
-    if (told->channel == NULL || told->unit == NULL || !make(&told->value, rows) ||
-        !make(&told->mean, rows) || !make(&told->q05, rows) || !make(&told->median, rows) ||
-        !make(&told->q95, rows))
+    if (told->channel == NULL || told->unit == NULL || !reals_make(&told->value, rows) ||
+        !reals_make(&told->mean, rows) || !reals_make(&told->q05, rows) ||
+        !reals_make(&told->median, rows) || !reals_make(&told->q95, rows))
         return no_memory(problem);
     memcpy(told->value.at, own->values, rows * sizeof *values);
     for (size_t k = 0; k < rows; k++) {
         double sum = 0;
+        if (k % LOOK == 0 && !watch_advance(watch, 1))
+            return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
         for (size_t i = 0; i < runs; i++) {
             values[i] = kept->at[(i * kept->channels + channel) * rows + k];
             sum += values[i] / (double)runs;
         }
-        qsort(values, runs, sizeof *values, by_size);
+        statistics_sort(values, runs);
         told->mean.at[k] = sum;
         told->q05.at[k] = statistics_quantile(values, runs, 0.05);
         told->median.at[k] = statistics_quantile(values, runs, 0.5);
@@ -95,28 +90,29 @@ static Status tell_spectrum(const BandDensities *kept, size_t channel, const Col
     return STATUS_OK;
 }
 
-static Status tell_spectra(const BandDensities *kept, const Spectrum *own, Sensitivity *answer,
-                           Problem *problem) {
+static Status tell_spectra(const BandDensities *kept, const Spectrum *own, const Watch *watch,
+                           Sensitivity *answer, Problem *problem) {
     if (kept->runs == 0)
         return STATUS_OK;
     double *values = calloc(kept->runs, sizeof *values);
     answer->spectra.at = calloc(kept->channels, sizeof *answer->spectra.at);
     Status status =
-        values == NULL || answer->spectra.at == NULL || !make(&answer->frequency, kept->rows)
+        values == NULL || answer->spectra.at == NULL || !reals_make(&answer->frequency, kept->rows)
             ? no_memory(problem)
             : STATUS_OK;
     if (status == STATUS_OK)
         memcpy(answer->frequency.at, own->frequency, kept->rows * sizeof *own->frequency);
     for (size_t c = 0; c < kept->channels && status == STATUS_OK; c++)
-        status = tell_spectrum(kept, c, &own->densities.at[c], values,
+        status = tell_spectrum(kept, c, &own->densities.at[c], watch, values,
                                &answer->spectra.at[answer->spectra.count++], problem);
     free(values);
     return status;
 }
 
 Status band_tell(const EnsembleRuns *table, const Status *statuses, const BandDensities *kept,
-                 const Outcome *own, bool has_force, Sensitivity *answer, Problem *problem) {
+                 const Outcome *own, bool has_force, const Watch *watch, Sensitivity *answer,
+                 Problem *problem) {
     TRY(tell_statistics(table, &own->summary, has_force, answer, problem));
     TRY(statistics_failures(table, statuses, &answer->failures, problem));
-    return tell_spectra(kept, &own->spectrum, answer, problem);
+    return tell_spectra(kept, &own->spectrum, watch, answer, problem);
 }

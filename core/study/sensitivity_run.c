@@ -20,20 +20,31 @@
 // nothing depends on the parameter.
 static const double settled_part = 0.1, settled_least = 1e-3;
 
-// What a study has at hand while it runs.
-typedef struct Session {
+// What the study has at hand. Its members are the steps, parameter by parameter, down and up by
+// each of them, and then the drawn runs.
+typedef struct SensitivityWork {
+    StudyWork work;
     const SensitivityStudy *study;
     const Simulation *simulation;
-    const StudyTools *tools;
-    Simulation member;
+    Simulation member; // what each run changes a copy of
+    bool has_force;
     Sensitivity *answer;
-    Outcome *own;      // the scene itself
-    double done, all;  // runs
-    EnsembleRuns runs; // drawn ones; "seed" is the run's number
-    Status *statuses;  // of those
+    Outcome *own;                          // the scene itself
+    size_t *rows;                          // of the answer, those that are stepped by
+    size_t steps;                          // members
+    double (*values)[ENSEMBLE_STATISTICS]; // of each step
+    EnsembleRuns runs;                     // drawn ones; "seed" is the run's number
+    Status *statuses;                      // of those
     BandDensities densities;
-    Problem *fault; // of a run
-} Session;
+} SensitivityWork;
+
+// A member's run, and what was drawn for it.
+typedef struct SensitivityPart {
+    MemberPart run;
+    Reals restitution, contact_time;
+} SensitivityPart;
+
+enum { SIDES = 2, ROW_STEPS = SIDES * SENSITIVITY_STEPS };
 
 static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
@@ -50,47 +61,60 @@ uint64_t sensitivity_runs(const SensitivityStudy *study, const Simulation *simul
     uint64_t count = 1 + study->runs;
     for (size_t i = 0; i < study->parameters.count; i++)
         if (change_refuse(simulation, parameter_of(study->parameters.at[i])) == NULL)
-            count += 2 * SENSITIVITY_STEPS;
+            count += ROW_STEPS;
     return count;
 }
 
-// Runs the member as it stands.
-static Status run(Session *session, Outcome **outcome) {
-    const StudyTools *tools = session->tools;
-    Stage stage = stage_of(tools->watch, session->done / session->all, 1 / session->all);
-    const Watch watch = stage_watch(&stage);
-    problem_clear(session->fault);
-    *outcome = NULL;
-    if (!watch_advance(tools->watch, session->done / session->all))
-        return problem_set(session->fault, STATUS_CANCELLED, "the study was stopped");
-    const Status status = simulation_run(&session->member, tools->limits, &watch, tools->workspace,
-                                         outcome, session->fault);
-    session->done++;
+// How far a step goes: the study's own, and each half of the one before. Up it may be less.
+static double step_of(const SensitivityWork *work, size_t step) {
+    return ldexp(work->study->step, -(int)step);
+}
+
+static double step_up(const SensitivityWork *work, int parameter, size_t step) {
+    return change_most(work->simulation, parameter, step_of(work, step));
+}
+
+// Sets the scene of one step.
+static void take_step(const SensitivityWork *work, size_t index, Simulation *member) {
+    const int parameter = work->answer->response.at[work->rows[index / ROW_STEPS]].parameter;
+    const size_t step = index % ROW_STEPS / SIDES;
+    const double factor =
+        index % SIDES == 0 ? 1 - step_of(work, step) : 1 + step_up(work, parameter, step);
+    change_apply(work->simulation, parameter, factor, member);
+}
+
+static void drop_run(void *made) {
+    SensitivityPart *part = made;
+    if (part == NULL)
+        return;
+    member_clear(&part->run);
+    free(part->restitution.at);
+    free(part->contact_time.at);
+    free(part);
+}
+
+static Status make_run(const StudyWork *of, size_t index, const StudyTools *tools, void **made,
+                       Problem *problem) {
+    const SensitivityWork *work = (const SensitivityWork *)(const void *)of;
+    const size_t buffers = change_buffers(work->simulation);
+    SensitivityPart *part = calloc(1, sizeof *part);
+    Simulation member;
+    *made = part;
+    if (part == NULL || !reals_make(&part->restitution, buffers) ||
+        !reals_make(&part->contact_time, buffers))
+        return no_memory(problem);
+    Status status = fields_copy(simulation_fields, &work->member, &member);
+    if (status != STATUS_OK)
+        (void)no_memory(problem);
+    else if (index < work->steps)
+        take_step(work, index, &member);
+    else
+        change_draw(work->study, work->simulation, index - work->steps + 1, &member,
+                    part->restitution.at, part->contact_time.at);
     if (status == STATUS_OK)
-        session->answer->steps += (*outcome)->steps;
+        status = member_run(&member, tools, &part->run, problem);
+    simulation_clear(&member);
     return status;
-}
-
-// STATUS_OK where the study goes on without this run, whose reason *why is then.
-static Status forgive(const Session *session, Status status, char **why, Problem *problem) {
-    if (member_ends_all(status))
-        return problem_set(problem, status, "%s", session->fault->detail);
-    free(*why);
-    *why = member_why(session->fault);
-    return *why != NULL ? STATUS_OK : no_memory(problem);
-}
-
-// The statistics with `factor` times a parameter; all NAN, and *why, where the run failed.
-static Status measure(Session *session, int parameter, double factor,
-                      double values[ENSEMBLE_STATISTICS], char **why, Problem *problem) {
-    Outcome *outcome;
-    change_apply(session->simulation, parameter, factor, &session->member);
-    const Status status = run(session, &outcome);
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
-        values[metric] =
-            status == STATUS_OK ? statistics_value(&outcome->summary, metric) : (double)NAN;
-    outcome_drop(outcome);
-    return status == STATUS_OK ? STATUS_OK : forgive(session, status, why, problem);
 }
 
 // Relative change over relative change.
@@ -114,106 +138,99 @@ static void settle(const double quotients[SENSITIVITY_STEPS], SensitivitySlope *
         slope->spread <= fmax(settled_part * fmax(fabs(least), fabs(most)), settled_least);
 }
 
-static Status make_row(Session *session, int parameter, SensitivityRow *row, Problem *problem) {
-    const char *refused = change_refuse(session->simulation, parameter);
-    row->parameter = parameter;
-    if (refused != NULL)
-        return (row->why = strdup(refused)) != NULL ? STATUS_OK : no_memory(problem);
+static void fold_step(SensitivityWork *work, size_t index, MemberPart *run) {
+    char **why = &work->answer->response.at[work->rows[index / ROW_STEPS]].why;
+    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+        work->values[index][metric] =
+            run->why == NULL ? statistics_value(&run->summary, metric) : (double)NAN;
+    if (run->why == NULL)
+        return;
+    free(*why);
+    *why = run->why;
+    run->why = NULL;
+}
+
+static Status fold_draw(SensitivityWork *work, size_t index, SensitivityPart *part,
+                        Problem *problem) {
+    Sensitivity *answer = work->answer;
+    SensitivityDraw *told = &answer->table.at[index];
+    EnsembleRun *kept = &work->runs.at[index];
+    *told = (SensitivityDraw){.run = index + 1,
+                              .why = part->run.why,
+                              .restitution = part->restitution,
+                              .contact_time = part->contact_time,
+                              .summary = part->run.summary};
+    part->run.why = NULL;
+    part->restitution = part->contact_time = (Reals){NULL, 0};
+    answer->table.count++;
+    *kept = (EnsembleRun){.seed = index + 1, .why = told->why, .summary = told->summary};
+    work->runs.count++;
+    work->statuses[index] = part->run.status;
+    answer->made++;
+    if (told->why != NULL) {
+        answer->failed++;
+        return STATUS_OK;
+    }
+    if (!work->has_force)
+        kept->summary.peak_contact_force = (double)NAN; // of no statistic
+    return band_keep(&work->densities, &part->run.spectrum, (size_t)work->study->runs, problem);
+}
+
+static Status fold_run(StudyWork *of, size_t index, void *made, Problem *problem) {
+    SensitivityWork *work = (SensitivityWork *)(void *)of;
+    SensitivityPart *part = made;
+    if (part->run.why == NULL)
+        work->answer->steps += part->run.steps;
+    if (index >= work->steps)
+        return fold_draw(work, index - work->steps, part, problem);
+    fold_step(work, index, &part->run);
+    return STATUS_OK;
+}
+
+static Status tell_row(const SensitivityWork *work, size_t index, Problem *problem) {
+    SensitivityRow *row = &work->answer->response.at[work->rows[index]];
+    const Summary *own = &work->own->summary;
     row->steps.at = calloc(SENSITIVITY_STEPS, sizeof(double));
     row->slopes.at = calloc(ENSEMBLE_STATISTICS, sizeof *row->slopes.at);
     if (row->steps.at == NULL || row->slopes.at == NULL)
         return no_memory(problem);
-    double quotients[ENSEMBLE_STATISTICS][SENSITIVITY_STEPS];
-    double step = session->study->step;
-    for (int i = 0; i < SENSITIVITY_STEPS; i++, step /= 2) {
-        double low[ENSEMBLE_STATISTICS], high[ENSEMBLE_STATISTICS];
-        const double up = change_most(session->simulation, parameter, step);
-        row->steps.at[row->steps.count++] = step;
-        TRY(measure(session, parameter, 1 - step, low, &row->why, problem));
-        TRY(measure(session, parameter, 1 + up, high, &row->why, problem));
-        for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
-            quotients[metric][i] =
-                quotient(low[metric], high[metric],
-                         statistics_value(&session->own->summary, metric), step + up);
-    }
-    change_apply(session->simulation, parameter, 1, &session->member);
+    for (size_t step = 0; step < SENSITIVITY_STEPS; step++)
+        row->steps.at[row->steps.count++] = step_of(work, step);
     for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++) {
-        if (metric == ENSEMBLE_PEAK_CONTACT_FORCE && !ladder_has_force(session->simulation))
+        double quotients[SENSITIVITY_STEPS];
+        if (metric == ENSEMBLE_PEAK_CONTACT_FORCE && !work->has_force)
             continue;
+        for (size_t step = 0; step < SENSITIVITY_STEPS; step++) {
+            const size_t low = index * ROW_STEPS + step * SIDES;
+            const double width = step_of(work, step) + step_up(work, row->parameter, step);
+            quotients[step] = quotient(work->values[low][metric], work->values[low + 1][metric],
+                                       statistics_value(own, metric), width);
+        }
         SensitivitySlope *slope = &row->slopes.at[row->slopes.count++];
-        *slope = (SensitivitySlope){metric, statistics_value(&session->own->summary, metric),
-                                    (double)NAN, (double)NAN, false};
-        settle(quotients[metric], slope);
+        *slope = (SensitivitySlope){metric, statistics_value(own, metric), (double)NAN, (double)NAN,
+                                    false};
+        settle(quotients, slope);
     }
     return STATUS_OK;
 }
 
-static Status make_rows(Session *session, Problem *problem) {
-    const Texts *parameters = &session->study->parameters;
-    SensitivityRows *rows = &session->answer->response;
-    rows->at = calloc(parameters->count + 1, sizeof *rows->at);
-    if (rows->at == NULL)
-        return no_memory(problem);
-    for (size_t i = 0; i < parameters->count; i++)
-        TRY(make_row(session, parameter_of(parameters->at[i]), &rows->at[rows->count++], problem));
-    return STATUS_OK;
+static Status end_runs(StudyWork *of, const StudyTools *tools, Problem *problem) {
+    const SensitivityWork *work = (const SensitivityWork *)(const void *)of;
+    for (size_t i = 0; i < work->steps / ROW_STEPS; i++)
+        TRY(tell_row(work, i, problem));
+    return work->study->runs == 0
+               ? STATUS_OK
+               : band_tell(&work->runs, work->statuses, &work->densities, work->own,
+                           work->has_force, tools->watch, work->answer, problem);
 }
 
-static Status make_draw(Session *session, size_t index, Problem *problem) {
-    const size_t buffers = change_buffers(session->simulation);
-    SensitivityDraw *told = &session->answer->table.at[index];
-    EnsembleRun *kept = &session->runs.at[index];
-    Outcome *outcome;
-    told->run = kept->seed = index + 1;
-    told->restitution = (Reals){calloc(buffers + 1, sizeof(double)), buffers};
-    told->contact_time = (Reals){calloc(buffers + 1, sizeof(double)), buffers};
-    session->answer->table.count++;
-    session->runs.count++;
-    if (told->restitution.at == NULL || told->contact_time.at == NULL)
-        return no_memory(problem);
-    change_draw(session->study, session->simulation, index + 1, &session->member,
-                told->restitution.at, told->contact_time.at);
-    const Status status = run(session, &outcome);
-    session->statuses[index] = status;
-    session->answer->made++;
-    if (status != STATUS_OK) {
-        TRY(forgive(session, status, &told->why, problem));
-        session->answer->failed++;
-        return (kept->why = strdup(told->why)) != NULL ? STATUS_OK : no_memory(problem);
-    }
-    kept->summary = told->summary = outcome->summary;
-    if (!ladder_has_force(session->simulation))
-        kept->summary.peak_contact_force = (double)NAN; // of no statistic
-    const Status done =
-        band_keep(&session->densities, &outcome->spectrum, (size_t)session->study->runs, problem);
-    outcome_drop(outcome);
-    return done;
-}
-
-static Status make_draws(Session *session, Problem *problem) {
-    const size_t runs = (size_t)session->study->runs;
-    Sensitivity *answer = session->answer;
-    if (runs == 0)
-        return STATUS_OK;
-    answer->table.at = calloc(runs, sizeof *answer->table.at);
-    session->runs.at = calloc(runs, sizeof *session->runs.at);
-    session->statuses = calloc(runs, sizeof *session->statuses);
-    if (answer->table.at == NULL || session->runs.at == NULL || session->statuses == NULL)
-        return no_memory(problem);
-    for (size_t i = 0; i < runs; i++) {
-        (void)fields_default(summary_fields, &answer->table.at[i].summary);
-        TRY(make_draw(session, i, problem));
-    }
-    return band_tell(&session->runs, session->statuses, &session->densities, session->own,
-                     ladder_has_force(session->simulation), answer, problem);
-}
-
-static Status tell_own(Session *session, Problem *problem) {
-    Sensitivity *answer = session->answer;
-    const Outcome *own = session->own;
+static Status tell_own(const SensitivityWork *work, Problem *problem) {
+    Sensitivity *answer = work->answer;
+    const Outcome *own = work->own;
     const double horizon = own->summary.trust_horizon;
     char text[280];
     answer->summary = own->summary;
+    answer->steps = own->steps;
     answer->is_chaotic = !isnan(horizon);
     if (answer->is_chaotic)
         snprintf(text, sizeof text,
@@ -228,29 +245,74 @@ static Status tell_own(Session *session, Problem *problem) {
     answer->why = strdup(text);
     if (answer->why == NULL)
         return no_memory(problem);
-    return sensitivity_contact(session->study, session->simulation, &own->plan.derived,
-                               &answer->contact, problem);
+    return sensitivity_contact(work->study, work->simulation, &own->plan.derived, &answer->contact,
+                               problem);
 }
 
-static Status make_all(Session *session, Problem *problem) {
-    TRY(member_copy(session->simulation, &session->member, problem));
-    TRY(member_settle(&session->member, problem));
-    const Status status = run(session, &session->own);
-    if (status != STATUS_OK)
-        return problem_set(problem, status, "%s", session->fault->detail);
-    TRY(tell_own(session, problem));
-    TRY(make_rows(session, problem));
-    return make_draws(session, problem);
+// The answer's rows, and which of them there are steps for.
+static Status lay_rows(SensitivityWork *work, Problem *problem) {
+    const Texts *parameters = &work->study->parameters;
+    SensitivityRows *rows = &work->answer->response;
+    size_t stepped = 0;
+    rows->at = calloc(parameters->count + 1, sizeof *rows->at);
+    work->rows = calloc(parameters->count + 1, sizeof *work->rows);
+    if (rows->at == NULL || work->rows == NULL)
+        return no_memory(problem);
+    for (size_t i = 0; i < parameters->count; i++) {
+        SensitivityRow *row = &rows->at[rows->count++];
+        row->parameter = parameter_of(parameters->at[i]);
+        const char *refused = change_refuse(work->simulation, row->parameter);
+        if (refused == NULL)
+            work->rows[stepped++] = i;
+        else if ((row->why = strdup(refused)) == NULL)
+            return no_memory(problem);
+    }
+    work->steps = stepped * ROW_STEPS;
+    work->values = calloc(work->steps + 1, sizeof *work->values);
+    return work->values != NULL ? STATUS_OK : no_memory(problem);
 }
 
-Status sensitivity_make(const SensitivityStudy *study, const Simulation *simulation,
-                        const StudyTools *tools, Sensitivity *answer, Problem *problem) {
-    Session session = {.study = study,
-                       .simulation = simulation,
-                       .tools = tools,
-                       .answer = answer,
-                       .all = (double)sensitivity_runs(study, simulation),
-                       .fault = calloc(1, sizeof(Problem))};
+static Status lay_table(SensitivityWork *work, Problem *problem) {
+    const size_t runs = (size_t)work->study->runs;
+    if (runs == 0)
+        return STATUS_OK;
+    work->answer->table.at = calloc(runs, sizeof *work->answer->table.at);
+    work->runs.at = calloc(runs, sizeof *work->runs.at);
+    work->statuses = calloc(runs, sizeof *work->statuses);
+    return work->answer->table.at != NULL && work->runs.at != NULL && work->statuses != NULL
+               ? STATUS_OK
+               : no_memory(problem);
+}
+
+static Status begin_all(SensitivityWork *work, const StudyTools *tools, Problem *problem) {
+    TRY(member_copy(work->simulation, &work->member, problem));
+    TRY(member_settle(&work->member, problem));
+    TRY(simulation_run(&work->member, tools->limits, tools->watch, tools->workspace, &work->own,
+                       problem));
+    TRY(tell_own(work, problem));
+    TRY(lay_rows(work, problem));
+    return lay_table(work, problem);
+}
+
+static void free_runs(StudyWork *of) {
+    SensitivityWork *work = (SensitivityWork *)(void *)of;
+    if (work == NULL)
+        return;
+    free(work->rows);
+    free(work->values);
+    free(work->runs.at); // their texts are the table's
+    free(work->statuses);
+    band_clear(&work->densities);
+    outcome_drop(work->own);
+    simulation_clear(&work->member);
+    free(work);
+}
+
+static Status begin_runs(const Study *asked, const Simulation *simulation, const StudyTools *tools,
+                         Variant *told, StudyWork **made, Problem *problem) {
+    const SensitivityStudy *study = (const SensitivityStudy *)(const void *)asked;
+    Sensitivity *answer = (Sensitivity *)(void *)told;
+    SensitivityWork *work = calloc(1, sizeof *work);
     answer->runs = study->runs;
     answer->seed = study->seed;
     answer->restitution_deviation = study->restitution_deviation;
@@ -259,16 +321,38 @@ Status sensitivity_make(const SensitivityStudy *study, const Simulation *simulat
     answer->distribution = strdup(
         "log-normal factors of mean 1 and the stated relative deviation, each buffer's "
         "restitution and contact time for themselves; a restitution beyond 1 is drawn again");
-    const Status status = session.fault == NULL || answer->distribution == NULL
-                              ? no_memory(problem)
-                              : make_all(&session, problem);
-    for (size_t i = 0; i < session.runs.count; i++)
-        free(session.runs.at[i].why);
-    free(session.runs.at);
-    free(session.statuses);
-    band_clear(&session.densities);
-    outcome_drop(session.own);
-    simulation_clear(&session.member);
-    free(session.fault);
-    return status;
+    if (work == NULL || answer->distribution == NULL) {
+        free(work);
+        return no_memory(problem);
+    }
+    *work = (SensitivityWork){.study = study,
+                              .simulation = simulation,
+                              .has_force = ladder_has_force(simulation),
+                              .answer = answer};
+    const Status status = begin_all(work, tools, problem);
+    if (status != STATUS_OK) {
+        free_runs(&work->work);
+        return status;
+    }
+    const size_t members = work->steps + (size_t)study->runs;
+    const size_t densities =
+        work->own->spectrum.densities.count * work->own->spectrum.densities.rows;
+    work->work = (StudyWork){.kind = &study_sensitivity,
+                             .members = members,
+                             .wanted = members,
+                             .expected = members,
+                             .bytes = outcome_bytes(work->own) +
+                                      sizeof(double) * densities * (size_t)study->runs,
+                             .part_bytes = sizeof(SensitivityPart) + sizeof(double) * densities};
+    *made = &work->work;
+    return STATUS_OK;
 }
+
+const StudyMembers sensitivity_members = {
+    .begin = begin_runs,
+    .make = make_run,
+    .fold = fold_run,
+    .drop = drop_run,
+    .end = end_runs,
+    .free = free_runs,
+};

@@ -8,7 +8,6 @@
 // How many runs a completed study takes.
 uint64_t sensitivity_runs(const SensitivityStudy *study, const Simulation *simulation);
 
-Status sensitivity_make(const SensitivityStudy *study, const Simulation *simulation,
-                        const StudyTools *tools, Sensitivity *answer, Problem *problem);
+extern const StudyMembers sensitivity_members;
 
 #endif

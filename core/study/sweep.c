@@ -137,12 +137,6 @@ static Status study_cost(const Study *asked, const Simulation *simulation,
     return STATUS_OK;
 }
 
-static Status study_make(const Study *asked, const Simulation *simulation, const StudyTools *tools,
-                         Variant *answer, Problem *problem) {
-    return sweep_run_all((const SweepStudy *)(const void *)asked, simulation, tools,
-                         (Sweep *)(void *)answer, problem);
-}
-
 static const Kind sweep_answer = {"sweep", "what each point came to", answer_fields, sizeof(Sweep)};
 
 const StudyKind study_sweep = {
@@ -153,5 +147,5 @@ const StudyKind study_sweep = {
     .most_runs = most_runs,
     .complete = study_complete,
     .cost = study_cost,
-    .run = study_make,
+    .members = &sweep_members,
 };

@@ -7,7 +7,12 @@
 
 #include "core/study/sweep_judge.h"
 
-static const double check_share = 0.02; // of the way, to judge all points
+// What the study has at hand.
+typedef struct SweepWork {
+    StudyWork work;
+    SweepPlan *plan;
+    Sweep *answer;
+} SweepWork;
 
 size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {
     size_t stride = 1;
@@ -133,61 +138,98 @@ Status sweep_add_failure(SweepFailures *failures, SweepStatus status, uint64_t p
     return STATUS_OK;
 }
 
-static Status make_rows(const SweepPlan *plan, const StudyTools *tools, SweepTable *table,
-                        Problem *fault, Problem *problem) {
-    const size_t metrics = plan->study->metrics.count;
-    Stage stage = stage_of(tools->watch, check_share, 1 - check_share);
-    for (size_t i = 0; i < plan->points; i++) {
-        SweepStatus status;
-        if (!stage_advance(&stage, (double)i / (double)plan->points))
-            return problem_set(problem, STATUS_CANCELLED, "the sweep was stopped");
-        // What a long point tells of itself is little of the whole.
-        Stage part = stage_of(tools->watch,
-                              check_share + (1 - check_share) * (double)i / (double)plan->points,
-                              (1 - check_share) / (double)plan->points);
-        const Watch watch = stage_watch(&part);
-        Status made = sweep_run_point(plan, i, tools->limits, &watch, tools->workspace,
-                                      &table->values.at[i * metrics], &status, fault);
-        if (made == STATUS_OK && status != SWEEP_MADE) {
-            table->failed++;
-            made = sweep_add_failure(&table->failures, status, i, fault->detail);
-        }
-        if (made != STATUS_OK)
-            return problem_set(problem, made, "point %zu: %s", i,
-                               made == STATUS_NO_MEMORY ? "no memory" : fault->detail);
-        table->points.at[i] = (double)i;
-        table->statuses.at[i] = status;
+static Status make_point(const StudyWork *of, size_t point, const StudyTools *tools, void **made,
+                         Problem *problem) {
+    const SweepPlan *plan = ((const SweepWork *)(const void *)of)->plan;
+    SweepPart *part = calloc(1, sizeof *part + plan->study->metrics.count * sizeof(double));
+    *made = part;
+    if (part == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a point");
+    TRY(sweep_run_point(plan, point, tools->limits, tools->watch, tools->workspace, part->values,
+                        &part->status, problem));
+    if (part->status == SWEEP_MADE)
+        return STATUS_OK;
+    part->why = strdup(problem->detail);
+    problem_clear(problem);
+    return part->why != NULL ? STATUS_OK
+                             : problem_set(problem, STATUS_NO_MEMORY, "no memory for a point");
+}
+
+static void drop_point(void *made) {
+    SweepPart *part = made;
+    if (part != NULL)
+        free(part->why);
+    free(part);
+}
+
+// Only where rows are kept here and nowhere else is there room for them.
+static Status lay_table(SweepTable *table, size_t points, size_t metrics, Problem *problem) {
+    table->points.at = calloc(points, sizeof(double));
+    table->statuses.at = calloc(points, sizeof(double));
+    table->values.at = calloc(points * metrics, sizeof(double));
+    table->failed = 0;
+    return table->points.at != NULL && table->statuses.at != NULL && table->values.at != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu points", points);
+}
+
+static Status fold_point(StudyWork *of, size_t point, void *made, Problem *problem) {
+    SweepTable *table = &((SweepWork *)(void *)of)->answer->table;
+    const size_t metrics = ((const SweepWork *)(const void *)of)->plan->study->metrics.count;
+    const SweepPart *part = made;
+    if (point == 0)
+        TRY(lay_table(table, of->members, metrics, problem));
+    table->points.at[table->points.count++] = (double)point;
+    table->statuses.at[table->statuses.count++] = part->status;
+    memcpy(&table->values.at[table->values.count], part->values, metrics * sizeof *part->values);
+    table->values.count += metrics;
+    if (part->status == SWEEP_MADE)
+        return STATUS_OK;
+    table->failed++;
+    const Status added = sweep_add_failure(&table->failures, part->status, point, part->why);
+    return added == STATUS_OK ? added : problem_set(problem, added, "no memory for a point");
+}
+
+static void free_points(StudyWork *of) {
+    SweepWork *work = (SweepWork *)(void *)of;
+    sweep_plan_free(work->plan);
+    free(work);
+}
+
+static Status begin_points(const Study *asked, const Simulation *simulation,
+                           const StudyTools *tools, Variant *told, StudyWork **made,
+                           Problem *problem) {
+    const SweepStudy *study = (const SweepStudy *)(const void *)asked;
+    SweepWork *work = calloc(1, sizeof *work);
+    if (work == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep");
+    work->answer = (Sweep *)(void *)told;
+    Status status = sweep_plan_new(study, simulation, tools->limits, &work->plan, problem);
+    if (status == STATUS_OK)
+        status = sweep_check(work->plan, false, tools->limits, tools->watch, problem);
+    if (status == STATUS_OK) {
+        status = tell(study, work->plan, work->answer);
+        if (status != STATUS_OK)
+            (void)problem_set(problem, status, "no memory for the sweep's axes");
     }
+    if (status != STATUS_OK) {
+        free_points(&work->work);
+        return status;
+    }
+    work->work =
+        (StudyWork){.kind = &study_sweep,
+                    .members = work->plan->points,
+                    .wanted = work->plan->points,
+                    .expected = work->plan->points,
+                    .part_bytes = sizeof(SweepPart) + study->metrics.count * sizeof(double)};
+    *made = &work->work;
     return STATUS_OK;
 }
 
-Status sweep_run_all(const SweepStudy *study, const Simulation *simulation, const StudyTools *tools,
-                     Sweep *answer, Problem *problem) {
-    SweepPlan *plan;
-    SweepTable *table = &answer->table;
-    TRY(sweep_plan_new(study, simulation, tools->limits, &plan, problem));
-    Stage stage = stage_of(tools->watch, 0, check_share);
-    const Watch watch = stage_watch(&stage);
-    Problem *fault = malloc(sizeof *fault);
-    Status status = sweep_check(plan, false, tools->limits, &watch, problem);
-    if (status == STATUS_OK)
-        status = tell(study, plan, answer);
-    if (status == STATUS_OK) {
-        const size_t points = plan->points;
-        table->failed = 0;
-        table->points = (Reals){calloc(points, sizeof(double)), points};
-        table->statuses = (Reals){calloc(points, sizeof(double)), points};
-        table->values = (Reals){calloc(points * study->metrics.count, sizeof(double)),
-                                points * study->metrics.count};
-        if (fault == NULL || table->points.at == NULL || table->statuses.at == NULL ||
-            table->values.at == NULL) {
-            table->points.count = table->statuses.count = table->values.count = 0;
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu points", points);
-        }
-    }
-    if (status == STATUS_OK)
-        status = make_rows(plan, tools, table, fault, problem);
-    free(fault);
-    sweep_plan_free(plan);
-    return status;
-}
+const StudyMembers sweep_members = {
+    .begin = begin_points,
+    .make = make_point,
+    .fold = fold_point,
+    .drop = drop_point,
+    .free = free_points,
+};

@@ -1,5 +1,5 @@
-// What one point of a sweep comes to, and all of them in a row. Not many workers: server/jobs. Used
-// by sweep.c, server/jobs and the benches.
+// What one point of a sweep comes to, and all of them as members of the study. Not how they are
+// shared out: server/jobs. Used by sweep.c, server/jobs and the benches.
 #ifndef CORE_STUDY_SWEEP_RUN_H
 #define CORE_STUDY_SWEEP_RUN_H
 
@@ -16,8 +16,13 @@ Status sweep_run_point(const SweepPlan *plan, size_t point, const SimulationLimi
 Status sweep_add_failure(SweepFailures *failures, SweepStatus status, uint64_t point,
                          const char *detail);
 
-// Judges all points, runs them one by one and fills `answer` with its table.
-Status sweep_run_all(const SweepStudy *study, const Simulation *simulation, const StudyTools *tools,
-                     Sweep *answer, Problem *problem);
+// What a point comes to, as a part of the study's members: freed with it.
+typedef struct SweepPart {
+    SweepStatus status;
+    char *why; // NULL where it was made
+    double values[];
+} SweepPart;
+
+extern const StudyMembers sweep_members;
 
 #endif

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/simulation/compare.h"
+#include "core/study/ensemble_statistics.h"
 #include "core/study/tradeoff_budget.h"
 #include "core/study/tradeoff_choice.h"
 #include "core/study/tradeoff_ladder.h"
@@ -162,11 +163,6 @@ static Status time_point(Session *session, size_t index, size_t round, Problem *
     return STATUS_OK;
 }
 
-static int by_size(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void tell_times(Session *session) {
     const size_t repeats = session->study->repeats;
     for (size_t i = 0; i < session->answer->points.count; i++) {
@@ -174,7 +170,7 @@ static void tell_times(Session *session) {
         double *times = &session->times[i * repeats];
         if (point->status != TRADEOFF_MEASURED)
             continue;
-        qsort(times, repeats, sizeof *times, by_size);
+        statistics_sort(times, repeats);
         point->cpu_minimum = times[0];
         point->cpu_median = (times[(repeats - 1) / 2] + times[repeats / 2]) / 2;
     }

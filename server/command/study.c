@@ -7,6 +7,7 @@
 #include "server/base/clock.h"
 #include "server/command/bar.h"
 #include "server/command/command.h"
+#include "server/command/crew.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
 #include "server/encode/answer.h"
@@ -60,18 +61,28 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
+// CPU times are measured on one thread, by itself.
+static Status measure(const Inquiry *inquiry, const SimulationLimits *limits, const Watch *watch,
+                      Variant **answer, Problem *problem) {
+    Workspace workspace = {0};
+    const StudyTools tools = {
+        .limits = limits, .watch = watch, .workspace = &workspace, .cpu = thread_cpu};
+    const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, answer, problem);
+    workspace_clear(&workspace);
+    return status;
+}
+
 static Status study_make(const StudyCommand *command, const Inquiry *inquiry, const Texts *outputs,
                          const SimulationLimits *limits, Problem *problem) {
     Bar bar;
-    Workspace workspace = {0};
     Variant *answer = NULL;
     bar_start(&bar);
     const Watch watch = bar_watch(&bar);
-    const StudyTools tools = {
-        .limits = limits, .watch = &watch, .workspace = &workspace, .cpu = thread_cpu};
-    Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &answer, problem);
+    Status status =
+        study_kind(inquiry->study)->members != NULL
+            ? crew_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem)
+            : measure(inquiry, limits, &watch, &answer, problem);
     bar_stop(&bar);
-    workspace_clear(&workspace);
     if (status == STATUS_OK && (command->choose != NULL || outputs->count == 0))
         command->print(answer);
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)

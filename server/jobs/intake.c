@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/study.h"
 
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
@@ -27,7 +27,7 @@ Computation *computation_new(const char *result) {
 void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
-    sweep_free(computation->sweep);
+    study_run_free(computation->study);
     inquiry_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
@@ -55,6 +55,10 @@ void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
              STATUS_OK)
         cost.cpu_seconds = queue_quick; // the run will tell
     computation->queued.seconds = cost.cpu_seconds;
+    // The members of a study have turns of their own.
+    computation->queued.charge = study_is_shared(computation)
+                                     ? simulation_cost(&computation->inquiry.simulation).cpu_seconds
+                                     : 0;
     if (client == NULL)
         queue_urge(intake->queue, &computation->queued);
     else
@@ -133,8 +137,8 @@ void intake_detach(Job *job) {
     index_remove(job->intake->in_flight, &computation->indexed);
     if (computation->is_running) {
         atomic_store(&computation->is_stopped, true);
-        if (computation->sweep != NULL)
-            sweep_stop(computation->sweep);
+        if (computation->study != NULL)
+            study_stop(computation->study);
     } else {
         queue_remove(job->intake->queue, &computation->queued);
         computation_free(computation);
@@ -243,7 +247,7 @@ void intake_close(Intake *intake) {
     for (size_t i = 0; i < intake->worker_count; i++)
         if (intake->workers[i].running != NULL)
             atomic_store(&intake->workers[i].running->is_stopped, true);
-    for (SweepRun *run = intake->sweeps; run != NULL; run = run->next)
+    for (StudyRun *run = intake->studies; run != NULL; run = run->next)
         atomic_store(&run->computation->is_stopped, true);
     pthread_cond_broadcast(&intake->work);
     pthread_cond_broadcast(&intake->spare_work);
@@ -260,9 +264,9 @@ void intake_close(Intake *intake) {
         intake->stalled = computation->next_stalled;
         let_go(computation);
     }
-    while (intake->sweeps != NULL) {
-        Computation *computation = intake->sweeps->computation;
-        intake->sweeps = intake->sweeps->next;
+    while (intake->studies != NULL) {
+        Computation *computation = intake->studies->computation;
+        intake->studies = intake->studies->next;
         queue_remove(intake->queue, &computation->queued);
         let_go(computation);
     }
@@ -396,7 +400,7 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
     tally->cached_bytes = tally->series.bytes + tally->heads.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
-        tally->running += intake->workers[i].running != NULL || intake->workers[i].sweep != NULL;
+        tally->running += intake->workers[i].running != NULL || intake->workers[i].study != NULL;
     pthread_mutex_unlock(&intake->lock);
     tally->stored.most_bytes = intake->settings.store_bytes;
 }

@@ -16,7 +16,7 @@
 
 enum { OUTCOME_FAILURES = 64 };
 
-struct SweepRun;
+struct StudyRun;
 
 typedef struct Wakers {
     Waker *at;
@@ -29,7 +29,7 @@ typedef struct Computation {
     char result[72];
     Inquiry inquiry;
     char *scene, *warnings; // documents
-    QueueEntry queued;      // also for the next turn of a sweep
+    QueueEntry queued;      // also for the next turn of a study
     bool is_running;
     int64_t began_ns;
     bool is_again; // only its series is wanted: the result is saved already
@@ -37,7 +37,7 @@ typedef struct Computation {
     Wakers askers; // readers of the outcome
     atomic_bool is_stopped;
     atomic_uint progress;   // in 1/10,000
-    struct SweepRun *sweep; // of a sweep that is under way, under the lock
+    struct StudyRun *study; // that is under way, under the lock
     struct Computation *next_stalled;
 } Computation;
 
@@ -77,8 +77,8 @@ typedef struct Worker {
     Intake *intake;
     pthread_t thread;
     Computation *running;   // or NULL
-    struct SweepRun *sweep; // of which it has a chunk in hand, or NULL
-    size_t chunk;
+    struct StudyRun *study; // of which it has a chunk in hand, or NULL
+    size_t chunk;           // its first member
     bool is_spare;       // beyond the number asked for: takes quick work while all others are slow
     Workspace workspace; // of its thread alone
 } Worker;
@@ -101,17 +101,18 @@ struct Intake {
     size_t slow_running;
     double pace; // run time over what was foretold, of late
     bool is_closing;
-    Index *jobs;                 // not yet finished
-    Index *in_flight;            // computations
-    Queue *queue;                // of computations
-    struct SweepRun *sweeps;     // under way
-    Computation *stalled;        // sweeps that could not be written down for want of room
-    size_t live;                 // jobs not yet finished
-    size_t scene_bytes;          // of them all
-    size_t posted;               // writes that the store has yet to answer
-    size_t saving, saving_bytes; // computations that have run and are not yet saved
-    struct Saving *delayed;      // of these, what waits for room in the store
-    Job *undismissed;            // held: dismissed, but the store could not be told
+    Index *jobs;                     // not yet finished
+    Index *in_flight;                // computations
+    Queue *queue;                    // of computations
+    struct StudyRun *studies;        // under way
+    size_t study_count, study_bytes; // of them, and that they hold
+    Computation *stalled;            // studies that could not begin for want of room
+    size_t live;                     // jobs not yet finished
+    size_t scene_bytes;              // of them all
+    size_t posted;                   // writes that the store has yet to answer
+    size_t saving, saving_bytes;     // computations that have run and are not yet saved
+    struct Saving *delayed;          // of these, what waits for room in the store
+    Job *undismissed;                // held: dismissed, but the store could not be told
     Cache *cache;
     Known *known;
     LayerTally rows, stored;            // results and series found in the database

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/gather.h"
 
 const char *const job_state_names[] = {"accepted", "running",   "successful",
                                        "failed",   "dismissed", NULL};
@@ -112,10 +112,11 @@ Status job_show(Job *job, JobShow *show) {
         show->is_result_deleted = job->intake == NULL && !row->has_result;
     } else if (job->computation != NULL) {
         show->progress = atomic_load(&job->computation->progress) / 100.0;
-        if (job->computation->sweep != NULL) {
-            show->points = job->computation->sweep->row.points;
-            show->points_done = atomic_load(&job->computation->sweep->done);
-            show->points_failed = atomic_load(&job->computation->sweep->failed);
+        StudyRun *run = job->computation->study;
+        if (run != NULL && run->gather == &gather_rows) {
+            show->points = run->row.points;
+            show->points_done = atomic_load(&run->rows_done);
+            show->points_failed = atomic_load(&run->rows_failed);
         }
     }
     if (!job_state_is_final(row->state) && job->submitted_ns > 0) {

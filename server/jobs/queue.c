@@ -210,7 +210,8 @@ QueueEntry *queue_take(Queue *queue, bool only_quick) {
     queue_remove(queue, entry);
     if (next->served > queue->reached)
         queue->reached = next->served;
-    const double seconds = entry->seconds > least ? entry->seconds : least;
+    const double given = entry->charge > 0 ? entry->charge : entry->seconds;
+    const double seconds = given > least ? given : least;
     next->served += seconds;
     next->ordinary = entry->is_turn ? 0 : next->ordinary + seconds;
     return entry;

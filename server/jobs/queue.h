@@ -30,6 +30,7 @@ typedef struct QueueEntry {
     struct QueueEntry *child, *next, *previous;
     Client *client; // NULL: ahead of all
     double seconds; // of CPU foretold
+    double charge;  // of these, what its client is counted when it is taken; 0: all
     bool is_turn; // of long work that is done bit by bit: it goes between a client's ordinary work
     double rank;
     uint64_t number; // of arrival, from 1; 0: does not wait

@@ -8,7 +8,7 @@
 #include <math.h>
 
 #include "server/base/clock.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/study.h"
 
 static double allowance(const Intake *intake, const Client *client) {
     const double most = intake->settings.rate;
@@ -73,7 +73,7 @@ int intake_retry_after(Intake *intake, const char *name, Status status) {
             if (running != NULL && (!is_own || is_of(running, client)))
                 soonest = fmin(soonest, left_of(intake, running));
         }
-        for (const SweepRun *run = intake->sweeps; run != NULL; run = run->next)
+        for (const StudyRun *run = intake->studies; run != NULL; run = run->next)
             if (!is_own || is_of(run->computation, client))
                 soonest = fmin(soonest, left_of(intake, run->computation));
         // None of its jobs runs: their turn comes within what waits.

@@ -14,7 +14,7 @@
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
 #include "server/codec/write.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/study.h"
 
 // Computations on the way to the store, and the bytes of what they came to.
 enum { SAVING_MOST = 4096, SAVING_BYTES = 256 << 20 };
@@ -290,7 +290,7 @@ void intake_retry(Intake *intake) {
         ended = saving;
     }
     intake_retry_dismissed(intake);
-    sweeps_resume(intake);
+    studies_resume(intake);
     pthread_mutex_unlock(&intake->lock);
     for (; ended != NULL; ended = next) {
         next = ended->next;

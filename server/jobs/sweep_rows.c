@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "server/codec/read.h"
+#include "server/jobs/job.h"
 #include "server/jobs/sweep.h"
 
 // Bytes of rows that are read at once, more only where one of each chunk is.

@@ -10,15 +10,13 @@
 #include "server/base/clock.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
-#include "server/jobs/sweep.h"
+#include "server/jobs/study.h"
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
     Computation *computation;
     double from, share;
 } Part;
-
-static const double own_share = 0.05; // of the scene's own run where a study follows
 
 static bool advance(void *context, double fraction) {
     const Part *part = context;
@@ -72,16 +70,20 @@ static Status describe(const Computation *computation, Findings *findings) {
     row->impacts = take(&impacts, &status);
     if (outcome->spectrum.densities.count > 0)
         row->psd = take(&psd, &status);
-    if (findings->answer.study != NULL) {
-        Bytes study = {.most = DOCUMENT_BYTES};
-        document_study(&study, &findings->answer);
-        row->study = take(&study, &status);
-    }
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
     return row->engine == NULL || row->scene == NULL || row->warnings == NULL ? STATUS_NO_MEMORY
                                                                               : status;
+}
+
+Status findings_tell_study(Findings *findings, Problem *problem) {
+    Bytes study = {.most = DOCUMENT_BYTES};
+    Status status = STATUS_OK;
+    document_study(&study, &findings->answer);
+    findings->result.study = take(&study, &status);
+    findings->result.created_unix_ms = clock_unix_ms();
+    return problem_set(problem, status, "no memory for the study's document");
 }
 
 void findings_fail(Findings *findings, Status status, const Problem *problem) {
@@ -98,21 +100,18 @@ static double thread_cpu(void *context) {
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
-static bool is_sweep(const Computation *computation) {
-    const Variant *study = computation->inquiry.study;
-    return study != NULL && !computation->is_again && study_kind(study) == &study_sweep;
-}
-
 static Status run_study(Worker *worker, Computation *computation, Findings *findings,
                         Problem *problem) {
-    Part part = {computation, own_share, 1 - own_share};
+    Part part = {computation, STUDY_OWN, 1 - STUDY_OWN};
     const Watch watch = {&part, advance};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .watch = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
-    if (is_sweep(computation))
-        return sweep_open(worker, computation, findings, &watch, problem);
+    // What has members goes on chunk by chunk, on all threads. What measures CPU times has none: it
+    // is made here, by itself.
+    if (study_is_shared(computation))
+        return study_open(worker, computation, findings, &watch, problem);
     return study_run(computation->inquiry.study, &computation->inquiry.simulation, &tools,
                      &findings->answer.study, problem);
 }
@@ -121,7 +120,7 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     Intake *intake = worker->intake;
     // Only the scene's own series is ever wanted again.
     const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
-    Part part = {computation, 0, has_study ? own_share : 1};
+    Part part = {computation, 0, has_study ? STUDY_OWN : 1};
     const Watch watch = {&part, advance};
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
@@ -143,6 +142,8 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
         status = describe(computation, findings);
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the result's documents");
+        else if (has_study && computation->study == NULL)
+            status = findings_tell_study(findings, problem);
     }
     if (status != STATUS_OK)
         findings_fail(findings, status, problem);
@@ -182,11 +183,11 @@ static bool is_slow(const Computation *computation) {
     return computation->queued.seconds > queue_quick;
 }
 
-// What a worker does next: a computation, or a part of a sweep, or the end of one (no part).
+// What a worker does next: a computation, or a chunk of a study, or the end of one (no chunk).
 typedef struct Task {
     Computation *computation;
-    SweepRun *sweep;
-    SweepPart *part;
+    StudyRun *study;
+    Shift *shift;
 } Task;
 
 // The spare worker has nothing to do while an ordinary one is idle or busy with something quick.
@@ -220,6 +221,17 @@ static void begin_computation(Worker *worker, Computation *computation) {
     }
 }
 
+static void leave(Worker *worker, const Computation *computation) {
+    worker->running = NULL;
+    worker->intake->slow_running -= is_slow(computation);
+}
+
+// It waits for room, of whatever kind, and then begins anew.
+static void stall(Intake *intake, Computation *computation) {
+    computation->next_stalled = intake->stalled;
+    intake->stalled = computation;
+}
+
 static QueueEntry *wait_for_entry(Worker *worker) {
     Intake *intake = worker->intake;
     QueueEntry *entry = NULL;
@@ -238,19 +250,24 @@ static bool next_task(Worker *worker, Task *task) {
         if (entry == NULL)
             return false;
         Computation *computation = computation_of(entry);
-        if (computation->sweep == NULL) {
-            task->computation = computation;
+        if (computation->study == NULL) {
             begin_computation(worker, computation);
+            if (study_must_wait(worker->intake, computation)) {
+                leave(worker, computation);
+                stall(worker->intake, computation);
+                continue;
+            }
+            task->computation = computation;
             return true;
         }
-        task->sweep = computation->sweep;
-        task->part = sweep_take(task->sweep, &is_ended);
-        if (task->part != NULL) {
-            worker->sweep = task->sweep;
-            worker->chunk = task->part->chunk;
+        task->study = computation->study;
+        task->shift = study_take(task->study, &is_ended);
+        if (task->shift != NULL) {
+            worker->study = task->study;
+            worker->chunk = task->shift->chunk.first;
             begin_slow(worker->intake);
         }
-        if (task->part != NULL || is_ended)
+        if (task->shift != NULL || is_ended)
             return true;
     }
 }
@@ -267,22 +284,19 @@ static void compute(Worker *worker, Computation *computation, Problem *problem) 
     Intake *intake = worker->intake;
     Findings findings = {0};
     run(worker, computation, &findings, problem);
-    const bool is_launched = findings.status == STATUS_OK && computation->sweep != NULL;
-    const bool is_stalled = findings.status == STATUS_FULL && is_sweep(computation);
+    const bool is_launched = findings.status == STATUS_OK && computation->study != NULL;
+    const bool is_stalled = findings.status == STATUS_FULL;
     pthread_mutex_lock(&intake->lock);
-    worker->running = NULL;
-    intake->slow_running -= is_slow(computation);
+    leave(worker, computation);
     if (findings.status == STATUS_OK && !is_launched)
         keep_pace(intake, computation, &findings);
-    if (is_stalled) {
-        computation->next_stalled = intake->stalled;
-        intake->stalled = computation;
-    }
+    if (is_stalled)
+        stall(intake, computation);
     pthread_mutex_unlock(&intake->lock);
     if (findings.status == STATUS_CANCELLED)
         computation_abandon(intake, computation);
     else if (is_launched)
-        sweep_launch(intake, computation, &findings, problem);
+        study_launch(worker, computation, &findings, problem);
     else if (!is_stalled)
         computation_finish(intake, computation, &findings);
     findings_clear(&findings);
@@ -298,10 +312,10 @@ void *worker_main(void *context) {
         pthread_mutex_unlock(&intake->lock);
         if (task.computation != NULL)
             compute(worker, task.computation, &problem);
-        else if (task.part != NULL)
-            sweep_work(worker, task.sweep, task.part, &problem);
+        else if (task.shift != NULL)
+            study_work(worker, task.study, task.shift, &problem);
         else
-            sweep_end(intake, task.sweep);
+            study_finish(worker, task.study, &problem);
         pthread_mutex_lock(&intake->lock);
     }
     pthread_mutex_unlock(&intake->lock);

@@ -1,12 +1,16 @@
 // What a worker does with a computation besides running it: for those that go on after that, part
 // by part. Not the queue (intake_state.h) and not how it is saved (saving.c). Used by worker.c and
-// sweep.c.
+// study.c.
 #ifndef SERVER_JOBS_WORKER_H
 #define SERVER_JOBS_WORKER_H
 
 #include "server/jobs/intake_state.h"
 
+#define STUDY_OWN 0.05 // of the progress, the scene's own run where a study follows
+
 void findings_fail(Findings *findings, Status status, const Problem *problem);
+// The answer's document, once it is whole.
+Status findings_tell_study(Findings *findings, Problem *problem);
 
 // Without the lock. Takes both: saves what it came to, also its series where that pays.
 void computation_finish(Intake *intake, Computation *computation, Findings *findings);

@@ -13,6 +13,7 @@
 #include "core/math/fourier.h"
 #include "core/study/sweep_judge.h"
 #include "server/base/clock.h"
+#include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"
 
 enum { ROUNDS_MOST = 64 };

@@ -4,103 +4,18 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
 
 #include <cmocka.h>
 
 #include "core/math/fourier.h"
 #include "server/jobs/sweep.h"
 #include "server/jobs/sweep_rows.h"
-#include "tests/support/scratch.h"
+#include "tests/support/room.h"
 
-typedef struct Room {
-    char directory[SCRATCH_SIZE];
-    Store *store;
-    Intake *intake;
-    size_t workers;
-} Room;
-
-static Problem problem;
-
-static void room_open(Room *room) {
-    const IntakeSettings settings = {.workers = room->workers,
-                                     .queue_most = 1000,
-                                     .cache_bytes = 1 << 24,
-                                     .limits = {.samples = 1 << 25, .impacts = 1 << 20}};
-    problem_clear(&problem);
-    if (store_open(room->directory, &room->store, &problem) != STATUS_OK ||
-        intake_open(room->store, &settings, &room->intake, &problem) != STATUS_OK)
-        fail_msg("%s", problem.detail);
-}
-
-static void room_close(Room *room) {
-    intake_close(room->intake);
-    store_close(room->store);
-}
-
-static Room room_make(size_t workers) {
-    Room room = {.workers = workers};
-    scratch_make(room.directory);
-    room_open(&room);
-    return room;
-}
-
-static void room_end(Room *room) {
-    room_close(room);
-    scratch_remove(room->directory);
-}
-
-static Job *submit(const Room *room, size_t points, double duration) {
+static void submit(const Room *room, size_t points, double duration, char id[40]) {
     char text[1024];
-    snprintf(text, sizeof text,
-             "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},"
-             " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
-             " \"excitation\": {\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 1},"
-             " \"duration\": %.17g, \"sample_rate\": 1000, \"output\": {\"psd\": null},"
-             " \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
-             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.02, \"count\": %zu}]}}",
-             duration, points);
-    Job *job;
-    const Submission submission = {.text = text, .size = strlen(text)};
-    problem_clear(&problem);
-    if (intake_submit(room->intake, &submission, &job, &problem) != STATUS_OK)
-        fail_msg("%s", problem.detail);
-    return job;
-}
-
-static void nap(long ns) {
-    const struct timespec time = {0, ns};
-    nanosleep(&time, NULL);
-}
-
-static JobState state_of(const Room *room, const char *id, char result[72]) {
-    Job *job;
-    JobShow show;
-    assert_int_equal(intake_find(room->intake, id, &job, NULL), STATUS_OK);
-    assert_int_equal(job_show(job, &show), STATUS_OK);
-    job_drop(job);
-    const JobState state = show.state;
-    text_fit(result, 72, show.result);
-    job_show_clear(&show);
-    return state;
-}
-
-static void finish(const Room *room, const char *id, char result[72]) {
-    JobState state;
-    while (!job_state_is_final((int)(state = state_of(room, id, result))))
-        nap(2000000);
-    assert_int_equal(state, JOB_SUCCESSFUL);
-}
-
-static void id_of(Job *job, char id[40]) {
-    JobShow show;
-    assert_int_equal(job_show(job, &show), STATUS_OK);
-    text_fit(id, 40, show.id);
-    job_show_clear(&show);
-    job_drop(job);
+    room_sweep(text, sizeof text, points, duration);
+    room_submit(room, text, NULL, id);
 }
 
 static void assert_whole(const Room *room, const char *result, size_t points) {
@@ -147,13 +62,13 @@ static void a_sweep_interrupted_again_and_again_comes_to_its_end(void **state) {
     Room room = room_make(3);
     char id[40], result[72];
     enum { POINTS = 4000 };
-    id_of(submit(&room, POINTS, 20), id);
+    submit(&room, POINTS, 20, id);
     for (int i = 0; i < 6; i++) {
-        nap(30000000L * (i + 1));
+        room_nap(30000000L * (i + 1));
         room_close(&room);
         room_open(&room);
     }
-    finish(&room, id, result);
+    room_finish(&room, id, result);
     assert_whole(&room, result, POINTS);
     room_end(&room);
 }
@@ -163,15 +78,13 @@ static void a_sweep_is_dismissed_at_any_moment_and_leaves_nothing(void **state) 
     Room room = room_make(2);
     char id[40], other[72];
     for (int i = 0; i < 20; i++) {
-        Job *job;
-        id_of(submit(&room, 3000, 20 + i), id);
-        nap(7000000L * (i % 10));
-        assert_int_equal(intake_dismiss(room.intake, id, &job, NULL), STATUS_OK);
-        job_drop(job);
+        submit(&room, 3000, 20 + i, id);
+        room_nap(7000000L * (i % 10));
+        room_dismiss(&room, id);
     }
     // The workers are free again and the room closes at once.
-    id_of(submit(&room, 5, 1), id);
-    finish(&room, id, other);
+    submit(&room, 5, 1, id);
+    room_finish(&room, id, other);
     assert_whole(&room, other, 5);
     room_end(&room);
 }
@@ -181,9 +94,9 @@ static void two_sweeps_and_their_doubles_share_the_workers(void **state) {
     Room room = room_make(2);
     char ids[4][40], results[4][72];
     for (int i = 0; i < 4; i++)
-        id_of(submit(&room, i % 2 == 0 ? 300 : 200, 10), ids[i]);
+        submit(&room, i % 2 == 0 ? 300 : 200, 10, ids[i]);
     for (int i = 0; i < 4; i++) {
-        finish(&room, ids[i], results[i]);
+        room_finish(&room, ids[i], results[i]);
         assert_whole(&room, results[i], i % 2 == 0 ? 300 : 200);
     }
     assert_string_equal(results[0], results[2]);

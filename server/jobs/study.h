@@ -1,0 +1,89 @@
+// A study under way: its members go to an executor chunk by chunk, what they come to is gathered,
+// and the last one ends its jobs. Not how chunks are run (executor.h, threads.c), not what becomes
+// of their members (gather.h) and not the members (core/study/study.h). Used by worker.c, intake.c
+// and threads.c, with the intake's lock where it says so.
+#ifndef SERVER_JOBS_STUDY_H
+#define SERVER_JOBS_STUDY_H
+
+#include "server/base/bytes.h"
+#include "server/jobs/executor.h"
+#include "server/jobs/worker.h"
+
+// A chunk that a thread makes, or will.
+typedef struct Shift {
+    struct Shift *next;
+    Chunk chunk;
+    size_t done;       // of its members, the first ones
+    bool is_begun;     // gather->begin was called
+    bool is_made;      // all of them
+    bool is_again;     // rows were loaded: those that came to nothing are made anew
+    SweepChunkRow row; // of a sweep, as it goes to the store
+    Bytes reasons;
+} Shift;
+
+struct StudyRun {
+    StudyRun *next; // in the intake's list
+    Intake *intake;
+    Computation *computation;
+    const Executor *executor;
+    const struct Gather *gather;
+    StudyWork *work;
+    struct Fold *fold;                    // of what is folded in memory
+    size_t bytes;                         // that it holds, about
+    SweepRow row;                         // of a sweep
+    atomic_size_t rows_done, rows_failed; // of a sweep; the failed ones are done too
+    Findings findings;
+    atomic_size_t expected;          // members
+    atomic_uint_fast64_t millionths; // of members, that are done
+    atomic_bool is_over;             // all that is wanted is there, or it has failed
+    // Under the intake's lock:
+    Shift *first, *last; // that wait
+    size_t in_hand;      // shifts that threads have
+    size_t left;         // of a sweep, chunks that the store has not
+    double turn;         // [s] that a turn takes, about
+    bool is_paused;      // until there is room in the store
+    bool is_told;        // that it is
+    bool is_failed;      // findings say how
+};
+
+// Whether its study has members, which are shared out.
+bool study_is_shared(const Computation *computation);
+
+// Makes ready: a worker's part of the way, until there are members to be shared out. Fills
+// findings->answer and computation->study. Stops when `watch` says so.
+Status study_open(Worker *worker, Computation *computation, Findings *findings, const Watch *watch,
+                  Problem *problem);
+// Hands the members to the executor; takes the computation and the findings. From here on whoever
+// takes its last chunk ends it.
+void study_launch(Worker *worker, Computation *computation, Findings *findings, Problem *problem);
+void study_run_free(StudyRun *run); // NULL is fine
+
+// With the lock held, by whoever took its turn from the queue: a chunk to work on. NULL: there is
+// nothing to do but to end it, where *is_ended says so.
+Shift *study_take(StudyRun *run, bool *is_ended);
+// Without it: works on the chunk until it is done, or others are to have their turn. Then the run
+// may be no more.
+void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem);
+// Ends it: successful, failed or abandoned. Frees it with its computation.
+void study_finish(Worker *worker, StudyRun *run, Problem *problem);
+// With the lock held: nobody wants it any more.
+void study_stop(StudyRun *run);
+// With the lock held: whether those that are under way hold so much that this one is to wait.
+bool study_must_wait(const Intake *intake, const Computation *computation);
+// With the lock held: those that wait for room try again.
+void studies_resume(Intake *intake);
+
+// With the lock held, by executors: a chunk waits for a thread.
+void study_wait(StudyRun *run, Shift *shift, bool is_first);
+void shift_free(StudyRun *run, Shift *shift); // NULL is fine
+
+// Without it: makes the chunk's members. STATUS_BUSY: others are to have their turn, the rest comes
+// later.
+enum { STUDY_TURN_MS = 10 }; // that is not interrupted for others
+Status study_chunk_make(Worker *worker, StudyRun *run, Shift *shift, Problem *problem);
+// A Watch's advance: whether the study, a StudyRun, goes on.
+bool study_goes_on(void *run, double fraction);
+// Members were there before.
+void study_count(StudyRun *run, size_t members);
+
+#endif

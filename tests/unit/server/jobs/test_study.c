@@ -1,0 +1,398 @@
+// Studies in the jobs room, with the real engine and a real database: shared out to the workers,
+// the same bytes for any number of them, stopped, interrupted, and side by side.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/math/fourier.h"
+#include "server/base/clock.h"
+#include "server/jobs/gather.h"
+#include "server/jobs/order.h"
+#include "tests/support/room.h"
+
+#if defined __SANITIZE_THREAD__ || defined __SANITIZE_ADDRESS__
+enum { SLOWER = 20 }; // instrumented code takes many times the CPU
+#else
+enum { SLOWER = 1 };
+#endif
+
+static Problem problem;
+
+static void scene(char text[1024], double duration, const char *accuracy, const char *study) {
+    snprintf(
+        text, 1024,
+        "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},"
+        " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
+        " \"excitation\": {\"kind\": \"random\", \"band\": [0.1, 10], \"rms\": 1, \"seed\": 3},"
+        " \"duration\": %.17g, \"sample_rate\": 500, \"accuracy\": %s%s%s}",
+        duration, accuracy, study == NULL ? "" : ", \"study\": ", study == NULL ? "" : study);
+}
+
+static const char usual[] = "{\"solver\": \"auto\"}";
+
+static void ensemble(char text[1024], size_t runs, double duration) {
+    char study[120];
+    snprintf(study, sizeof study, "{\"kind\": \"ensemble\", \"runs\": %zu}", runs);
+    scene(text, duration, usual, study);
+}
+
+static void members_are_dealt_out_to_chunks_each_once(void **state) {
+    (void)state;
+    for (size_t from = 0; from < 3; from++)
+        for (size_t to = from + 1; to < 20; to++)
+            for (size_t chunks = 1; chunks <= to - from; chunks++) {
+                int met[20] = {0};
+                for (size_t i = 0; i < chunks; i++) {
+                    const Chunk chunk = chunk_deal(from, to, chunks, i);
+                    assert_true(chunk.count > 0);
+                    for (size_t k = 0; k < chunk.count; k++)
+                        met[chunk.first + k * chunk.stride]++;
+                }
+                for (size_t member = 0; member < 20; member++)
+                    assert_int_equal(met[member], member >= from && member < to);
+            }
+    const ExecutorLimits limits = {
+        .slots = 2, .chunk_seconds = 0.5, .chunks = 100, .chunk_members = 50};
+    assert_int_equal(executor_chunks(&limits, 3, 1e-6), 3);        // one each
+    assert_int_equal(executor_chunks(&limits, 400, 1e-6), 8);      // four a slot
+    assert_int_equal(executor_chunks(&limits, 400, 0.05), 40);     // half a second each
+    assert_int_equal(executor_chunks(&limits, 400, 10), 100);      // as many as it takes
+    assert_int_equal(executor_chunks(&limits, 50000, 1e-6), 1000); // no more than 50 members
+}
+
+// A study that notes in which order it is folded, and how many parts there are.
+typedef struct Noted {
+    StudyWork work;
+    size_t folded, enough, parts, most;
+} Noted;
+
+static Status note(StudyWork *work, size_t member, void *part, Problem *fault) {
+    Noted *noted = (Noted *)(void *)work;
+    (void)fault;
+    assert_int_equal(member, noted->folded);
+    assert_int_equal(*(size_t *)part, member);
+    noted->folded++;
+    if (noted->folded == noted->enough)
+        work->wanted = noted->folded;
+    return STATUS_OK;
+}
+
+static Noted *noted_of_all;
+
+static void drop(void *part) {
+    if (part != NULL)
+        noted_of_all->parts--;
+    free(part);
+}
+
+static void put(Order *order, size_t member) {
+    size_t *part = malloc(sizeof *part);
+    assert_non_null(part);
+    *part = member;
+    if (++noted_of_all->parts > noted_of_all->most)
+        noted_of_all->most = noted_of_all->parts;
+    assert_int_equal(order_put(order, member, part, &problem), STATUS_OK);
+}
+
+static const StudyMembers noted_members = {.fold = note, .drop = drop};
+static const StudyKind noted_kind = {.members = &noted_members};
+
+// Hands members in the last of a stretch first. How many were folded.
+static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, size_t *most) {
+    Noted noted = {.work = {.kind = &noted_kind,
+                            .members = members,
+                            .wanted = members,
+                            .expected = members,
+                            .part_bytes = part_bytes},
+                   .enough = enough};
+    Order order;
+    size_t from, to;
+    noted_of_all = &noted;
+    assert_int_equal(order_make(&noted.work, 2, &order, NULL), STATUS_OK);
+    while (order_begin(&order, SIZE_MAX, &from, &to)) {
+        assert_true(to > from && to - from <= order.window);
+        while (to > from)
+            put(&order, --to);
+    }
+    order_clear(&order);
+    assert_int_equal(noted.parts, 0);
+    *most = noted.most;
+    return noted.folded;
+}
+
+static void parts_are_folded_in_order_within_bounded_memory(void **state) {
+    (void)state;
+    size_t most;
+    assert_int_equal(fold_backwards(1000, SIZE_MAX, 8, &most), 1000);
+    assert_int_equal(most, 1000);
+    // Large parts: some are begun, and when half of them are folded as many more.
+    assert_int_equal(fold_backwards(1000, SIZE_MAX, 1 << 28, &most), 1000);
+    assert_int_equal(most, 16);
+    // What was made beyond the end is of no use, and goes.
+    assert_int_equal(fold_backwards(1000, 7, 1 << 28, &most), 7);
+    assert_int_equal(fold_backwards(0, SIZE_MAX, 8, &most), 0);
+}
+
+static char *answer_of(const Room *room, const char *text) {
+    char id[40], result[72];
+    ResultRow row;
+    room_submit(room, text, NULL, id);
+    room_finish(room, id, result);
+    assert_int_equal(store_result_load(room->store, result, &row, &problem), STATUS_OK);
+    char *study = strdup(row.study);
+    result_row_clear(&row);
+    assert_non_null(study);
+    return study;
+}
+
+static void an_answer_has_the_same_bytes_for_any_number_of_workers(void **state) {
+    (void)state;
+    static const size_t workers[] = {1, 2, 5};
+    static const struct Case {
+        const char *accuracy, *study;
+    } cases[] = {
+        {usual, "{\"kind\": \"ensemble\", \"runs\": 120}"},
+        {usual, "{\"kind\": \"ensemble\", \"runs\": 400, \"target\": 0.05}"},
+        {usual, "{\"kind\": \"ensemble\", \"runs\": 200, \"target\": 0.1, \"metric\": \"psd\"}"},
+        {usual, "{\"kind\": \"sensitivity\", \"contact_time_deviation\": 0.1, \"runs\": 40}"},
+        {"{\"solver\": \"rk4\", \"step\": 0.002}",
+         "{\"kind\": \"sensitivity\", \"contact_time_deviation\": 0.3, \"runs\": 40}"},
+        {usual, "{\"kind\": \"compare\"}"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        char *first = NULL, text[1024];
+        scene(text, 4, cases[i].accuracy, cases[i].study);
+        for (size_t k = 0; k < COUNT(workers); k++) {
+            Room room = room_make(workers[k]);
+            char *answer = answer_of(&room, text);
+            room_end(&room);
+            if (first == NULL) {
+                first = answer;
+                continue;
+            }
+            assert_string_equal(answer, first);
+            free(answer);
+        }
+        free(first);
+    }
+}
+
+// How many workers have chunks in hand.
+static size_t busy(const Room *room) {
+    size_t count = 0;
+    pthread_mutex_lock(&room->intake->lock);
+    for (size_t i = 0; i < room->intake->worker_count; i++)
+        count += room->intake->workers[i].study != NULL;
+    pthread_mutex_unlock(&room->intake->lock);
+    return count;
+}
+
+static bool is_idle(const Room *room) {
+    pthread_mutex_lock(&room->intake->lock);
+    bool is_idle = room->intake->studies == NULL;
+    for (size_t i = 0; i < room->intake->worker_count; i++)
+        is_idle = is_idle && room->intake->workers[i].study == NULL &&
+                  room->intake->workers[i].running == NULL;
+    pthread_mutex_unlock(&room->intake->lock);
+    return is_idle;
+}
+
+static void all_workers_make_an_ensemble_together(void **state) {
+    (void)state;
+    Room room = room_make(3);
+    char text[1024], id[40], result[72];
+    size_t most = 0;
+    ensemble(text, 4000, 20);
+    room_submit(&room, text, NULL, id);
+    while (most < 3) {
+        const size_t now = busy(&room);
+        most = now > most ? now : most;
+        if (job_state_is_final((int)room_state(&room, id, result)))
+            fail_msg("%zu of 3 workers had a part in it", most);
+    }
+    room_dismiss(&room, id);
+    room_end(&room);
+}
+
+static int64_t process_cpu_ns(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+// Dismisses a study whose members are long, in the midst of them: the CPU that it takes afterwards.
+static void a_study_stops_within_100_ms_of_work(void **state) {
+    (void)state;
+    static const char *const kinds[] = {
+        "{\"kind\": \"ensemble\", \"runs\": 50}",
+        "{\"kind\": \"sensitivity\"}",
+        "{\"kind\": \"compare\"}",
+        "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.01,"
+        " \"to\": 0.02, \"count\": 50}]}",
+    };
+    Room room = room_make(2);
+    for (size_t i = 0; i < COUNT(kinds); i++) {
+        char text[1024], id[40];
+        // Some tenths of a second each.
+        scene(text, 100.0 / SLOWER, "{\"solver\": \"rk4\", \"step\": 2e-5}", kinds[i]);
+        room_submit(&room, text, NULL, id);
+        while (busy(&room) < 2)
+            room_nap(1000000);
+        room_nap(5000000);
+        const int64_t began_ns = process_cpu_ns();
+        room_dismiss(&room, id);
+        while (!is_idle(&room))
+            room_nap(1000000);
+        const double ms = 1e-6 * (double)(process_cpu_ns() - began_ns);
+        if (ms > 100 * 2 * SLOWER)
+            fail_msg("%s took %.0f ms of CPU more", kinds[i], ms);
+    }
+    room_end(&room);
+}
+
+static void an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing(void **state) {
+    (void)state;
+    Room room = room_make(2);
+    char text[1024], id[40], result[72];
+    for (int i = 0; i < 20; i++) {
+        ensemble(text, 2000, 20 + i);
+        room_submit(&room, text, NULL, id);
+        room_nap(7000000L * (i % 10));
+        room_dismiss(&room, id);
+    }
+    ensemble(text, 5, 1);
+    room_submit(&room, text, NULL, id);
+    room_finish(&room, id, result);
+    assert_true(is_idle(&room) && room.intake->study_bytes == 0 && room.intake->study_count == 0);
+    room_end(&room);
+}
+
+static void an_ensemble_that_was_interrupted_begins_again(void **state) {
+    (void)state;
+    Room room = room_make(2);
+    char text[1024], id[40], result[72];
+    ensemble(text, 300, 20);
+    char *whole = answer_of(&room, text);
+    room_end(&room);
+    room = room_make(2);
+    room_submit(&room, text, NULL, id);
+    for (int i = 0; i < 3; i++) {
+        while (busy(&room) == 0 && !job_state_is_final((int)room_state(&room, id, result)))
+            room_nap(100000);
+        room_close(&room);
+        room_open(&room);
+    }
+    char *again = answer_of(&room, text);
+    assert_string_equal(again, whole);
+    free(again);
+    free(whole);
+    room_end(&room);
+}
+
+// Points or members that a job has made, of a thousand.
+static double share_of(const Room *room, const char *id) {
+    Job *job;
+    JobShow show;
+    assert_int_equal(intake_find(room->intake, id, &job, NULL), STATUS_OK);
+    assert_int_equal(job_show(job, &show), STATUS_OK);
+    job_drop(job);
+    const double share = show.progress / 100;
+    job_show_clear(&show);
+    return share;
+}
+
+// Two equal studies of two clients on one worker: when the first is at its end, the other is well
+// on its way.
+static void assert_both_get_on(const char *one, const char *other) {
+    Room room = room_make(1);
+    char ids[2][40], result[72];
+    room_submit(&room, one, "one", ids[0]);
+    while (share_of(&room, ids[0]) < 0.15) // its members are being made
+        room_nap(1000000);
+    room_submit(&room, other, "other", ids[1]);
+    while (!job_state_is_final((int)room_state(&room, ids[0], result)))
+        room_nap(1000000);
+    const double share = share_of(&room, ids[1]);
+    if (share < 0.4)
+        fail_msg("the other is at %.0f %% when the first is at its end", 100 * share);
+    room_finish(&room, ids[1], result);
+    room_end(&room);
+}
+
+static void studies_of_two_clients_both_get_on(void **state) {
+    (void)state;
+    char one[1024], other[1024];
+    room_sweep(one, sizeof one, 4000, 20);
+    room_sweep(other, sizeof other, 4000, 20.5);
+    assert_both_get_on(one, other);
+    ensemble(one, 1000, 20);
+    ensemble(other, 1000, 20.5);
+    assert_both_get_on(one, other);
+    assert_both_get_on(other, one);
+}
+
+static void single_jobs_go_between_the_members_of_an_ensemble(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    char text[1024], id[40], single[40], result[72];
+    ensemble(text, 8000, 20);
+    room_submit(&room, text, NULL, id);
+    while (busy(&room) == 0)
+        room_nap(100000);
+    scene(text, 1, usual, NULL);
+    room_submit(&room, text, NULL, single);
+    room_finish(&room, single, result);
+    assert_int_equal(room_state(&room, id, result), JOB_RUNNING);
+    room_dismiss(&room, id);
+    room_end(&room);
+}
+
+// Where much is held already, another study waits until one is at its end.
+static void studies_wait_where_much_is_held(void **state) {
+    (void)state;
+    Room room = room_make(1);
+    char text[1024], ids[3][40], result[72];
+    for (int i = 0; i < 2; i++) {
+        ensemble(text, 4000, 20 + i);
+        room_submit(&room, text, NULL, ids[i]);
+    }
+    while (share_of(&room, ids[0]) < 0.15 || share_of(&room, ids[1]) < 0.15)
+        room_nap(1000000);
+    pthread_mutex_lock(&room.intake->lock);
+    assert_int_equal(room.intake->study_count, 2);
+    room.intake->study_bytes += (size_t)1 << 40;
+    pthread_mutex_unlock(&room.intake->lock);
+    ensemble(text, 10, 1);
+    room_submit(&room, text, NULL, ids[2]);
+    const double before = share_of(&room, ids[0]);
+    while (share_of(&room, ids[0]) < before + 0.05)
+        room_nap(1000000);
+    assert_true(share_of(&room, ids[2]) == 0);
+    room_dismiss(&room, ids[0]);
+    room_finish(&room, ids[2], result); // there are too few under way for it to wait
+    room_dismiss(&room, ids[1]);
+    room_end(&room);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(members_are_dealt_out_to_chunks_each_once),
+        cmocka_unit_test(parts_are_folded_in_order_within_bounded_memory),
+        cmocka_unit_test(an_answer_has_the_same_bytes_for_any_number_of_workers),
+        cmocka_unit_test(all_workers_make_an_ensemble_together),
+        cmocka_unit_test(a_study_stops_within_100_ms_of_work),
+        cmocka_unit_test(an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing),
+        cmocka_unit_test(an_ensemble_that_was_interrupted_begins_again),
+        cmocka_unit_test(studies_of_two_clients_both_get_on),
+        cmocka_unit_test(single_jobs_go_between_the_members_of_an_ensemble),
+        cmocka_unit_test(studies_wait_where_much_is_held),
+    };
+    fourier_start();
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
