@@ -45,7 +45,8 @@ static void clocks_go_forward_in_their_units(void **state) {
     while (clock_monotonic_ns() - started < 20000000)
         sum = sum + 1;
     assert_true(clock_thread_cpu_ns() > cpu);
-    assert_true(clock_unix_ms() - day >= 15 && clock_unix_ms() - day < 10000);
+    // The date may be set meanwhile, even back.
+    assert_true(clock_unix_ms() - day < 10000);
     assert_true(day > 1700000000000);
 }
 
