@@ -5,22 +5,7 @@
 #define CORE_BASE_POINTER_H
 
 #include "core/base/field.h"
-
-// One number, text or truth value. The text is borrowed.
-typedef enum ScalarKind { SCALAR_NUMBER, SCALAR_TEXT, SCALAR_FLAG } ScalarKind;
-typedef struct Scalar {
-    ScalarKind kind;
-    double number;
-    uint64_t whole; // the number, where it is whole and at least 0; else COUNT_ABSENT
-    const char *text;
-    bool flag;
-} Scalar;
-
-Scalar scalar_number(double number);
-
-// Reads JSON text as codec/ keeps it under FIELD_SCALARS. A text's characters go to `room`, which
-// is as long as `json`. False if it is none.
-bool scalar_read(const char *json, Scalar *value, char *room);
+#include "core/base/scalar.h"
 
 enum { POINTER_SENTENCE = 240 };
 

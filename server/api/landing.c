@@ -85,7 +85,7 @@ static void write_line(Bytes *bytes, const char *line, const char *url) {
 }
 
 static void write_text(Bytes *bytes, const char *url) {
-    bytes_format(bytes, "impactd %s: simulations of impact dampers over HTTP and JSON\n",
+    bytes_format(bytes, "# impactd %s: simulations of impact dampers over HTTP and JSON\n",
                  program_version);
     for (size_t i = 0; i < COUNT(steps); i++) {
         if (steps[i].what != NULL)

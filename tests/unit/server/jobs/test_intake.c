@@ -17,6 +17,7 @@
 
 #include "core/math/fourier.h"
 #include "server/jobs/intake.h"
+#include "server/jobs/intake_state.h"
 #include "server/store/database.h"
 #include "server/store/job_search.h"
 #include "tests/support/scratch.h"
@@ -698,22 +699,33 @@ static void limit_files(rlim_t size) {
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
 }
 
-// Until nothing is computed, so that only what could not be stored is unfinished.
+static int lift_limit(void **state) {
+    (void)state;
+    limit_files(RLIM_INFINITY);
+    return 0;
+}
+
+// Until nothing is computed and the store has answered whatever it was sent, so that only what
+// could not be stored is unfinished.
 static void wait_until_idle(Room *room) {
     IntakeTally tally;
-    do {
+    bool is_idle = false;
+    for (int i = 0; i < 60000 && !is_idle; i++) {
         nanosleep(&moment, NULL);
         intake_tally(room->intake, &tally);
-    } while (tally.queued + tally.running > 0);
-    for (int i = 0; i < 50; i++)
-        nanosleep(&moment, NULL);
+        pthread_mutex_lock(&room->intake->lock);
+        is_idle = tally.queued + tally.running + room->intake->posted == 0;
+        pthread_mutex_unlock(&room->intake->lock);
+    }
+    assert_true(is_idle);
 }
 
 static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     (void)state;
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
-    Job *job = submit(&room, 0.015, 2000), *dropped = submit(&room, 0.016, 2000);
+    // Long enough that they still run when there is no room any more.
+    Job *job = submit(&room, 0.015, 20000), *dropped = submit(&room, 0.016, 20000);
     limit_files(1);
     wait_until_idle(&room);
     intake_retry(room.intake);
@@ -726,7 +738,8 @@ static void a_result_that_there_is_no_room_for_waits_for_it(void **state) {
     job_drop(dismissed);
     limit_files(RLIM_INFINITY);
     intake_retry(room.intake);
-    wait_for(job);
+    wait_until_idle(&room);
+    assert_true(job_is_finished(job));
     JobShow now = show(job);
     assert_int_equal(now.state, JOB_SUCCESSFUL);
     assert_true(store_result_exists(room.store, now.result));
@@ -746,7 +759,7 @@ static void a_result_that_there_is_no_room_for_is_computed_again_after_a_restart
     (void)state;
     Room room = room_make(1);
     signal(SIGXFSZ, SIG_IGN);
-    Job *job = submit(&room, 0.015, 2000);
+    Job *job = submit(&room, 0.015, 20000);
     limit_files(1);
     wait_until_idle(&room);
     JobShow waits = show(job);
@@ -970,9 +983,9 @@ int main(void) {
         cmocka_unit_test(a_known_body_is_answered_with_a_job_of_its_own),
         cmocka_unit_test(a_dear_series_is_kept_and_outlasts_its_engine),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
-        cmocka_unit_test(a_result_that_there_is_no_room_for_waits_for_it),
-        cmocka_unit_test(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart),
-        cmocka_unit_test(a_job_that_cannot_be_kept_never_was),
+        cmocka_unit_test_teardown(a_result_that_there_is_no_room_for_waits_for_it, lift_limit),
+        cmocka_unit_test_teardown(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, lift_limit),
+        cmocka_unit_test_teardown(a_job_that_cannot_be_kept_never_was, lift_limit),
         cmocka_unit_test(a_job_that_is_done_before_it_was_written_is_written_once),
         cmocka_unit_test(whoever_waits_for_a_job_to_be_kept_is_woken),
         cmocka_unit_test(a_job_may_outlive_the_intake),
