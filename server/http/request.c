@@ -94,6 +94,7 @@ void request_close(Request *request) {
     request->storage = NULL;
 }
 
+// Of these the first value is kept.
 #define KEPT(name, member)                                                                         \
     { name, offsetof(Request, member) }
 static const struct {
