@@ -57,11 +57,12 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
 
 static Status refuse_choice(const Reader *reader, const char *typed, const char *value,
                             const Field *row) {
-    char all[160] = "one of ";
-    for (size_t i = 0; row->choices[i] != NULL; i++) {
-        const size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%s", i > 0 ? ", " : "", row->choices[i]);
-    }
+    static const char before[] = "one of ";
+    char all[160];
+    const size_t used = sizeof before - 1;
+    memcpy(all, before, sizeof before);
+    for (size_t i = 0; row->choices[i] != NULL; i++)
+        text_list(all + used, sizeof all - used, row->choices[i]);
     return refuse(reader, typed, value, row, all);
 }
 

@@ -26,7 +26,7 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
         const size_t used = strlen(there);
         if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0 &&
             used + sizeof column->name + 2 < sizeof there)
-            snprintf(there + used, sizeof there - used, "%s%s", used > 0 ? ", " : "", column->name);
+            text_list(there, sizeof there, column->name);
     }
     return problem_add(problem, STATUS_INVALID, "/channel",
                        "must be a sampled channel in %s; the result has: %s",

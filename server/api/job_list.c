@@ -86,8 +86,7 @@ static Status read_choice(const Request *request, const char *name, const char *
             *choice = i;
             return STATUS_OK;
         }
-        const size_t used = strlen(list);
-        snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", names[i]);
+        text_list(list, sizeof list, names[i]);
     }
     return problem_set(problem, STATUS_USAGE,
                        "the query parameter \"%s\" must be one of %s, is \"%.40s\"", name, list,

@@ -58,9 +58,7 @@ Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
     char known[96] = "";
     const char *types[16] = {NULL};
     for (size_t i = 0; encoders[i] != NULL && i + 1 < COUNT(types); i++) {
-        const size_t used = strlen(known);
-        snprintf(known + used, sizeof known - used, "%s%s", i > 0 ? ", " : "",
-                 encoders[i]->extension);
+        text_list(known, sizeof known, encoders[i]->extension);
         types[i] = encoders[i]->content_type;
         types[i + 1] = NULL;
     }

@@ -118,9 +118,9 @@ const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *
 void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
                          size_t size) {
     *target = '\0';
-    for (size_t length = 0; formats->extension != NULL && length < size; formats++) {
-        snprintf(target + length, size - length, "%s%s%s", length > 0 ? ", " : "", before,
-                 formats->extension);
-        length = strlen(target);
+    for (; formats->extension != NULL; formats++) {
+        char name[16];
+        snprintf(name, sizeof name, "%.4s%.8s", before, formats->extension);
+        text_list(target, size, name);
     }
 }

@@ -17,21 +17,8 @@
 enum { COLUMNS = 560, DOTS = 80 };
 static const double width = 640, left = 66, right = 622, panel = 110, gap = 34;
 
-static void put_style(Bytes *bytes) {
-    bytes_text(bytes,
-               "<style>\n"
-               "svg { font: 12px system-ui, sans-serif; color-scheme: light dark; }\n"
-               ".page { fill: #ffffff; } text { fill: #222222; }\n"
-               ".small { font-size: 10.5px; } .name { font-weight: 600; }\n"
-               ".grid { stroke: #dddddd; fill: none; } .frame { stroke: #777777; fill: none; }\n"
-               ".line { stroke: #0072b2; fill: none; stroke-width: 1.6; stroke-linejoin: round; }\n"
-               ".dot { fill: #0072b2; } .bad { fill: #9a9a9a; } .miss { stroke: #d55e00; }\n"
-               "@media (prefers-color-scheme: dark) {\n"
-               ".page { fill: #16181c; } text { fill: #e4e4e4; } .grid { stroke: #363a41; }\n"
-               ".frame { stroke: #8a8f98; } .line { stroke: #56b4e9; } .dot { fill: #56b4e9; }\n"
-               ".bad { fill: #5c6068; } .miss { stroke: #f0944d; }\n"
-               "}\n</style>\n");
-}
+static const char rules[] = ".small { font-size: 10.5px; } .name { font-weight: 600; }\n"
+                            ".bad { fill: #9a9a9a; } .miss { stroke: #d55e00; }\n";
 
 // Over the points' axis: to scale where all its values are numbers, else evenly.
 typedef struct Across {
@@ -100,7 +87,8 @@ static void put_dots(const SweepChart *chart, const Across *of, const SweepScale
                      const SweepSample *sample, const double *values, double top) {
     for (size_t i = 0; i < sample->cells; i++)
         if (!isnan(values[i]))
-            bytes_format(chart->bytes, "<circle class=\"dot\" cx=\"%.1f\" cy=\"%.1f\" r=\"2.4\"/>",
+            bytes_format(chart->bytes,
+                         "<circle class=\"mark s0\" cx=\"%.1f\" cy=\"%.1f\" r=\"2.4\"/>",
                          across_x(of, i), height_of(scale, values[i], top));
         else if (sample->is_there[i])
             bytes_format(chart->bytes, "<path class=\"miss\" d=\"M%.1f %.1fl5 5m0 -5l-5 5\"/>",
@@ -120,7 +108,7 @@ static void put_line(const SweepChart *chart, const Across *of, const SweepSampl
     }
     sweep_metric_name(chart->sweep, metric, name);
     put_frame(chart, &scale, name, top);
-    bytes_text(chart->bytes, "<path class=\"line\" d=\"");
+    bytes_text(chart->bytes, "<path class=\"line s0\" d=\"");
     for (size_t i = 0; i < sample->cells; i++) {
         const double x = across_x(of, i * of->group);
         if (!isnan(low[i])) {
@@ -198,28 +186,23 @@ bool chart_sweep(const Sweep *sweep, const SweepSource *source, Bytes *bytes) {
     Status status;
     const double bottom =
         is_map(sweep) ? sweep_put_maps(&chart, 56, &status) : put_lines(&chart, 62, &status);
-    bytes_format(
-        bytes,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n",
-        width, bottom + 6);
-    bytes_format(bytes, "<title>A sweep of %llu points</title>\n",
-                 (unsigned long long)sweep->points);
+    char text[96];
+    size_t length = 0;
+    snprintf(text, sizeof text, "A sweep of %llu points", (unsigned long long)sweep->points);
+    svg_open(bytes, width, bottom + 6, text);
     put_description(sweep, source->rows, bytes);
-    put_style(bytes);
-    bytes_format(bytes, "<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n", width,
-                 bottom + 6);
-    bytes_format(bytes, "<text x=\"%.0f\" y=\"26\" font-size=\"14\">", left);
+    svg_page(bytes, width, bottom + 6, rules);
     if (source->rows < sweep->points)
-        bytes_format(bytes, "%zu of ", source->rows);
-    bytes_format(bytes, "%llu points", (unsigned long long)sweep->points);
-    if (sweep->table.failed > 0)
-        bytes_format(bytes, ", %llu failed", (unsigned long long)sweep->table.failed);
-    bytes_text(bytes, "</text>\n");
+        length = (size_t)snprintf(text, sizeof text, "%zu of ", source->rows);
+    snprintf(text + length, sizeof text - length,
+             sweep->table.failed > 0 ? "%llu points, %llu failed" : "%llu points",
+             (unsigned long long)sweep->points, (unsigned long long)sweep->table.failed);
+    svg_heading(bytes, left, 26, text);
     if (picture.is_failed || status == STATUS_NO_MEMORY)
         bytes->is_failed = true;
     else
         bytes_put(bytes, picture.at, picture.count);
     bytes_clear(&picture);
-    bytes_text(bytes, "</svg>\n");
+    svg_close(bytes);
     return status != STATUS_CONFLICT;
 }

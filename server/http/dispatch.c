@@ -21,10 +21,8 @@ static Status check_queries(const Route *route, const Request *request, Problem 
             continue;
         const char *nearest = texts_nearest(allowed, name);
         char list[160] = "";
-        for (size_t k = 0; allowed[k] != NULL; k++) {
-            const size_t used = strlen(list);
-            snprintf(list + used, sizeof list - used, "%s%s", k > 0 ? ", " : "", allowed[k]);
-        }
+        for (size_t k = 0; allowed[k] != NULL; k++)
+            text_list(list, sizeof list, allowed[k]);
         if (nearest != NULL)
             return problem_set(problem, STATUS_USAGE,
                                "unknown query parameter \"%.40s\"; did you mean \"%s\"?", name,

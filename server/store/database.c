@@ -171,7 +171,7 @@ Status database_read_part(Database *database, const char *table, const char *col
     int code = sqlite3_blob_open(database->connection, "main", table, column, number, 0, &blob);
     const size_t bytes = code == SQLITE_OK ? (size_t)sqlite3_blob_bytes(blob) : 0;
     const size_t left = bytes > offset ? bytes - offset : 0;
-    if (code == SQLITE_OK)
+    if (left > 0)
         code = sqlite3_blob_read(blob, target, (int)(left < size ? left : size), (int)offset);
     (void)sqlite3_blob_close(blob);
     return code == SQLITE_OK ? STATUS_OK
