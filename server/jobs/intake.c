@@ -46,19 +46,8 @@ void intake_call_worker(Intake *intake) {
 }
 
 void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
-    Cost cost = {0};
     index_add(intake->in_flight, &computation->indexed);
-    // A series that is computed again needs no study.
-    if (computation->is_again)
-        cost = simulation_cost(&computation->inquiry.simulation);
-    else if (inquiry_cost(&computation->inquiry, &intake->settings.limits, &cost, NULL) !=
-             STATUS_OK)
-        cost.cpu_seconds = queue_quick; // the run will tell
-    computation->queued.seconds = cost.cpu_seconds;
-    // The members of a study have turns of their own.
-    computation->queued.charge = study_is_shared(computation)
-                                     ? simulation_cost(&computation->inquiry.simulation).cpu_seconds
-                                     : 0;
+    study_foretell(computation, &intake->settings.limits);
     if (client == NULL)
         queue_urge(intake->queue, &computation->queued);
     else

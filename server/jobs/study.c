@@ -24,6 +24,17 @@ bool study_is_shared(const Computation *computation) {
     return study != NULL && !computation->is_again && study_kind(study)->members != NULL;
 }
 
+void study_foretell(Computation *computation, const SimulationLimits *limits) {
+    const Inquiry *inquiry = &computation->inquiry;
+    const Cost own = simulation_cost(&inquiry->simulation);
+    Cost whole = own;
+    // A series that is computed again needs no study.
+    if (!computation->is_again && inquiry_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
+        whole.cpu_seconds = queue_quick; // the run will tell
+    computation->queued.seconds = whole.cpu_seconds;
+    computation->queued.charge = study_is_shared(computation) ? own.cpu_seconds : 0;
+}
+
 void shift_free(StudyRun *run, Shift *shift) {
     if (shift == NULL)
         return;

@@ -48,6 +48,9 @@ struct StudyRun {
 
 // Whether its study has members, which are shared out.
 bool study_is_shared(const Computation *computation);
+// What it will take and what of that its client is charged for when it begins, for the queue: the
+// members of a study have turns of their own.
+void study_foretell(Computation *computation, const SimulationLimits *limits);
 
 // Makes ready: a worker's part of the way, until there are members to be shared out. Fills
 // findings->answer and computation->study. Stops when `watch` says so.

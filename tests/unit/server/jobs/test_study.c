@@ -17,9 +17,9 @@
 #include "tests/support/room.h"
 
 #if defined __SANITIZE_THREAD__ || defined __SANITIZE_ADDRESS__
-enum { SLOWER = 20 }; // instrumented code takes many times the CPU
+enum { SLOWER = 20, FEWER = 8 }; // instrumented code takes many times the CPU
 #else
-enum { SLOWER = 1 };
+enum { SLOWER = 1, FEWER = 1 };
 #endif
 
 static Problem problem;
@@ -208,7 +208,7 @@ static void all_workers_make_an_ensemble_together(void **state) {
     Room room = room_make(3);
     char text[1024], id[40], result[72];
     size_t most = 0;
-    ensemble(text, 4000, 20);
+    ensemble(text, 4000 / FEWER, 20);
     room_submit(&room, text, NULL, id);
     while (most < 3) {
         const size_t now = busy(&room);
@@ -328,11 +328,11 @@ static void assert_both_get_on(const char *one, const char *other) {
 static void studies_of_two_clients_both_get_on(void **state) {
     (void)state;
     char one[1024], other[1024];
-    room_sweep(one, sizeof one, 4000, 20);
-    room_sweep(other, sizeof other, 4000, 20.5);
+    room_sweep(one, sizeof one, 4000 / FEWER, 20);
+    room_sweep(other, sizeof other, 4000 / FEWER, 20.5);
     assert_both_get_on(one, other);
-    ensemble(one, 1000, 20);
-    ensemble(other, 1000, 20.5);
+    ensemble(one, 1000 / FEWER, 20);
+    ensemble(other, 1000 / FEWER, 20.5);
     assert_both_get_on(one, other);
     assert_both_get_on(other, one);
 }
@@ -341,7 +341,7 @@ static void single_jobs_go_between_the_members_of_an_ensemble(void **state) {
     (void)state;
     Room room = room_make(1);
     char text[1024], id[40], single[40], result[72];
-    ensemble(text, 8000, 20);
+    ensemble(text, 8000 / FEWER, 20);
     room_submit(&room, text, NULL, id);
     while (busy(&room) == 0)
         room_nap(100000);
@@ -359,7 +359,7 @@ static void studies_wait_where_much_is_held(void **state) {
     Room room = room_make(1);
     char text[1024], ids[3][40], result[72];
     for (int i = 0; i < 2; i++) {
-        ensemble(text, 4000, 20 + i);
+        ensemble(text, 4000 / FEWER, 20 + i);
         room_submit(&room, text, NULL, ids[i]);
     }
     while (share_of(&room, ids[0]) < 0.15 || share_of(&room, ids[1]) < 0.15)
