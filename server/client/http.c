@@ -247,8 +247,8 @@ static Status failure_tell(const Transfer *transfer, CURLcode code, Problem *pro
                            url, curl_easy_strerror(code));
     case CURLE_UNSUPPORTED_PROTOCOL:
     case CURLE_WEIRD_SERVER_REPLY:
-        return problem_set(problem, STATUS_UNREACHABLE, "what answers at %s does not speak HTTP%s%s",
-                           url, hint, hinted);
+        return problem_set(problem, STATUS_UNREACHABLE,
+                           "what answers at %s does not speak HTTP%s%s", url, hint, hinted);
     case CURLE_OPERATION_TIMEDOUT:
         return problem_set(problem, STATUS_UNREACHABLE, "%s has been silent for too long", url);
     case CURLE_OUT_OF_MEMORY:
@@ -307,6 +307,9 @@ static CURLcode exchange(Transfer *transfer, const char *url, struct curl_slist 
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)HTTP_SILENCE);
     curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
+    if (ask->within > 0)
+        curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS,
+                         ask->within < 1e6 ? (long)(1000 * ask->within) + 1 : 0L);
     if (http->is_loopback) // a proxy of the environment is not meant for these
         curl_easy_setopt(curl, CURLOPT_PROXY, "");
     if (http->ca_file != NULL)
