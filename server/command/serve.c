@@ -14,6 +14,7 @@
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
+#include "server/base/journal.h"
 #include "server/base/notify.h"
 #include "server/base/process.h"
 #include "server/command/data_folder.h"
@@ -169,7 +170,10 @@ static void run_until_stopped(App *app, Listener *listener, const ServeSettings 
     notify_send("STOPPING=1");
     atomic_store(&app->is_stopping, true);
     let_signals_kill(stops);
-    fprintf(stderr, "impactd: %s, stopping\n", signal == SIGINT ? "interrupted" : "asked to end");
+    Bytes line = {0};
+    bytes_text(&line, signal == SIGINT ? "interrupted, stopping" : "asked to end, stopping");
+    journal_write(&line);
+    bytes_clear(&line);
 }
 
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
