@@ -14,6 +14,7 @@
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
+#include "server/base/journal.h"
 #include "server/base/notify.h"
 #include "server/base/process.h"
 #include "server/command/data_folder.h"
@@ -187,10 +188,13 @@ static void run_until_stopped(App *app, Listener *listener, const ServeSettings 
     notify_send("STOPPING=1");
     atomic_store(&app->is_stopping, true);
     let_signals_kill(signals);
-    fprintf(stderr, "impactd: %s, stopping\n",
-            signal == SIGINT   ? "interrupted"
-            : signal == SIGHUP ? "its terminal is gone"
-                               : "asked to end");
+    Bytes line = {0};
+    bytes_format(&line, "%s, stopping",
+                 signal == SIGINT   ? "interrupted"
+                 : signal == SIGHUP ? "its terminal is gone"
+                                    : "asked to end");
+    journal_write(&line);
+    bytes_clear(&line);
 }
 
 static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {

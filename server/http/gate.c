@@ -175,6 +175,8 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
         return refuse(problem, 414, "the target is longer than 4096 bytes");
     if (has_control(target, strlen(target)))
         return refuse(problem, 400, "the target holds a control character");
+    if (strchr(target, ' ') != NULL)
+        return refuse(problem, 400, "the target holds a space; write it as %20");
     const char *fault = path_fault(target);
     if (fault != NULL)
         return refuse(problem, 400, fault);

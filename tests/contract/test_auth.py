@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tokens and scopes, Host names, base URL, request ids, headers, settings together, the daemon's end: as clients meet them."""
 
+import contextlib
 import fcntl
 import http.client
 import json
@@ -389,6 +390,45 @@ def test_the_journal_has_a_line_per_request_and_no_secrets():
         daemon.get("/none")
         daemon.stop()
         assert "request=" not in daemon.stderr()
+
+
+def test_a_journal_that_nobody_reads_holds_up_nobody():
+    """Standard error is a full pipe: requests are answered, SIGTERM ends the daemon; once it is read, what was lost is told."""
+    taken, full = os.pipe()
+    os.set_blocking(full, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(full, b"0" * 4096)
+    os.set_blocking(full, True)
+    with tempfile.TemporaryDirectory() as data:
+        process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", data, "--journal", "all"],
+                                   stdout=subprocess.PIPE, stderr=full, text=True)
+        os.close(full)
+        try:
+            port = int(re.search(r":(\d+)$", process.stdout.readline())[1])
+
+            def ask():
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+                connection.request("GET", "/version")
+                code = connection.getresponse().status
+                connection.close()
+                return code
+
+            assert [ask() for _ in range(20)] == 20 * [200]
+            os.set_blocking(taken, False)
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    os.read(taken, 4096)
+            os.set_blocking(taken, True)
+            assert ask() == 200
+            assert os.read(taken, 4096).startswith(b"impactd: 20 lines were lost")
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+            os.close(taken)
 
 
 def test_settings_that_contradict_each_other_do_not_start():

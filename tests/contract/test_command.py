@@ -273,6 +273,24 @@ def test_progress_bar_on_a_terminal():
         assert on_a_terminal(file.read(), 20) == ""
 
 
+def test_no_file_takes_a_closed_streams_place():
+    """A daemon without standard streams: what it would print there stands in none of its files."""
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.Popen(["sh", "-c", 'exec "$0" serve --listen 127.0.0.1:0 --data "$1" <&- >&- 2>&-',
+                                    program.impactd(), folder])
+        try:
+            lock, end = os.path.join(folder, "impactd.lock"), time.monotonic() + 20
+            while not os.path.exists(os.path.join(folder, "impactd.late")) and time.monotonic() < end:
+                time.sleep(0.05)
+            files = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
+            assert files == 3 * ["/dev/null"], files
+            with open(lock, encoding="ascii") as file:
+                assert file.read() == f"{process.pid}\n"
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0
+
+
 def test_version():
     """`version` and --version print the versions that the daemon tells."""
     code, out, errors = program.run("version")

@@ -89,6 +89,8 @@ def test_ambiguous_heads_are_refused_and_the_connection_closed():
         (400, b"OPTIONS * HTTP/1.1\r\n" + HOST),
         (400, b"GET http://localhost/version HTTP/1.1\r\n" + HOST),
         (400, b"GET version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version?a=b c HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version HTTP/1.0 HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/%2e%2e/version HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/.%2E/version HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/../version HTTP/1.1\r\n" + HOST),
