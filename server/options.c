@@ -362,8 +362,8 @@ void options_print(const Field *fields, const void *item, const Options *options
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
         // "config" and "print_config" are about the file, not of it.
-        const bool is_for_file = strstr(row->name, "config") == NULL;
-        fprintf(file, "%s%s = ", is_set && is_for_file ? "" : "# ", row->name);
+        fprintf(file, "%s%s = ", is_set && strstr(row->name, "config") == NULL ? "" : "# ",
+                row->name);
         if (is_set)
             value_print(row, item, file);
         fprintf(file, "  # %s\n", origin_names[options->origins[row - fields]]);
