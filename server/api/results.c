@@ -9,6 +9,7 @@
 #include "server/api/app.h"
 #include "server/api/studies.h"
 #include "server/base/clock.h"
+#include "server/base/digest.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
@@ -71,13 +72,23 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
     bytes_text(bytes, "}");
 }
 
-static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer) {
+// What the scene did not ask for is not linked to.
+static bool is_there(const char *way, const Output *output) {
+    if (strncmp(way, "psd", 3) == 0)
+        return output->psd.channels.count > 0;
+    return output->impacts || strncmp(way, "impacts", 7) != 0;
+}
+
+static void write_links(Bytes *bytes, const char *id, const Output *output,
+                        const StudyAnswer *answer) {
     static const char *const ways[] = {
         "manifest",    "series.json", "series.csv",  "series.npy", "series.npz",   "series.mat",
         "psd.json",    "psd.csv",     "psd.npz",     "psd.mat",    "impacts.json", "impacts.csv",
         "impacts.npz", "impacts.mat", "energy.json", "energy.csv", "bundle.zip"};
     bytes_format(bytes, "{\"self\": \"%s/v1/results/%s\"", link_base(), id);
     for (size_t i = 0; i < COUNT(ways); i++) {
+        if (!is_there(ways[i], output))
+            continue;
         // "series" is the JSON one; the other formats are named in full.
         const size_t size =
             strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
@@ -85,8 +96,9 @@ static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer)
                      id, ways[i]);
     }
     // A template (RFC 6570): the impact's place in the ledger, from 1.
-    bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
-                 link_base(), id);
+    if (output->impacts)
+        bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
+                     link_base(), id);
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
         const bool is_table = answer->study->kind == study_sweep.answer;
@@ -133,7 +145,7 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     else
         bytes_text(bytes, "null");
     bytes_text(bytes, ", \"links\": ");
-    write_links(bytes, row->id, answer);
+    write_links(bytes, row->id, &simulation->output, answer);
     bytes_text(bytes, "}\n");
 }
 
@@ -243,13 +255,25 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
     return status;
 }
 
+bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
+                    const Bytes *content) {
+    char digits[65] = "", tag[104];
+    Digest *digest = digest_new();
+    if (digest != NULL) {
+        digest_take(digest, content->at, content->count);
+        digest_end(digest, digits);
+    }
+    snprintf(tag, sizeof tag, "%.72s-%.8s-%.16s", row->id, what, digits);
+    return reply_tagged(reply, request, tag);
+}
+
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     else
         bytes_clear(&bytes);

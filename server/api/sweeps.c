@@ -48,6 +48,8 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
         else
             format->write((const Variant *)(const void *)show.sweep, &bytes);
         status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
+        // Of rows that still come there is no part that fits the next.
+        reply->accepts_ranges = format->is_binary && show.is_complete;
     }
     sweep_show_clear(&show);
     return status;

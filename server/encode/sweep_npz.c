@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "server/encode/npy.h"
+#include "server/encode/sweep_columns.h"
 #include "server/encode/zip.h"
 
 enum { PIECE = 1 << 16 };
@@ -80,13 +81,6 @@ static const char *status_text(const Sweep *sweep, size_t column, size_t row, si
     return name;
 }
 
-static bool is_numeric(const SweepTold *axis) {
-    for (size_t i = 0; i < axis->values.count; i++)
-        if (strchr("-0123456789", axis->values.at[i][0]) == NULL)
-            return false;
-    return true;
-}
-
 // `column`: room for one column of each of all.
 static void put_columns(Archive *archive, double *column) {
     const Sweep *sweep = archive->sweep;
@@ -94,7 +88,7 @@ static void put_columns(Archive *archive, double *column) {
     put_numbers(archive, "index", sweep->table.points.at);
     for (size_t i = 0; i < sweep->axes.count; i++) {
         const SweepTold *axis = &sweep->axes.at[i];
-        if (!is_numeric(axis)) {
+        if (!sweep_axis_is_numeric(axis)) {
             put_texts(archive, axis->pointer, axis_text, i);
             continue;
         }
@@ -129,7 +123,8 @@ static void copy(const Layout *layout, Bytes *bytes) {
 
 void sweep_npz(const Sweep *sweep, Bytes *bytes) {
     Layout layout = {0};
-    Archive archive = {.sweep = sweep, .rows = sweep->table.points.count, .zip = {.layout = &layout}};
+    Archive archive = {
+        .sweep = sweep, .rows = sweep->table.points.count, .zip = {.layout = &layout}};
     const size_t columns = sweep->axes.count + sweep->metrics.count;
     double *room = calloc(archive.rows * columns + 1, sizeof *room);
     if (room == NULL)
