@@ -36,7 +36,7 @@ still=()
 if setarch "$(uname -m)" -R true 2>/dev/null; then still=(setarch "$(uname -m)" -R); fi
 
 for preset in "${presets[@]}"; do
-    echo "== $preset"
+    echo "== $preset (at $SECONDS s)"
     if ! { cmake --preset "$preset" -DIMPACTD_TESTS=ON && cmake --build --preset "$preset"; } >"$log" 2>&1; then
         tail -n 60 "$log"
         echo "FAIL  the $preset build"
@@ -69,7 +69,7 @@ begin() {
 
 # FILE PRESET: runs one Python test of a build and adds its count.
 ask() {
-    echo "-- $1 ($2)"
+    echo "-- $1 ($2, at $SECONDS s)"
     local code
     local -a runner=()
     if [ -n "${beside[$1 $2]-}" ]; then
@@ -114,5 +114,6 @@ if [[ " ${presets[*]} " == *" tsan "* ]]; then
 fi
 
 echo
+echo "took $SECONDS s"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]

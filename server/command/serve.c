@@ -35,7 +35,8 @@ typedef struct ServeSettings {
     bool require_tokens, print_config;
 } ServeSettings;
 
-enum { GRACE_MS = 1500, ASIDES = 2 }; // ASIDES: runs for readers at once
+// ASIDES: runs for readers at once. HOT_SHARE: whole answers take such a part of the cache's bytes.
+enum { GRACE_MS = 1500, ASIDES = 2, HOT_SHARE = 4 };
 
 #define MIB ((double)(1 << 20))
 
@@ -54,7 +55,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "CPU time a scene may be foretold to take; it is refused beyond, and stopped at about three times as much"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "memory a scene may be foretold to take; it is refused beyond"),
     FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "points a sweep may have"),
-    FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for finished results"),
+    FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "memory for what is kept ready: whole answers a quarter, results the rest"),
     FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk for series that are dearer to compute than to read"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "finished jobs are kept so long, with the results that no later job names; 0: for ever"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "finished jobs kept, the oldest go first; 0: all"),
@@ -174,7 +175,8 @@ static void run_until_stopped(App *app, Listener *listener, const ServeSettings 
 static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
     Doorman doorman = {.journal = (JournalMode)settings->journal};
-    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new((size_t)64 << 20), &doorman};
+    const size_t hot_bytes = settings->cache_bytes / HOT_SHARE;
+    Dispatcher dispatcher = {&app, routes, quick_handlers, hot_new(hot_bytes), &doorman};
     ListenerSettings door = {.body_most = settings->max_body,
                              .answer_at_once = dispatch_at_once,
                              .answer = dispatch,
@@ -184,7 +186,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     const IntakeSettings work = {.workers = settings->workers,
                                  .queue_most = settings->queue,
                                  .queue_bytes = settings->queue_bytes,
-                                 .cache_bytes = settings->cache_bytes,
+                                 .cache_bytes = settings->cache_bytes - hot_bytes,
                                  .store_bytes = settings->store_bytes,
                                  .quota = settings->quota,
                                  .rate = settings->rate,

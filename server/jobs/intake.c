@@ -11,7 +11,7 @@
 // Of scenes that wait, where the settings say nothing.
 static const size_t queue_bytes_usual = (size_t)256 << 20;
 
-enum { KNOWN_SHARE = 8 }; // of the cache's bytes, for ready answers
+enum { KNOWN_SHARE = 8 }; // of the cache's bytes: answers to known bodies
 
 Computation *computation_new(const char *result) {
     Computation *computation = calloc(1, sizeof *computation);
@@ -192,9 +192,9 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
     pthread_cond_init(&intake->settled, NULL);
     intake->jobs = index_new();
     intake->in_flight = index_new();
-    intake->cache = cache_new(settings->cache_bytes);
-    intake->known = known_new(settings->known_bytes > 0 ? settings->known_bytes
-                                                        : settings->cache_bytes / KNOWN_SHARE);
+    const size_t known_bytes = settings->cache_bytes / KNOWN_SHARE;
+    intake->cache = cache_new(settings->cache_bytes - known_bytes);
+    intake->known = known_new(known_bytes);
     intake->workers = calloc(settings->workers + 1, sizeof *intake->workers);
     Status status = STATUS_OK;
     if (intake->jobs == NULL || intake->in_flight == NULL || intake->cache == NULL ||

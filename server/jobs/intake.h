@@ -14,11 +14,10 @@ typedef struct IntakeSettings {
     size_t workers;     // threads, at least 1
     size_t queue_most;  // unfinished jobs at most
     size_t queue_bytes; // of their scenes at most; 0: 256 MiB
-    size_t cache_bytes; // of finished outcomes in memory
+    size_t cache_bytes; // in memory, of finished outcomes and of answers to bodies that came before
     size_t quota;       // unfinished jobs of one client by name; 0: as many as the queue takes
     double rate;        // jobs a minute of one client by name; 0: any number
     Waker deleted;      // called after results were deleted; `wake` may be NULL
-    size_t known_bytes; // of ready answers in memory; 0: an eighth of cache_bytes
     size_t store_bytes; // of series in the database, those that are dearer to compute than to read
     SimulationLimits limits;
 } IntakeSettings;
