@@ -45,10 +45,23 @@ void process_facts(ProcessFacts *facts) {
         facts->open_files_most = limit.rlim_cur;
 }
 
-// By default the C library keeps, for each of its up to 8 arenas a core, twice the largest block
-// that was ever freed: after one study of 20 MB, 40 MB for every few threads.
+// By default the C library has up to 8 arenas a processor and keeps, for each, twice the largest
+// block that was ever freed. More arenas than processors only spread the holes: with 2 for 28
+// threads 95 MB stayed resident where 190 MB did.
 void process_return_memory(void) {
     enum { KEPT = 8 << 20 };
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    mallopt(M_ARENA_MAX, processors > 2 && processors < 1024 ? (int)processors : 2);
     mallopt(M_MMAP_THRESHOLD, KEPT);
     mallopt(M_TRIM_THRESHOLD, KEPT);
+}
+
+// Small blocks in use keep the free ones between them from going back by themselves.
+void process_trim_memory(uint64_t *taken) {
+    enum { PAGES = 4096 }; // 16 MB, in some milliseconds
+    struct rusage usage = {0};
+    if (getrusage(RUSAGE_SELF, &usage) != 0 || (uint64_t)usage.ru_minflt - *taken < PAGES)
+        return;
+    malloc_trim(0);
+    *taken = (uint64_t)usage.ru_minflt;
 }

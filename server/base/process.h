@@ -1,5 +1,6 @@
 // What the system says of this process, and how it deals with its memory. Not what is in that
-// memory: every cache has a budget of its own. Used by api/metrics.c and command/serve.c.
+// memory: every cache has a budget of its own. Used by api/metrics.c, command/serve.c and the
+// keeper.
 #ifndef SERVER_BASE_PROCESS_H
 #define SERVER_BASE_PROCESS_H
 
@@ -11,7 +12,10 @@ typedef struct ProcessFacts {
 } ProcessFacts;
 void process_facts(ProcessFacts *facts); // 0 where the system does not tell
 
-// From here on what is freed soon goes back to the system, whichever thread it was that freed it.
+// From here on large blocks that are freed go back to the system, whichever thread freed them.
 void process_return_memory(void);
+// Gives back whole pages between blocks in use, if enough pages were taken since the last time;
+// that is `*taken`, 0 at first.
+void process_trim_memory(uint64_t *taken);
 
 #endif

@@ -1,6 +1,7 @@
 // Every second it has the intake try again what there was no room for. Every few seconds it looks
-// for what is to go, and goes on at once while there is something to remove, with a pause
-// between the steps in which others write. What cannot be removed now is tried again the next time.
+// for what is to go, in the store and in memory, and goes on at once while there is something to
+// remove, with a pause between the steps in which others write. What cannot be removed now is tried
+// again the next time.
 #include "server/jobs/keeper.h"
 
 #include <pthread.h>
@@ -8,6 +9,7 @@
 #include <time.h>
 
 #include "server/base/clock.h"
+#include "server/base/process.h"
 
 enum { LOOK_MS = 5000, PAUSE_MS = 10, RETRY_MS = 1000 };
 
@@ -38,6 +40,7 @@ static bool pause_for(Keeper *keeper, int64_t until_ns) {
 static void *work(void *context) {
     Keeper *keeper = context;
     int64_t next_ns = 0; // to look for what is to go
+    uint64_t pages = 0;
     do {
         intake_retry(keeper->intake);
         if (clock_monotonic_ns() < next_ns)
@@ -47,6 +50,7 @@ static void *work(void *context) {
         for (size_t i = 0; status == STATUS_OK && i < removed.results; i++)
             intake_forget(keeper->intake, removed.result[i]);
         const int64_t pause_ms = status == STATUS_OK && removed.is_more ? PAUSE_MS : LOOK_MS;
+        process_trim_memory(&pages);
         next_ns = clock_monotonic_ns() + pause_ms * 1000000;
     } while (pause_for(keeper, next_ns));
     return NULL;

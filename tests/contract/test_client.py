@@ -21,6 +21,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 SANITIZED = True
+WAITS = True
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
 
 

@@ -13,6 +13,8 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
+WAITS = True
+
 ASYNC = {"Prefer": "respond-async"}
 
 

@@ -43,8 +43,9 @@ def record(method, path, headers, body, reply):
             "body": base64.b64encode(body).decode() if body is not None and len(body) < 1 << 20 else None,
             "status": reply.status, "answer_headers": reply.headers, "size": len(reply.body),
             "answer": base64.b64encode(reply.body).decode() if is_text else None}
-    with open(target, "a", encoding="utf-8") as file:
-        file.write(json_module.dumps(line) + "\n")
+    # One append each: tests run beside others.
+    with open(target, "ab", buffering=0) as file:
+        file.write(json_module.dumps(line).encode() + b"\n")
 
 
 class Daemon:
