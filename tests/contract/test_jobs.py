@@ -335,6 +335,27 @@ def test_a_result_is_deleted_and_its_jobs_say_so():
         daemon.request("DELETE", f"/v1/jobs/{running}")
 
 
+def test_a_page_whose_place_is_gone_goes_on():
+    """Retention between two pages: the next page has what is still there behind that place, no 404."""
+    folder = tempfile.mkdtemp(prefix="impactd-jobs-")
+    try:
+        with program.daemon(data=folder) as daemon:
+            for i in range(8):
+                daemon.submit(quick(i))
+            link = daemon.get("/v1/jobs?limit=6").headers["link"]
+            place = link[1:link.index(">")]
+            assert len(ids(daemon.get(place))) == 2
+        with program.daemon("--keep-jobs", "3", data=folder) as daemon:
+            end = time.monotonic() + 60
+            while len(ids(daemon.get("/v1/jobs"))) > 3 and time.monotonic() < end:
+                time.sleep(0.2)
+            reply = daemon.get(place)
+            assert reply.status == 200 and ids(reply) == [] and "link" not in reply.headers, reply
+            assert daemon.get("/v1/jobs?before=j-7f3a").status == 404
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def test_what_is_not_to_be_kept_goes():
     """--keep-jobs: the oldest finished jobs go, and the results that no job names any more."""
     folder = tempfile.mkdtemp(prefix="impactd-jobs-")
