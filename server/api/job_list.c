@@ -10,6 +10,7 @@
 #include "server/api/job_document.h"
 #include "server/base/clock.h"
 #include "server/http/reply.h"
+#include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100, TEXT_MOST = 100 };
@@ -121,6 +122,8 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     TRY(read_choice(request, "status", job_state_names, -1, state, problem));
     TRY(read_choice(request, "kind", kinds, -1, &kind, problem));
     TRY(read_text(request, "before", &search->before, problem));
+    if (search->before != NULL)
+        search->before_unix_ms = job_id_unix_ms(search->before);
     TRY(read_text(request, "q", &search->words, problem));
     TRY(read_text(request, "label", &search->label, problem));
     TRY(read_text(request, "result", &search->result, problem));
@@ -193,6 +196,7 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
             return STATUS_OK;
         }
         search.before = before;
+        search.before_unix_ms = job_id_unix_ms(before);
     }
 }
 

@@ -283,7 +283,8 @@ Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     double wait;
-    TRY(request_number(request, "wait", 0, wait_most, 0, &wait, problem));
+    TRY(request_number(request, "wait", 0, 1e9, 0, &wait, problem));
+    wait = wait < wait_most ? wait : wait_most; // as that of Prefer
     if (request->kept != NULL)
         job = pause_end(request->kept, reply);
     else

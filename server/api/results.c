@@ -9,6 +9,7 @@
 #include "server/api/app.h"
 #include "server/api/studies.h"
 #include "server/base/clock.h"
+#include "server/base/digest.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
@@ -260,13 +261,25 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
     return status;
 }
 
+bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
+                    const Bytes *content) {
+    char digits[65] = "", tag[104];
+    Digest *digest = digest_new();
+    if (digest != NULL) {
+        digest_take(digest, content->at, content->count);
+        digest_end(digest, digits);
+    }
+    snprintf(tag, sizeof tag, "%.72s-%.8s-%.16s", row->id, what, digits);
+    return reply_tagged(reply, request, tag);
+}
+
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     else
         bytes_clear(&bytes);

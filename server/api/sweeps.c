@@ -11,7 +11,7 @@
 #include "server/encode/answer.h"
 #include "server/encode/chart_sweep.h"
 #include "server/encode/encoding.h"
-#include "server/encode/sweep_npz.h"
+#include "server/encode/sweep_columns.h"
 #include "server/encode/sweep_table.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
@@ -49,6 +49,7 @@ typedef struct Sending {
     Bytes made;
     size_t taken; // of that
     bool is_last;
+    const Encoder *encoder; // of an archive; NULL: NPZ
     SweepArchive archive;
     Encoding *encoding;
 } Sending;
@@ -111,7 +112,10 @@ static Status begin_text(Sending *sending, Problem *problem) {
 
 static Status begin_archive(Sending *sending, Problem *problem) {
     Layout layout = {0};
-    const Status status = sweep_npz_lay(&sending->archive, &layout, problem);
+    const Status status =
+        sending->encoder != NULL
+            ? sweep_columns_lay(&sending->archive, sending->encoder, &layout, problem)
+            : sweep_npz_lay(&sending->archive, &layout, problem);
     if (status != STATUS_OK) {
         layout_clear(&layout);
         return status == STATUS_CONFLICT ? refuse_changed(problem) : status;
@@ -138,7 +142,8 @@ static Status send(Reply *reply, const char *content_type, Sending *sending, Pro
         return status;
     }
     reply_borrow(reply, 200, content_type, NULL, 0);
-    reply->accepts_ranges = sending->encoding != NULL;
+    // Of rows that still come there is no part that fits the next.
+    reply->accepts_ranges = sending->encoding != NULL && sending->show.is_complete;
     reply->stream = sending->encoding != NULL ? (Stream){.next = archive_next,
                                                          .size = encoding_size(sending->encoding),
                                                          .cut = archive_cut}
@@ -177,6 +182,8 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
     sending->next = strcmp(format->extension, "json") == 0  ? sweep_json_next
                     : strcmp(format->extension, "csv") == 0 ? sweep_csv_next
                                                             : NULL;
+    if (strcmp(format->extension, "npz") != 0)
+        sending->encoder = encoder_find(format->extension);
     return send(reply, format->content_type, sending, problem);
 }
 

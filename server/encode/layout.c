@@ -170,6 +170,16 @@ void layout_read(const Layout *layout, uint64_t start, void *target, size_t size
     }
 }
 
+void layout_write(const Layout *layout, Bytes *bytes) {
+    if (layout->is_failed) {
+        bytes->is_failed = true;
+    } else if (bytes_reserve(bytes, (size_t)layout->size)) {
+        layout_read(layout, 0, bytes->at + bytes->count, (size_t)layout->size);
+        bytes->count += (size_t)layout->size;
+        bytes->at[bytes->count] = '\0';
+    }
+}
+
 uint32_t layout_crc32(const Layout *layout) {
     uint32_t crc = 0;
     double numbers[CHUNK];

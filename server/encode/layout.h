@@ -47,6 +47,7 @@ void layout_join(Layout *layout, const Layout *other); // behind; borrows what `
 
 // Copies `size` bytes from `start` on; both within the document.
 void layout_read(const Layout *layout, uint64_t start, void *target, size_t size);
-uint32_t layout_crc32(const Layout *layout); // of the whole
+void layout_write(const Layout *layout, Bytes *bytes); // appends the whole
+uint32_t layout_crc32(const Layout *layout);           // of the whole
 
 #endif

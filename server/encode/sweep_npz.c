@@ -28,13 +28,22 @@ static const char *bare(const char *json, size_t *length) {
     return json + is_quoted;
 }
 
+static bool is_numeric(const Texts *values) {
+    for (size_t i = 0; i < values->count; i++)
+        if (strchr("-0123456789", values->at[i][0]) == NULL)
+            return false;
+    return true;
+}
+
 // Turns what the source has in a column's place into the column's own numbers.
 static void finish(const SweepArchive *archive, size_t column, double *values, size_t count) {
     if (column < first_axis(archive))
         return;
+    const size_t axis = column - first_axis(archive);
+    const bool is_place = archive->is_places && !is_numeric(&archive->sweep->axes.at[axis].values);
     for (size_t i = 0; i < count; i++)
-        values[i] =
-            strtod(sweep_axis_text(archive->sweep, column - first_axis(archive), values[i]), NULL);
+        values[i] = is_place ? (double)sweep_value_index(archive->sweep, axis, (size_t)values[i])
+                             : strtod(sweep_axis_text(archive->sweep, axis, values[i]), NULL);
 }
 
 // Bytes skip ... skip + size - 1 of the text of a row, filled up with zeros.
@@ -50,7 +59,7 @@ static void put_text(const SweepArchive *archive, size_t column, double value, s
     memset(target + some, 0, size - some);
 }
 
-static void read_column(void *context, size_t column, uint64_t offset, void *target, size_t size) {
+void sweep_archive_read(void *context, size_t column, uint64_t offset, void *target, size_t size) {
     SweepArchive *archive = context;
     const SweepSource *source = archive->source;
     const size_t texts = width_of(archive, column), width = texts > 0 ? texts : sizeof(double);
@@ -111,13 +120,6 @@ static size_t longest(const Texts *values) {
     return most;
 }
 
-static bool is_numeric(const Texts *values) {
-    for (size_t i = 0; i < values->count; i++)
-        if (strchr("-0123456789", values->at[i][0]) == NULL)
-            return false;
-    return true;
-}
-
 static void measure(SweepArchive *archive) {
     const SweepTolds *axes = &archive->sweep->axes;
     for (size_t i = 0; i < axes->count && i < SWEEP_AXES; i++)
@@ -132,7 +134,7 @@ static void measure(SweepArchive *archive) {
 Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem) {
     const Sweep *sweep = archive->sweep;
     Zip zip = {.layout = layout};
-    archive->columns = (LayoutSource){read_column, archive};
+    archive->columns = (LayoutSource){sweep_archive_read, archive};
     measure(archive);
     Status status = put(archive, &zip, "index", SWEEP_CELL_POINT, problem);
     for (size_t i = 0; i < sweep->axes.count && status == STATUS_OK; i++)
@@ -149,12 +151,9 @@ void sweep_npz(const Sweep *sweep, Bytes *bytes) {
     const SweepSource source = sweep_source(sweep);
     SweepArchive archive = {.sweep = sweep, .source = &source};
     Layout layout = {0};
-    if (sweep_npz_lay(&archive, &layout, NULL) != STATUS_OK || layout.is_failed)
+    if (sweep_npz_lay(&archive, &layout, NULL) != STATUS_OK)
         bytes->is_failed = true;
-    else if (bytes_reserve(bytes, (size_t)layout.size)) {
-        layout_read(&layout, 0, bytes->at + bytes->count, (size_t)layout.size);
-        bytes->count += (size_t)layout.size;
-        bytes->at[bytes->count] = '\0';
-    }
+    else
+        layout_write(&layout, bytes);
     layout_clear(&layout);
 }

@@ -15,8 +15,12 @@ typedef struct SweepArchive {
     LayoutSource columns;
     size_t axis_widths[SWEEP_AXES]; // of texts; 0: numbers
     size_t status_width;
+    bool is_places; // texts are told by their place among the axis's values, from 0
     bool is_broken; // the source was: bytes read since are none of the archive's
 } SweepArchive;
+
+// Columns are numbered as in SweepSource, and the axes behind them. Reads from one of them.
+void sweep_archive_read(void *context, size_t column, uint64_t offset, void *target, size_t size);
 
 // `layout` borrows `archive`.
 Status sweep_npz_lay(SweepArchive *archive, Layout *layout, Problem *problem);

@@ -52,6 +52,7 @@ void body_problem(Reply *reply, const Problem *problem, int code, const char *in
     if (code == 401)
         reply->authenticate = "Bearer realm=\"impactd\"";
     reply->etag[0] = '\0';
+    reply->cache_control[0] = '\0'; // of what it would have been
     reply->accepts_ranges = false;
     reply->location[0] = '\0';
 }

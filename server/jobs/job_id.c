@@ -3,6 +3,8 @@
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
 #include <sys/random.h>
 
 #include "server/base/clock.h"
@@ -45,4 +47,14 @@ bool job_id_make(char id[40]) {
         id[i] = digits[secret & 15];
     id[JOB_ID_LENGTH] = '\0';
     return true;
+}
+
+int64_t job_id_unix_ms(const char *id) {
+    if (strncmp(id, "j-", 2) != 0 || strlen(id) != JOB_ID_LENGTH ||
+        strspn(id + 2, "0123456789abcdef") != JOB_ID_LENGTH - 2)
+        return -1;
+    char time[15];
+    memcpy(time, id + 2, 14);
+    time[14] = '\0';
+    return strtoll(time, NULL, 16) / 1000;
 }

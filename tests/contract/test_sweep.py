@@ -10,6 +10,7 @@ import sys
 import time
 
 import numpy
+import scipy.io
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
@@ -264,6 +265,18 @@ def test_the_table_reads_the_same_in_every_format():
         for name in document["columns"]:
             read = arrays[name.lstrip("/")].tolist()
             assert [one.decode() if isinstance(one, bytes) else one for one in read] == column(document, name), name
+        # Numbers alone: the place of a text among its axis's values, and of a status.
+        told = [column(document, name) for name in document["columns"]]
+        numbers = [[("sponge@1", "aluminium@1").index(one) if str(one).endswith("@1") else 0 if one == "made" else one
+                    for one in values] for values in told]
+        reply = daemon.get(f"/v1/results/{job['result']}/table.npy")
+        array = numpy.load(io.BytesIO(reply.body))
+        assert array.dtype == float and array.T.tolist() == numbers, array
+        variables = scipy.io.loadmat(io.BytesIO(daemon.get(f"/v1/results/{job['result']}/table.mat").body))
+        for name, values in zip(document["columns"], numbers):
+            assert variables[name.lstrip("/").replace("/", "_")].ravel().tolist() == values, name
+        part = daemon.get(f"/v1/results/{job['result']}/table.npy", headers={"Range": "bytes=100-299"})
+        assert part.status == 206 and part.body == reply.body[100:300] and reply.headers["accept-ranges"] == "bytes"
         assert daemon.get(f"/v1/results/{job['result']}/table.xml").status == 404
         by_job = daemon.get(f"/v1/jobs/{job['id']}/table.csv")
         assert by_job.body == text.body
