@@ -233,7 +233,7 @@ static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *p
     Outcome *outcome = journey->outcome;
     run->is_clear = regime->is_clear;
     if (regime->is_at_rest)
-        rest_run(run, &outcome->response);
+        TRY(rest_run(run, &outcome->response, problem));
     else
         TRY(solver->run(run, &outcome->response, problem));
     outcome->steps = run->steps;

@@ -273,7 +273,7 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     ledger_start(&exact->ledger, response, run->impacts_most, &energy);
     exact->ledger.gain_most = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
-    exact_stride_start(exact);
+    TRY(exact_stride_start(exact));
     if (exact->lanes.run == NULL && !exact->has_flight) {
         flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
         exact->has_flight = true;
@@ -377,10 +377,13 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     double *const values = fine == 0 ? NULL : workspace_values(workspace, fine);
     if (values == NULL)
         return run_on_grid(run, response, problem);
-    const Base refined = refine_base(run->base, run->plan->sample_rate, fine, values);
+    Base refined;
     Run own = *run;
     own.base = &refined;
-    const Status status = run_on_grid(&own, response, problem);
+    Status status =
+        refine_base(run->base, run->plan->sample_rate, fine, values, run->watch, &refined, problem);
+    if (status == STATUS_OK)
+        status = run_on_grid(&own, response, problem);
     run->steps = own.steps;
     run->work = own.work;
     workspace_tidy(workspace);

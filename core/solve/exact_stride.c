@@ -8,7 +8,10 @@
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_press.h"
 
-enum { PENDING_MOST = 1024 }; // samples between two looks at the energy balance
+enum {
+    PENDING_MOST = 1024,     // samples between two looks at the energy balance
+    WATCH_SAMPLES = 1 << 16, // made ready between two looks at the watch
+};
 
 // Of energies, over all samples of a contact: times DBL_EPSILON, what its closed form may lose.
 static const double APART_MOST = 4e4;
@@ -41,16 +44,39 @@ WIDE static void measure_wide(const double *values, size_t count, double *most, 
     measure(values, count, most, step);
 }
 
-void exact_stride_start(Exact *exact) {
+// What flight leaves alone of samples `from` to `to`: contacts write over it.
+static void lay(const Exact *exact, size_t from, size_t to) {
     const Base *base = exact->run->base;
-    const size_t bytes = exact->plan->count * sizeof(double);
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        if (exact->recorder.columns[i] != NULL && exact->stretch.columns[i] == NULL)
+            memset(exact->recorder.columns[i] + from, 0, (to - from) * sizeof(double));
+    // From its last sample on the base is still.
+    double *const column = exact->recorder.columns[CHANNEL_BASE_ACCELERATION];
+    const size_t given = base->count > 0 ? base->count - 1 : 0, end = given < to ? given : to;
+    if (column != NULL && base->form == BASE_SAMPLED && from < end)
+        memcpy(column + from, base->values + from, (end - from) * sizeof *column);
+}
+
+// Part by part: all at once takes long where the run has many samples.
+static Status lay_all(const Exact *exact) {
+    const size_t count = exact->plan->count;
+    for (size_t from = 0; from < count; from += WATCH_SAMPLES) {
+        if (from > 0 && !watch_advance(exact->run->watch, 0))
+            return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = 0 s");
+        lay(exact, from, count - from > WATCH_SAMPLES ? from + WATCH_SAMPLES : count);
+    }
+    return STATUS_OK;
+}
+
+Status exact_stride_start(Exact *exact) {
+    const Base *base = exact->run->base;
     Stretch *stretch = &exact->stretch;
     double *const *columns = exact->recorder.columns;
     const bool is_sine = base->form == BASE_SINE;
     if (base->form == BASE_PIECES || (base->form == BASE_SAMPLED && exact->base.ratio != 1)) {
         exact->has_lanes = false;
         exact->lanes.run = NULL;
-        return;
+        return STATUS_OK;
     }
     if (!exact->has_lanes) {
         lanes_make(&exact->lanes, &exact->flying, base->omega, exact->interval, lanes_widest());
@@ -71,24 +97,14 @@ void exact_stride_start(Exact *exact) {
     stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
     stretch->left = stretch->right = INFINITY;
-    // What flight leaves alone: contacts write over it.
     const bool has_damper = exact->plan->damper_count > 0;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         const bool is_damper = i == CHANNEL_DAMPER_DISPLACEMENT || i == CHANNEL_DAMPER_VELOCITY;
-        if (columns[i] == NULL)
-            continue;
         if (i == CHANNEL_PENETRATION || i == CHANNEL_CONTACT_FORCE ||
-            (i == CHANNEL_BASE_ACCELERATION && !is_sine) || (is_damper && !has_damper)) {
-            memset(columns[i], 0, bytes);
+            (i == CHANNEL_BASE_ACCELERATION && !is_sine) || (is_damper && !has_damper))
             stretch->columns[i] = NULL;
-        }
     }
-    // From its last sample on the base is still.
-    double *const column = columns[CHANNEL_BASE_ACCELERATION];
-    const size_t given = base->count > 0 ? base->count - 1 : 0;
-    if (column != NULL && base->form == BASE_SAMPLED)
-        memcpy(column, base->values,
-               (given < exact->plan->count ? given : exact->plan->count) * sizeof *column);
+    return lay_all(exact);
 }
 
 // The base from the present sample on: how many intervals it goes on in one way, and its samples or

@@ -6,7 +6,8 @@
 
 #include "core/solve/exact_state.h"
 
-void exact_stride_start(Exact *exact);
+// STATUS_CANCELLED where the watch says so.
+Status exact_stride_start(Exact *exact);
 
 // From the present sample over as many as go by strides, at most `most`; returns how many.
 size_t exact_stride(Exact *exact, size_t most);

@@ -4,6 +4,8 @@
 
 #include "core/solve/cursor.h"
 
+enum { WATCH_VALUES = 1 << 18 }; // made between two looks at the watch
+
 size_t refine_count(const Base *base, double sample_rate, size_t samples) {
     BaseCursor cursor;
     base_cursor_make(&cursor, base, sample_rate);
@@ -14,17 +16,32 @@ size_t refine_count(const Base *base, double sample_rate, size_t samples) {
     return base->count - 1 > most / cursor.ratio ? most : (base->count - 1) * cursor.ratio + 1;
 }
 
-Base refine_base(const Base *base, double sample_rate, size_t count, double *values) {
+Status refine_base(const Base *base, double sample_rate, size_t count, double *values,
+                   const Watch *watch, Base *fine, Problem *problem) {
     const size_t ratio = (size_t)nearbyint(base->interval * sample_rate);
+    size_t unwatched = 0;
     for (size_t j = 0, n = 0; n < count; j++) {
         const double from = base->values[j];
         const double step = j + 1 < base->count ? base->values[j + 1] - from : 0;
-        for (size_t i = 0; i < ratio && n < count; i++, n++)
-            values[n] = from + (double)i / (double)ratio * step;
+        // A part of an interval at a time: one may be as long as the run.
+        for (size_t i = 0; i < ratio && n < count;) {
+            const size_t left = ratio - i < count - n ? ratio - i : count - n;
+            const size_t part = left < WATCH_VALUES ? left : WATCH_VALUES;
+            for (size_t k = 0; k < part; k++)
+                values[n + k] = from + (double)(i + k) / (double)ratio * step;
+            i += part;
+            n += part;
+            unwatched += part;
+            if (unwatched < WATCH_VALUES)
+                continue;
+            unwatched = 0;
+            if (!watch_advance(watch, 0))
+                return problem_set(problem, STATUS_CANCELLED, "cancelled before the first step");
+        }
     }
-    Base fine = *base;
-    fine.values = values;
-    fine.count = count;
-    fine.interval = 1 / sample_rate;
-    return fine;
+    *fine = *base;
+    fine->values = values;
+    fine->count = count;
+    fine->interval = 1 / sample_rate;
+    return STATUS_OK;
 }

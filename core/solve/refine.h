@@ -4,12 +4,15 @@
 #ifndef CORE_SOLVE_REFINE_H
 #define CORE_SOLVE_REFINE_H
 
+#include "core/base/status.h"
+#include "core/base/watch.h"
 #include "core/excite/base.h"
 
 // How many values it takes for a run of `samples` output samples; 0: there is nothing to refine.
 size_t refine_count(const Base *base, double sample_rate, size_t samples);
 
-// Writes them to `values`. The result borrows these.
-Base refine_base(const Base *base, double sample_rate, size_t count, double *values);
+// Writes them to `values`, which `fine` borrows. STATUS_CANCELLED where the watch says so.
+Status refine_base(const Base *base, double sample_rate, size_t count, double *values,
+                   const Watch *watch, Base *fine, Problem *problem);
 
 #endif

@@ -1,9 +1,15 @@
 #include "core/solve/rest.h"
 
 #include <math.h>
-#include <string.h>
 
-void rest_run(Run *run, Response *response) {
+enum { WATCH_SAMPLES = 1 << 16 }; // filled between two looks at the watch
+
+static void fill(double *values, size_t count, double value) {
+    for (size_t i = 0; i < count; i++)
+        values[i] = value;
+}
+
+Status rest_run(Run *run, Response *response, Problem *problem) {
     const Plan *plan = run->plan;
     Peaks *peaks = &response->peaks;
     const size_t first = (size_t)ceil(run->statistics_from * plan->sample_rate * (1 - 1e-12));
@@ -14,12 +20,18 @@ void rest_run(Run *run, Response *response) {
     response->trust_horizon = NAN;
     for (size_t i = 0; i < run->column_count; i++) {
         const RunColumn *column = &run->columns[i];
-        memset(column->values, 0, plan->count * sizeof *column->values);
         const PlanDamper *damper = &plan->dampers[column->number];
-        for (size_t j = 0; j < plan->count && column->channel == CHANNEL_DAMPER_DISPLACEMENT; j++)
-            column->values[j] = damper->offset + damper->position;
+        const double value =
+            column->channel == CHANNEL_DAMPER_DISPLACEMENT ? damper->offset + damper->position : 0;
+        for (size_t j = 0; j < plan->count; j += WATCH_SAMPLES) {
+            const size_t left = plan->count - j;
+            fill(column->values + j, left < WATCH_SAMPLES ? left : WATCH_SAMPLES, value);
+            if (!watch_advance(run->watch, (double)i / (double)run->column_count))
+                return problem_set(problem, STATUS_CANCELLED, "cancelled at rest");
+        }
     }
     for (size_t d = 0; d < plan->damper_count; d++)
         peaks->damper_displacement = fmax(
             peaks->damper_displacement, fabs(plan->dampers[d].offset + plan->dampers[d].position));
+    return STATUS_OK;
 }

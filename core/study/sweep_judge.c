@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PLACE = sizeof((Fault){0}.pointer), CHECK_ADVANCE = 256, RANGE_SAMPLES = 512 };
+enum { PLACE = sizeof((Fault){0}.pointer), RANGE_SAMPLES = 512 };
 
 static bool is_range(const SweepAxis *axis) {
     return axis->values.count == 0;
@@ -101,8 +101,7 @@ static Status check_sample(Check *check) {
 
 static Status check_all(Check *check, const Watch *watch) {
     for (size_t i = 0; i < check->plan->points; i++) {
-        if (i % CHECK_ADVANCE == 0 &&
-            !watch_advance(watch, (double)i / (double)check->plan->points))
+        if (!watch_advance(watch, (double)i / (double)check->plan->points))
             return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
         TRY(check_next(check, i));
     }

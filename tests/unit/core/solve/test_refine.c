@@ -17,7 +17,8 @@ static void a_refined_base_goes_through_the_same_points(void **state) {
     (void)state;
     double values[16];
     assert_int_equal(refine_count(&coarse, 1000, 100), 16);
-    const Base fine = refine_base(&coarse, 1000, 16, values);
+    Base fine;
+    assert_int_equal(refine_base(&coarse, 1000, 16, values, NULL, &fine, NULL), STATUS_OK);
     assert_int_equal(fine.count, 16);
     for (int i = 0; i < 15; i++)
         assert_true(fabs(fine.values[i] - base_at(&coarse, i * 0.001)) < 1e-14);
@@ -29,8 +30,39 @@ static void a_short_run_takes_no_more_than_it_sees(void **state) {
     (void)state;
     double values[9];
     assert_int_equal(refine_count(&coarse, 1000, 7), 9);
-    const Base fine = refine_base(&coarse, 1000, 9, values);
+    Base fine;
+    assert_int_equal(refine_base(&coarse, 1000, 9, values, NULL, &fine, NULL), STATUS_OK);
     assert_true(fabs(fine.values[8] - base_at(&coarse, 0.008)) < 1e-14);
+}
+
+static bool stop_at_third(void *context, double fraction) {
+    (void)fraction;
+    return ++*(int *)context < 3;
+}
+
+// Also within one interval of the base, which may be as long as the run.
+static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
+    (void)state;
+    enum { MANY = 1 << 22 };
+    double *values = test_calloc(MANY, sizeof *values);
+    assert_non_null(values);
+    const double intervals[] = {0.002, 0.005, 1e3, 1e5};
+    double *knots = test_calloc(MANY, sizeof *knots);
+    assert_non_null(knots);
+    for (size_t i = 0; i < sizeof intervals / sizeof *intervals; i++) {
+        const Base base = {
+            .form = BASE_SAMPLED, .values = knots, .count = MANY, .interval = intervals[i]};
+        int looks = 0;
+        const Watch watch = {&looks, stop_at_third};
+        Base fine;
+        values[MANY / 4] = 7;
+        assert_int_equal(refine_base(&base, 1000, MANY, values, &watch, &fine, NULL),
+                         STATUS_CANCELLED);
+        assert_int_equal(looks, 3);
+        assert_true(values[MANY / 4] == 7); // nothing was made that far behind
+    }
+    test_free(knots);
+    test_free(values);
 }
 
 static void other_grids_are_left_alone(void **state) {
@@ -46,6 +78,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_refined_base_goes_through_the_same_points),
         cmocka_unit_test(a_short_run_takes_no_more_than_it_sees),
+        cmocka_unit_test(a_long_one_stops_soon_when_it_is_told_to),
         cmocka_unit_test(other_grids_are_left_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
