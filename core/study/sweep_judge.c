@@ -68,64 +68,70 @@ static Status check_point(const SweepPlan *plan, size_t point, const SimulationL
 typedef struct Check {
     const SweepPlan *plan;
     const SimulationLimits *limits;
+    const Watch *watch;
     Problem *fault, *problem;
     bool is_faulty;
 } Check;
 
 static Status check_next(Check *check, size_t point) {
+    if (!watch_advance(check->watch, (double)point / (double)check->plan->points))
+        return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
     const Status status =
         check_point(check->plan, point, check->limits, check->fault, check->problem);
     check->is_faulty = check->is_faulty || status == STATUS_INVALID;
     return status == STATUS_INVALID ? STATUS_OK : status;
 }
 
-static Status check_sample(Check *check) {
+// Number k of `samples` among `count`, both ends among them.
+static size_t spread(size_t k, size_t samples, size_t count) {
+    return samples == count ? k : k * (count - 1) / (samples - 1);
+}
+
+static Status check_sample(Check *check, size_t most) {
     const SweepPlan *plan = check->plan;
+    const bool is_list = plan->study->mode == SWEEP_LIST;
+    const size_t axes = is_list ? 1 : plan->axis_count;
+    const size_t share = most / axes > 2 ? most / axes : 2; // of each axis
     TRY(check_next(check, plan->points - 1));
-    if (plan->study->mode == SWEEP_LIST) {
-        for (size_t k = 0; k < RANGE_SAMPLES; k++)
-            TRY(check_next(check, k * (plan->points - 1) / (RANGE_SAMPLES - 1)));
-        return STATUS_OK;
-    }
-    for (size_t i = 0; i < plan->axis_count; i++) {
-        // Of a long range some values, both ends among them; of given values all.
+    for (size_t i = 0; i < axes; i++) {
         const size_t count = plan->axes[i].count;
-        const bool is_long = is_range(&plan->study->axes.at[i]) && count > RANGE_SAMPLES;
-        const size_t samples = is_long ? RANGE_SAMPLES : count;
+        const bool is_short = is_list || is_range(&plan->study->axes.at[i]);
+        const size_t wanted = is_short && share > RANGE_SAMPLES ? RANGE_SAMPLES : share;
+        const size_t samples = count < wanted ? count : wanted;
         for (size_t k = i > 0; k < samples; k++)
-            TRY(check_next(check,
-                           (is_long ? k * (count - 1) / (samples - 1) : k) * plan->axes[i].stride));
+            TRY(check_next(check, spread(k, samples, count) * plan->axes[i].stride));
     }
     return STATUS_OK;
 }
 
-static Status check_all(Check *check, const Watch *watch) {
-    for (size_t i = 0; i < check->plan->points; i++) {
-        if (!watch_advance(watch, (double)i / (double)check->plan->points))
-            return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
+static Status check_all(Check *check) {
+    for (size_t i = 0; i < check->plan->points; i++)
         TRY(check_next(check, i));
-    }
     return STATUS_OK;
 }
 
-Status sweep_check(const SweepPlan *plan, bool is_sample, const SimulationLimits *limits,
+Status sweep_check(const SweepPlan *plan, size_t scenes, const SimulationLimits *limits,
                    const Watch *watch, Problem *problem) {
-    Check check = {
-        .plan = plan, .limits = limits, .fault = malloc(sizeof(Problem)), .problem = problem};
+    Check check = {.plan = plan,
+                   .limits = limits,
+                   .watch = watch,
+                   .fault = malloc(sizeof(Problem)),
+                   .problem = problem};
     if (check.fault == NULL)
         return no_memory(problem);
-    const Status status = is_sample ? check_sample(&check) : check_all(&check, watch);
+    const size_t most = sweep_affordable(plan, scenes);
+    const Status status = plan->points > most ? check_sample(&check, most) : check_all(&check);
     free(check.fault);
     return status == STATUS_OK && check.is_faulty ? STATUS_INVALID : status;
 }
 
-Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t at_once,
+Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t scenes,
                    const SimulationLimits *limits, Problem *problem) {
     SweepPlan *plan;
     Status status = sweep_plan_make(study, simulation, limits, &plan, problem);
     // Without limits it was judged before.
     if (plan != NULL && limits != NULL) {
-        const Status points = sweep_check(plan, plan->points > at_once, limits, NULL, problem);
+        const Status points = sweep_check(plan, scenes, limits, NULL, problem);
         status = status == STATUS_OK ? points : status;
     }
     sweep_plan_free(plan);

@@ -5,15 +5,15 @@
 
 #include "core/study/sweep_plan.h"
 
-// Judges every point, or (`is_sample`) those where one axis alone leaves its first value, of long
-// ranges some, and the last one. Each fault stands at the value it comes of and says which point it
-// is of. `watch` may stop it.
-Status sweep_check(const SweepPlan *plan, bool is_sample, const SimulationLimits *limits,
+// Judges every point where they are no more work than `scenes` small ones, else about as many as
+// that: points where one axis alone leaves its first value, of long axes some, and the last one.
+// Each fault stands at the value it comes of and says which point it is of. `watch`, asked before
+// each point, may stop it.
+Status sweep_check(const SweepPlan *plan, size_t scenes, const SimulationLimits *limits,
                    const Watch *watch, Problem *problem);
 
-// Judges axes and points, all points where they are at most `at_once`, else the sample of them;
-// `limits` NULL: the axes alone.
-Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t at_once,
+// Judges axes and points, these as sweep_check does; `limits` NULL: the axes alone.
+Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t scenes,
                    const SimulationLimits *limits, Problem *problem);
 
 #endif

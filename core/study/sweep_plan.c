@@ -6,13 +6,18 @@
 // set, completed like any other.
 #include "core/study/sweep_plan.h"
 
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excite/record.h"
+
 enum {
     PLACE = sizeof((Fault){0}.pointer),
     COST_SAMPLES = 64,
+    COST_SCENES = 2000, // what they may cost
+    AFFORDED_LEAST = 16,
     SWEEP_VALUES = 1 << 21,
 };
 
@@ -172,8 +177,25 @@ Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
     return simulation_complete(target, limits, NULL, problem);
 }
 
+// Measured: 3 us with one storey, 0.1 ms with 40 and 0.7 ms with 100; a record's samples are
+// copied.
+size_t sweep_affordable(const SweepPlan *plan, size_t scenes) {
+    const Scene *scene = &plan->simulation->scene;
+    const Excitation *excitation = scene_excitation(scene);
+    const double n = (double)structure_storeys(scene_structure(scene));
+    double cost = 1 + n / 4 + n * n / 64;
+    if (excitation_kind(excitation) == &excitation_record)
+        cost += 1e-3 * (double)((const ExcitationRecord *)(const void *)excitation)->samples.count;
+    if (scenes == SIZE_MAX)
+        return SIZE_MAX;
+    const size_t most = (size_t)((double)scenes / cost);
+    return most > AFFORDED_LEAST ? most : AFFORDED_LEAST;
+}
+
 double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {
-    const size_t samples = plan->points < COST_SAMPLES ? plan->points : COST_SAMPLES;
+    const size_t afforded = sweep_affordable(plan, COST_SCENES);
+    const size_t most = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
+    const size_t samples = plan->points < most ? plan->points : most;
     double steps = 0;
     for (size_t i = 0; i < samples; i++) {
         // Odd multiples of half a part: an axis's period does not hide the other axes.

@@ -43,6 +43,10 @@ size_t sweep_plan_index(const SweepPlan *plan, size_t axis, size_t point);
 Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
                    const SimulationLimits *limits, Simulation *target, Problem *problem);
 
+// How many of its points are as much work to make ready as `scenes` of one storey; at least 16, and
+// all for SIZE_MAX.
+size_t sweep_affordable(const SweepPlan *plan, size_t scenes);
+
 // Solver steps foretold for all, from some points spread over them.
 double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits);
 

@@ -206,7 +206,7 @@ static Status begin_points(const Study *asked, const Simulation *simulation,
     work->answer = (Sweep *)(void *)told;
     Status status = sweep_plan_new(study, simulation, tools->limits, &work->plan, problem);
     if (status == STATUS_OK)
-        status = sweep_check(work->plan, false, tools->limits, tools->watch, problem);
+        status = sweep_check(work->plan, SIZE_MAX, tools->limits, tools->watch, problem);
     if (status == STATUS_OK) {
         status = tell(study, work->plan, work->answer);
         if (status != STATUS_OK)

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "core/study/inquiry.h"
+#include "core/study/sweep_judge.h"
 #include "core/study/sweep_run.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
@@ -69,6 +70,54 @@ static Simulation scene_of(const SweepPlan *plan, size_t point) {
     if (sweep_scene(plan, point, false, NULL, &scene, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
     return scene;
+}
+
+static bool count_look(void *context, double fraction) {
+    (void)fraction;
+    ++*(size_t *)context;
+    return true;
+}
+
+// Points judged where the scene has so many storeys.
+static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
+    Inquiry inquiry = inquiry_make();
+    Scene *scene = &inquiry.simulation.scene;
+    scene_start(&inquiry.simulation, 0, 0);
+    variant_free(scene->structure);
+    scene->structure = variant_new(&structure_frame.kind);
+    assert_non_null(scene->structure);
+    StructureFrame *frame = (StructureFrame *)(void *)scene->structure;
+    assert_true(reals_make(&frame->masses, storeys) && reals_make(&frame->stiffnesses, storeys));
+    for (size_t i = 0; i < storeys; i++) {
+        frame->masses.at[i] = 100;
+        frame->stiffnesses.at[i] = 2e5;
+    }
+    range_add(&inquiry, "/duration", 1, 2, count);
+    study_of(&inquiry)->mode = mode;
+    SweepPlan *plan = plan_of(&inquiry);
+    size_t looks = 0;
+    const Watch watch = {&looks, count_look};
+    assert_int_equal(sweep_check(plan, scenes, NULL, &watch, &problem), STATUS_OK);
+    sweep_plan_free(plan);
+    inquiry_clear(&inquiry);
+    return looks;
+}
+
+// Whoever submits it waits meanwhile.
+static void how_many_points_are_judged_at_once_goes_by_what_one_costs(void **state) {
+    (void)state;
+    assert_int_equal(judged(1, 3000, 5000, SWEEP_GRID), 3000);
+    const size_t eight = judged(8, 3000, 5000, SWEEP_GRID);
+    assert_in_range(eight, 100, 600);
+    assert_in_range(judged(100, 3000, 5000, SWEEP_GRID), 16, 40);
+    assert_in_range(judged(100, 3000, 5000, SWEEP_LIST), 16, 40);
+    assert_int_equal(judged(40, 100, SIZE_MAX, SWEEP_GRID), 100); // before anything runs: all
+}
+
+// No look at the watch may be far from the next one, whatever a point costs.
+static void judging_all_points_looks_at_the_watch_before_each(void **state) {
+    (void)state;
+    assert_int_equal(judged(20, 200, SIZE_MAX, SWEEP_LIST), 200);
 }
 
 static void a_points_scene_follows_from_its_number(void **state) {
@@ -229,6 +278,8 @@ static void a_sweep_stops_when_it_is_told_to(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(how_many_points_are_judged_at_once_goes_by_what_one_costs),
+        cmocka_unit_test(judging_all_points_looks_at_the_watch_before_each),
         cmocka_unit_test(a_points_scene_follows_from_its_number),
         cmocka_unit_test(whole_numbers_of_a_range_stay_whole),
         cmocka_unit_test(a_row_is_its_scenes_own_run),
