@@ -23,6 +23,8 @@ const Field likeness_fields[] = {
 };
 // clang-format on
 
+enum { WATCH_SAMPLES = 1 << 16 }; // compared between two looks at the watch
+
 // A time within this part of a sample interval of a sample is that sample's.
 static const double snap = 1e-6;
 
@@ -67,7 +69,13 @@ static double time_of(const Grid *grid, size_t i) {
     return grid->coarse->start + (double)(grid->first + i) / grid->coarse->rate;
 }
 
-Likeness likeness_measure(const Signal *reference, const Signal *other, double part) {
+// Before sample i.
+static bool goes_on(const Watch *watch, size_t i) {
+    return i % WATCH_SAMPLES != 0 || watch_advance(watch, 1);
+}
+
+Likeness likeness_measure(const Signal *reference, const Signal *other, double part,
+                          const Watch *watch) {
     const Grid grid = grid_of(reference, other);
     const double none = (double)NAN;
     Likeness told = {none, none, grid.count, none, none, none, none, none, none, none, none, none};
@@ -75,6 +83,8 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
         return told;
     double sx = 0, sy = 0, sxx = 0, syy = 0, sdd = 0, most_x = 0, most_y = 0, most_d = 0;
     for (size_t i = 0; i < grid.count; i++) {
+        if (!goes_on(watch, i))
+            return told;
         const double t = time_of(&grid, i), x = value_at(reference, t), y = value_at(other, t);
         sx += x;
         sy += y;
@@ -88,6 +98,8 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
     const double n = (double)grid.count, mean_x = sx / n, mean_y = sy / n;
     double vxx = 0, vyy = 0, vxy = 0;
     for (size_t i = 0; i < grid.count; i++) {
+        if (!goes_on(watch, i))
+            return told;
         const double t = time_of(&grid, i);
         const double x = value_at(reference, t), y = value_at(other, t);
         vxx += (x - mean_x) * (x - mean_x);
@@ -201,7 +213,7 @@ static double best_lag(const Lags *lags, double centre, double most) {
 static double moved_correlation(const Signal *reference, const Signal *other, double shift) {
     Signal moved = *other;
     moved.start += shift;
-    return likeness_measure(reference, &moved, 1).correlation;
+    return likeness_measure(reference, &moved, 1, NULL).correlation;
 }
 
 // The parabola leans where an end of one comes into the other's span: of its vertex and the whole

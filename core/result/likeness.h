@@ -6,6 +6,7 @@
 
 #include "core/base/columns.h"
 #include "core/base/field.h"
+#include "core/base/watch.h"
 
 // Evenly sampled; value i stands at start + i / rate.
 typedef struct Signal {
@@ -27,8 +28,9 @@ typedef struct Likeness {
 } Likeness;
 extern const Field likeness_fields[];
 
-// `part` is of the reference's peak within the span.
-Likeness likeness_measure(const Signal *reference, const Signal *other, double part);
+// `part` is of the reference's peak within the span. Where the watch stops it, its numbers are NAN.
+Likeness likeness_measure(const Signal *reference, const Signal *other, double part,
+                          const Watch *watch);
 
 // Both on one grid as two columns of `rate`. STATUS_LIMIT where fewer than `least` samples are
 // common.

@@ -160,8 +160,8 @@ static Status tell_reference(CompareWork *work, Problem *problem) {
                : no_memory(problem);
 }
 
-static Status tell(const CompareWork *work, const Outcome *outcome, CompareEntry *entry,
-                   Problem *problem) {
+static Status tell(const CompareWork *work, const Outcome *outcome, const Watch *watch,
+                   CompareEntry *entry, Problem *problem) {
     const Outcome *reference = work->reference;
     const Reals *band = &work->study->band;
     const Signal from = displacement_of(reference), to = displacement_of(outcome);
@@ -175,7 +175,9 @@ static Status tell(const CompareWork *work, const Outcome *outcome, CompareEntry
                                   spectrum, spectrum->densities.at[0].values,
                                   band->count == 2 ? band->at[0] : (double)NAN,
                                   band->count == 2 ? band->at[1] : (double)NAN);
-    entry->displacement = likeness_measure(&from, &to, work->study->part);
+    entry->displacement = likeness_measure(&from, &to, work->study->part, watch);
+    if (!watch_advance(watch, 1))
+        return problem_set(problem, STATUS_CANCELLED, "stopped at a comparison");
     TRY(tell_divergence(work, outcome, entry, problem));
     if (!copy_derived(&outcome->plan.derived, &entry->derived) ||
         !copy_reals(&entry->density, spectrum->densities.at[0].values, spectrum->densities.rows))
@@ -218,7 +220,7 @@ static Status make_entry(const StudyWork *of, size_t index, const StudyTools *to
     (void)fields_default(compare_entry_fields, part); // absent and 0: nothing to allocate
     Status status = run_entry(work, index + 1, tools, &outcome, part, problem);
     if (status == STATUS_OK) {
-        status = tell(work, outcome, part, problem);
+        status = tell(work, outcome, tools->watch, part, problem);
     } else if (!member_ends_all(status)) {
         part->why = member_why(problem);
         problem_clear(problem);
@@ -263,7 +265,7 @@ static Status make_reference(CompareWork *work, const StudyTools *tools, Problem
     else
         status = tell_reference(work, problem);
     if (status == STATUS_OK)
-        status = tell(work, work->reference, &told, problem);
+        status = tell(work, work->reference, tools->watch, &told, problem);
     if (status == STATUS_OK)
         take_entry(&work->answer->entries.at[0], &told);
     fields_clear(compare_entry_fields, &told);

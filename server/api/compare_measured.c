@@ -65,7 +65,7 @@ static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectr
 static void write_answer(Bytes *bytes, const char *result, const Column *column,
                          const MeasuredRequest *asked, double shift, const Signal *a,
                          const Signal *b, const Spectrum *spectrum) {
-    const Likeness likeness = likeness_measure(a, b, COMPARE_PART);
+    const Likeness likeness = likeness_measure(a, b, COMPARE_PART, NULL);
     const Distance distance =
         distance_measure(spectrum, spectrum->densities.at[0].values, spectrum,
                          spectrum->densities.at[1].values, (double)NAN, (double)NAN);

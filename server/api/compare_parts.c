@@ -88,7 +88,7 @@ size_t compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
         if (to == NULL || is_too_much)
             continue;
         const Signal x = signal_of(a, from), y = signal_of(b, to);
-        const Likeness likeness = likeness_measure(&x, &y, COMPARE_PART);
+        const Likeness likeness = likeness_measure(&x, &y, COMPARE_PART, NULL);
         size_t number;
         if (channel == NULL && channel_find(from->name, &number) == &channels[0]) {
             channel = from->name;

@@ -33,7 +33,7 @@ static void a_motion_is_like_itself(void **state) {
     (void)state;
     double *x = sampled(100, 501, 0);
     const Signal signal = {x, 501, 100, 0};
-    const Likeness own = likeness_measure(&signal, &signal, 0.01);
+    const Likeness own = likeness_measure(&signal, &signal, 0.01, NULL);
     assert_true(own.samples == 501 && own.from == 0 && own.to == 5);
     assert_true(own.relative == 0 && own.difference_peak == 0 && isnan(own.parting));
     assert_near(own.correlation, 1, 1e-12);
@@ -44,12 +44,12 @@ static void the_coarser_ones_samples_are_compared_within_the_common_span(void **
     (void)state;
     double *x = sampled(100, 501, 0), *y = sampled(1000, 3001, 1.005);
     const Signal coarse = {x, 501, 100, 0}, fine = {y, 3001, 1000, 1.005};
-    const Likeness told = likeness_measure(&coarse, &fine, 0.01);
+    const Likeness told = likeness_measure(&coarse, &fine, 0.01, NULL);
     assert_near(told.from, 1.01, 1e-12);
     assert_near(told.to, 4.0, 1e-12);
     assert_true(told.samples == 300);
     assert_true(told.relative < 1e-12 && told.difference_peak < 1e-12);
-    const Likeness other = likeness_measure(&fine, &coarse, 0.01);
+    const Likeness other = likeness_measure(&fine, &coarse, 0.01, NULL);
     assert_true(other.samples == 300 && other.relative < 1e-12);
     free(x);
     free(y);
@@ -59,7 +59,7 @@ static void numbers_are_those_of_the_definitions(void **state) {
     (void)state;
     const double x[] = {1, -2, 3, 0}, y[] = {1, -2, 4, -1};
     const Signal a = {x, 4, 2, 0}, b = {y, 4, 2, 0};
-    const Likeness told = likeness_measure(&a, &b, 0.25);
+    const Likeness told = likeness_measure(&a, &b, 0.25, NULL);
     assert_near(told.rms, sqrt(14.0 / 4), 1e-15);
     assert_near(told.other_rms, sqrt(22.0 / 4), 1e-15);
     assert_near(told.difference_rms, sqrt(0.5), 1e-15);
@@ -67,16 +67,16 @@ static void numbers_are_those_of_the_definitions(void **state) {
     assert_true(told.peak == 3 && told.other_peak == 4 && told.difference_peak == 1);
     assert_near(told.correlation, 16 / sqrt(13.0 * 21), 1e-14);
     assert_true(told.parting == 1); // 1 is more than a quarter of 3
-    assert_true(isnan(likeness_measure(&a, &b, 0.5).parting));
+    assert_true(isnan(likeness_measure(&a, &b, 0.5, NULL).parting));
 }
 
 static void what_does_not_overlap_has_nothing_in_common(void **state) {
     (void)state;
     const double x[] = {1, 2};
     const Signal a = {x, 2, 1, 0}, b = {x, 2, 1, 5}, none = {NULL, 0, 1, 0};
-    assert_true(likeness_measure(&a, &b, 0.1).samples == 0);
-    assert_true(isnan(likeness_measure(&a, &b, 0.1).rms));
-    assert_true(likeness_measure(&a, &none, 0.1).samples == 0);
+    assert_true(likeness_measure(&a, &b, 0.1, NULL).samples == 0);
+    assert_true(isnan(likeness_measure(&a, &b, 0.1, NULL).rms));
+    assert_true(likeness_measure(&a, &none, 0.1, NULL).samples == 0);
     Columns pair = {0};
     double rate;
     assert_int_equal(likeness_pair(&a, &b, 1, &pair, &rate, NULL), STATUS_LIMIT);
@@ -118,7 +118,7 @@ static void nothing_is_more_alike_than_alike(void **state) {
     for (size_t count = 2; count < 2000; count++) {
         double *x = sampled(100, count, 0);
         const Signal signal = {x, count, 100, 0};
-        assert_true(likeness_measure(&signal, &signal, 0.01).correlation <= 1);
+        assert_true(likeness_measure(&signal, &signal, 0.01, NULL).correlation <= 1);
         free(x);
     }
 }
@@ -137,6 +137,24 @@ static void a_shift_stays_within_what_is_allowed(void **state) {
     free(y);
 }
 
+static bool stop_at_third(void *context, double fraction) {
+    (void)fraction;
+    return ++*(int *)context < 3;
+}
+
+static void a_long_measurement_stops_soon_when_it_is_told_to(void **state) {
+    (void)state;
+    enum { MANY = 1 << 20 };
+    double *values = test_calloc(MANY, sizeof *values);
+    const Signal signal = {.values = values, .count = MANY, .rate = 1000};
+    int looks = 0;
+    const Watch watch = {&looks, stop_at_third};
+    assert_true(isnan(likeness_measure(&signal, &signal, 0.5, &watch).rms));
+    assert_int_equal(looks, 3);
+    assert_true(likeness_measure(&signal, &signal, 0.5, NULL).rms == 0);
+    test_free(values);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_motion_is_like_itself),
@@ -147,6 +165,7 @@ int main(void) {
         cmocka_unit_test(a_copy_behind_silence_is_found_at_its_sample),
         cmocka_unit_test(nothing_is_more_alike_than_alike),
         cmocka_unit_test(a_shift_stays_within_what_is_allowed),
+        cmocka_unit_test(a_long_measurement_stops_soon_when_it_is_told_to),
     };
     fourier_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
