@@ -1,8 +1,20 @@
 // impactd: the daemon and the command line in one program.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include "core/math/fourier.h"
 #include "server/command/command.h"
 
+// The first file opened takes the number of a closed standard stream, and would be given what is
+// printed there. What holds its place refuses that.
+static void keep_standard_streams(void) {
+    for (int number = 0; number <= STDERR_FILENO; number++)
+        if (fcntl(number, F_GETFD) < 0)
+            (void)open("/dev/null", number == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
+
 int main(int argc, char **argv) {
+    keep_standard_streams();
     fourier_start();
     return command_main(argc, argv);
 }

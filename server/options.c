@@ -57,11 +57,12 @@ static Status refuse(const Reader *reader, const char *typed, const char *value,
 
 static Status refuse_choice(const Reader *reader, const char *typed, const char *value,
                             const Field *row) {
-    char all[160] = "one of ";
-    for (size_t i = 0; row->choices[i] != NULL; i++) {
-        const size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%s", i > 0 ? ", " : "", row->choices[i]);
-    }
+    static const char before[] = "one of ";
+    char all[160];
+    const size_t used = sizeof before - 1;
+    memcpy(all, before, sizeof before);
+    for (size_t i = 0; row->choices[i] != NULL; i++)
+        text_list(all + used, sizeof all - used, row->choices[i]);
     return refuse(reader, typed, value, row, all);
 }
 
@@ -360,7 +361,9 @@ static void value_print(const Field *row, const void *item, FILE *file) {
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
         const bool is_set = row->kind == FIELD_KIND_FLAG || !field_is_absent(row, item);
-        fprintf(file, "%s%s = ", is_set ? "" : "# ", row->name);
+        // "config" and "print_config" are about the file, not of it.
+        fprintf(file, "%s%s = ", is_set && strstr(row->name, "config") == NULL ? "" : "# ",
+                row->name);
         if (is_set)
             value_print(row, item, file);
         fprintf(file, "  # %s\n", origin_names[options->origins[row - fields]]);

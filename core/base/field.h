@@ -66,10 +66,11 @@ typedef struct Variant {
     const Kind *kind;
 } Variant;
 
-// A plural table as walkers see it. at(0) is the default; at(i) is NULL past the end.
+// A plural table as walkers see it. at(i) is NULL past the end.
 typedef struct KindTable {
     const char *tag; // the JSON key that names the kind: "kind", "model", "solver"
     const Kind *(*at)(size_t index);
+    bool is_named; // the tag must be given; otherwise at(0) is taken where it is not
 } KindTable;
 
 // Bounds of a number; for REALS and ROWS of each number.

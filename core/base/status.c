@@ -51,6 +51,15 @@ void text_fit(char *target, size_t size, const char *text) {
     memcpy(target + kept, mark, strlen(mark) + 1);
 }
 
+void text_list(char *target, size_t size, const char *item) {
+    size_t used = strlen(target);
+    if (used > 0) {
+        text_fit(target + used, size - used, ", ");
+        used += strlen(target + used);
+    }
+    text_fit(target + used, size - used, item);
+}
+
 void text_quote(char *target, size_t size, const char *text) {
     if (size < 8) {
         if (size > 0)

@@ -90,6 +90,9 @@ bool problem_concerns(const Problem *problem, const char *pointer);
 // too long.
 void text_fit(char *target, size_t size, const char *text);
 
+// Puts `item` behind the others of a list in `target[size]`, with ", " between, cut likewise.
+void text_list(char *target, size_t size, const char *item);
+
 // `text` as a JSON string with its quotes, cut likewise inside them.
 void text_quote(char *target, size_t size, const char *text);
 

@@ -35,4 +35,4 @@ static const Kind *contact_at(size_t index) {
     return index < COUNT(contacts) - 1 ? &contacts[index]->kind : NULL;
 }
 
-const KindTable contact_kinds = {"model", contact_at};
+const KindTable contact_kinds = {"model", contact_at, false};

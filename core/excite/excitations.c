@@ -20,7 +20,7 @@ static const Kind *excitation_at(size_t index) {
     return index < COUNT(excitations) - 1 ? &excitations[index]->kind : NULL;
 }
 
-const KindTable excitation_kinds = {"kind", excitation_at};
+const KindTable excitation_kinds = {"kind", excitation_at, false};
 
 void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
                                 const char *name, Problem *doubts) {

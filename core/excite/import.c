@@ -111,9 +111,9 @@ static bool has_times(const Numbers *numbers) {
     return step > 0 && alike > numbers->rows / 2;
 }
 
-// Leaves the accelerations in numbers->at, and their interval.
-static Status take_times(Numbers *numbers, const ImportHeader *header, double *interval,
-                         Problem *problem) {
+// Leaves the accelerations in numbers->at; the first one's time, and their interval.
+static Status take_times(Numbers *numbers, const ImportHeader *header, double *start,
+                         double *interval, Problem *problem) {
     const size_t rows = numbers->rows;
     double *at = numbers->at;
     char place[64], now[32], then[32], step[32];
@@ -147,6 +147,7 @@ static Status take_times(Numbers *numbers, const ImportHeader *header, double *i
     // Differences of printed decimals: twelve digits are all they have.
     const double scale = pow(10, 11 - floor(log10(mean)));
     *interval = isfinite(scale) && scale > 0 ? nearbyint(mean * scale) / scale : mean;
+    *start = at[0];
     for (size_t i = 0; i < rows; i++)
         at[i] = at[2 * i + 1];
     numbers->count = rows;
@@ -248,7 +249,7 @@ static Status read_all(TextReader reader, const ImportRequest *request, Numbers 
     if (numbers->rows > 0 && header.count != (double)numbers->count &&
         (header.is_time || has_times(numbers))) {
         import->layout = "time_acceleration";
-        TRY(take_times(numbers, &header, &import->interval, problem));
+        TRY(take_times(numbers, &header, &import->start, &import->interval, problem));
     }
     TRY(check_rows(numbers, &header, problem));
     TRY(choose_interval(request, &header, import, problem));

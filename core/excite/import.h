@@ -20,6 +20,7 @@ typedef struct Import {
     char *header;       // the text before the numbers, lines joined by "; "
     Reals samples;      // [m/s^2]
     double interval;    // [s]
+    double start;       // time of the first sample, 0 where the file tells no times [s]
     int unit;           // of the file: ImportUnit
     int stated_unit;    // as its header has it; CHOICE_ABSENT: it has none
 } Import;

@@ -107,7 +107,7 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
     if (sxx > 0)
         told.relative = sqrt(sdd / sxx);
     if (vxx > 0 && vyy > 0)
-        told.correlation = vxy / (sqrt(vxx) * sqrt(vyy));
+        told.correlation = fmin(fmax(vxy / (sqrt(vxx) * sqrt(vyy)), -1), 1);
     return told;
 }
 
@@ -198,6 +198,21 @@ static double best_lag(const Lags *lags, double centre, double most) {
     return best;
 }
 
+static double moved_correlation(const Signal *reference, const Signal *other, double shift) {
+    Signal moved = *other;
+    moved.start += shift;
+    return likeness_measure(reference, &moved, 1).correlation;
+}
+
+// The parabola leans where an end of one comes into the other's span: of its vertex and the whole
+// sample beside it, that at which both are more alike.
+static double better_shift(const Signal *reference, const Signal *other, double whole,
+                           double vertex) {
+    return moved_correlation(reference, other, whole) >= moved_correlation(reference, other, vertex)
+               ? whole
+               : vertex;
+}
+
 Status likeness_shift(const Signal *reference, const Signal *other, double most, double *shift,
                       Problem *problem) {
     const double rate = fmin(reference->rate, other->rate);
@@ -256,7 +271,8 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
                                  "with the other, and both moving there",
                                  most);
         else
-            *shift = (lag - centre) / rate;
+            *shift = better_shift(reference, other, (nearbyint(lag) - centre) / rate,
+                                  (lag - centre) / rate);
     }
     fourier_free(forward);
     fourier_free(backward);

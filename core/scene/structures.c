@@ -19,7 +19,7 @@ static const Kind *structure_at(size_t index) {
     return index < COUNT(structures) - 1 ? &structures[index]->kind : NULL;
 }
 
-const KindTable structure_kinds = {"kind", structure_at};
+const KindTable structure_kinds = {"kind", structure_at, false};
 
 size_t structure_storeys(const Structure *structure) {
     return structure_kind(structure)->storeys(structure);

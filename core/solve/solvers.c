@@ -32,4 +32,4 @@ static const Kind *solver_at(size_t index) {
     return index + 1 < COUNT(solvers) ? &solvers[index]->kind : NULL;
 }
 
-const KindTable solver_kinds = {"solver", solver_at};
+const KindTable solver_kinds = {"solver", solver_at, false};

@@ -9,7 +9,7 @@
 #include "core/study/sweep_run.h"
 
 // Points that are judged while whoever submits them waits.
-enum { CHECKED_AT_ONCE = 5000, METRICS = 16 };
+enum { CHECKED_AT_ONCE = 5000 };
 
 static const double most_runs = 1000;
 
@@ -59,7 +59,7 @@ static const Field axis_fields[] = {
 static const Field study_fields[] = {
     FIELD_LIST(SweepStudy, axes, axis_fields, SWEEP_AXES, PRESENCE_REQUIRED, "what varies; changes are made in this order, and of a grid the last axis varies fastest"),
     FIELD_CHOICE(SweepStudy, mode, sweep_mode_names, SWEEP_GRID, "grid: every combination of the axes' values; list: their first values together, then their second, and so on"),
-    FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, usual_metrics, METRICS, PRESENCE_DEFAULT, 0, "what is kept of each point: the summary's numbers, and steps, the solver's"),
+    FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, usual_metrics, SWEEP_METRICS, PRESENCE_DEFAULT, 0, "what is kept of each point: the summary's numbers, and steps, the solver's"),
     FIELD_LIST(SweepStudy, materials, buffer_fields, 0, PRESENCE_OPTIONAL, "numbers of the materials that the scene and the axes name, as they were when it was submitted; need not be given"),
     FIELD_END
 };

@@ -9,6 +9,7 @@
 enum {
     SWEEP_AXES = 64,
     SWEEP_AXIS_VALUES = 1 << 20,
+    SWEEP_METRICS = 16,
     SWEEP_POINTS = 1000000, // where the limits say nothing
 };
 

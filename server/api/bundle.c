@@ -4,8 +4,6 @@
 
 #include "server/api/results.h"
 #include "server/api/tables.h"
-#include "server/base/digest.h"
-#include "server/base/link.h"
 #include "server/encode/csv.h"
 #include "server/encode/impacts_csv.h"
 #include "server/encode/npz.h"
@@ -81,12 +79,12 @@ static Status put_series(Zip *zip, const Response *response, Sheet *sheet, Probl
     return status;
 }
 
-static Status put_spectra(Zip *zip, const char *document, Outcome *outcome, Problem *problem) {
+static Status put_spectra(Zip *zip, const char *document, Problem *problem) {
     Bytes bytes = {.most = 0};
-    Sheet sheet = {.outcome = outcome_hold(outcome)};
+    Sheet sheet = {.encoding = NULL};
     Status status = put_document(zip, "psd.json", document, problem);
     if (status == STATUS_OK)
-        status = sheet_psd(&sheet, problem);
+        status = sheet_psd(&sheet, document, problem);
     if (status == STATUS_OK)
         status = encoding_write(&encoder_csv, &sheet.table, &bytes, problem);
     if (status == STATUS_OK)
@@ -112,27 +110,13 @@ static Status fill(Zip *zip, const ResultRow *row, Bytes *manifest, Sheet *sheet
     TRY(put_text(zip, "result.json", &result, problem));
     TRY(put_text(zip, "manifest.json", manifest, problem));
     TRY(put_series(zip, response, sheet, problem));
-    if (row->psd != NULL)
-        TRY(put_spectra(zip, row->psd, sheet->outcome, problem));
+    const char *spectra = results_document(row, DOCUMENT_PSD);
+    if (spectra != NULL)
+        TRY(put_spectra(zip, spectra, problem));
     if (response->is_unlisted)
         return STATUS_OK;
     impacts_csv(&response->impacts, &impacts);
     return put_text(zip, "impacts.csv", &impacts, problem);
-}
-
-// By what in it may change: a material's status, which the manifest tells, and the base of its
-// links. Sets the entity tag; true if the client has it.
-static bool is_known(const Request *request, Reply *reply, const ResultRow *row,
-                     const Bytes *manifest) {
-    char digits[65] = "", tag[104];
-    Digest *digest = digest_new();
-    if (digest != NULL) {
-        digest_take(digest, manifest->at, manifest->count);
-        digest_take(digest, link_base(), strlen(link_base()));
-        digest_end(digest, digits);
-    }
-    snprintf(tag, sizeof tag, "%.72s-bundle-%.16s", row->id, digits);
-    return reply_tagged(reply, request, tag);
 }
 
 static Status pack(App *app, Reply *reply, const ResultRow *row, Bytes *manifest, Sheet *sheet,
@@ -156,7 +140,8 @@ Status results_bundle(App *app, const Request *request, Reply *reply, Problem *p
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &manifest, problem);
-    if (status == STATUS_OK && !is_known(request, reply, &row, &manifest)) {
+    // The manifest tells all that may change: a material's status and the base of the links.
+    if (status == STATUS_OK && !results_tagged(request, reply, &row, "bundle", &manifest)) {
         status = tables_find(app, request, reply, &sheet.outcome, problem);
         if (status == STATUS_OK && sheet.outcome != NULL)
             status = pack(app, reply, &row, &manifest, &sheet, problem);

@@ -33,10 +33,11 @@ static void put_motions(Bytes *bytes, Outcome *const outcomes[SIDES], const Summ
     }
     const Outcome *a = outcomes[0], *b = outcomes[1];
     bytes_text(bytes, ", ");
-    compare_put_motions(bytes, &a->response, &b->response, horizons);
+    const size_t motions = compare_put_motions(bytes, &a->response, &b->response, horizons);
     bytes_text(bytes, ", \"psd\": ");
-    compare_put_spectra(bytes, &a->spectrum, &b->spectrum);
+    const size_t spectra = compare_put_spectra(bytes, &a->spectrum, &b->spectrum);
     bytes_text(bytes, ", \"warnings\": [");
+    compare_warn_left(bytes, motions, spectra);
     compare_warn(bytes, &a->response, &b->response, &a->spectrum, &b->spectrum);
     bytes_text(bytes, "]");
 }
@@ -47,7 +48,8 @@ static Status write_comparison(App *app, const ResultRow rows[2], Outcome *const
     Differences differences = {0};
     Bytes bytes = {.most = app->reply_most};
     for (int i = 0; i < 2; i++)
-        TRY(report_read(rows[i].summary, summary_fields, &summaries[i], problem));
+        TRY(report_read(rows[i].summary, strlen(rows[i].summary), summary_fields, &summaries[i],
+                        problem));
     // A study asks more of a scene; what is compared is the scene's own run.
     Status status = differ_json(rows[0].scene, rows[1].scene, "study", &differences, problem);
     if (status == STATUS_OK) {

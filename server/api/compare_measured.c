@@ -6,81 +6,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/record.h"
 #include "server/api/app.h"
 #include "server/api/compare_parts.h"
 #include "server/api/compare_side.h"
+#include "server/api/measured.h"
 #include "server/base/link.h"
-#include "server/codec/read.h"
 #include "server/codec/write.h"
-#include "server/http/body.h"
 #include "server/http/reply.h"
 
-enum { SEGMENT = 4096, SAMPLES_LEAST = 16 };
+enum { SEGMENT = 4096 };
 
-typedef enum Quantity { QUANTITY_ACCELERATION, QUANTITY_VELOCITY, QUANTITY_DISPLACEMENT } Quantity;
-static const char *const quantity_names[] = {"acceleration", "velocity", "displacement", NULL};
 static const char *const quantity_units[] = {"m/s^2", "m/s", "m"};
-
-typedef enum Align { ALIGN_GIVEN, ALIGN_AUTO } Align;
-static const char *const align_names[] = {"given", "auto", NULL};
-
-typedef struct Measured {
-    Reals samples;
-    double interval, start; // [s]
-    int quantity;           // Quantity
-} Measured;
-
-typedef struct MeasuredRequest {
-    char *a;
-    char *channel;
-    Measured measured;
-    int align;         // Align
-    double shift;      // [s]
-    double most_shift; // [s]
-} MeasuredRequest;
-
-// clang-format off
-static const Field measured_fields[] = {
-    FIELD_REALS(Measured, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
-    FIELD_REAL(Measured, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
-    FIELD_REAL(Measured, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
-    FIELD_CHOICE(Measured, quantity, quantity_names, QUANTITY_ACCELERATION, "what was measured"),
-    FIELD_END
-};
-
-static const Field request_fields[] = {
-    FIELD_TEXT(MeasuredRequest, a, 80, PRESENCE_REQUIRED, 0, "a result or a finished job"),
-    FIELD_TEXT(MeasuredRequest, channel, 64, PRESENCE_OPTIONAL, 0, "the result's channel; if absent the quantity's, or for an acceleration mean_acceleration where that alone was sampled"),
-    FIELD_ITEM(MeasuredRequest, measured, measured_fields, NULL, PRESENCE_DEFAULT, "the measurement"),
-    FIELD_CHOICE(MeasuredRequest, align, align_names, ALIGN_GIVEN, "given: by shift; auto: the shift at which both correlate best"),
-    FIELD_REAL(MeasuredRequest, shift, "s", WITHIN(-1e9, 1e9), 0, "that the measured samples are moved by to later times, under given"),
-    FIELD_REAL(MeasuredRequest, most_shift, "s", ABOVE(0), OPTIONAL, "under auto, within which it is sought; anywhere if absent"),
-    FIELD_END
-};
-// clang-format on
-
-static void release(void *asked) {
-    fields_clear(request_fields, asked);
-    free(asked);
-}
-
-// Into what is kept while the request sleeps.
-static Status request_read(const Request *request, Sides *sides, Problem *problem) {
-    TRY(body_require_json(request, problem));
-    MeasuredRequest *asked = calloc(1, sizeof *asked);
-    if (asked == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    sides->asked = asked;
-    sides->release = release;
-    TRY(read_json(request->body, request->body_size, request_fields, asked, problem));
-    TRY(fields_check(request_fields, asked, "", problem));
-    if (asked->measured.samples.count < SAMPLES_LEAST)
-        return problem_add(problem, STATUS_INVALID, "/measured/samples",
-                           "must be at least %d samples, are %zu", SAMPLES_LEAST,
-                           asked->measured.samples.count);
-    return STATUS_OK;
-}
 
 static Status refuse_channel(const MeasuredRequest *asked, const Response *response,
                              Problem *problem) {
@@ -90,7 +26,7 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
         const size_t used = strlen(there);
         if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0 &&
             used + sizeof column->name + 2 < sizeof there)
-            snprintf(there + used, sizeof there - used, "%s%s", used > 0 ? ", " : "", column->name);
+            text_list(there, sizeof there, column->name);
     }
     return problem_add(problem, STATUS_INVALID, "/channel",
                        "must be a sampled channel in %s; the result has: %s",
@@ -115,7 +51,7 @@ static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectr
     static const char *const units[2] = {"", ""};
     Columns pair = {0};
     double rate;
-    TRY(likeness_pair(a, b, SAMPLES_LEAST, &pair, &rate, problem));
+    TRY(likeness_pair(a, b, MEASURED_LEAST, &pair, &rate, problem));
     columns_name(&pair, 0, "a", "");
     columns_name(&pair, 1, "measured", "");
     const size_t segment = pair.rows < SEGMENT ? pair.rows : SEGMENT;
@@ -181,8 +117,12 @@ Status compare_measured(App *app, const Request *request, Reply *reply, Problem 
     Sides sides = sides_begin(request);
     char results[1][72];
     bool is_waiting = false;
-    Status status = sides.asked == NULL ? request_read(request, &sides, problem) : STATUS_OK;
-    const MeasuredRequest *asked = sides.asked;
+    Status status = STATUS_OK;
+    MeasuredRequest *asked = sides.asked;
+    if (asked == NULL)
+        status = measured_read(request, &asked, problem);
+    sides.asked = asked;
+    sides.release = measured_free;
     if (status == STATUS_OK)
         status = side_resolve(app, "a", asked->a, results[0], problem);
     if (status == STATUS_OK)

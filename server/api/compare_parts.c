@@ -74,16 +74,18 @@ static void put_divergence(Bytes *bytes, const char *channel, double parting,
                  !isnan(parting) && !(parting > horizon) ? "true" : "false");
 }
 
-void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
-                         const double horizons[2]) {
+size_t compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
+                           const double horizons[2]) {
     const char *channel = NULL, *separator = "";
     double parting = (double)NAN;
-    size_t compared = 0;
+    size_t compared = 0, left = 0;
     double samples = 0;
     bytes_text(bytes, "\"channels\": [");
-    for (size_t i = 0; i < a->series.count && compared < CHANNELS && samples < SAMPLES; i++) {
+    for (size_t i = 0; i < a->series.count; i++) {
         const Column *from = &a->series.at[i], *to = columns_find(&b->series, from->name);
-        if (to == NULL)
+        const bool is_too_much = compared == CHANNELS || samples >= SAMPLES;
+        left += to != NULL && is_too_much;
+        if (to == NULL || is_too_much)
             continue;
         const Signal x = signal_of(a, from), y = signal_of(b, to);
         const Likeness likeness = likeness_measure(&x, &y, COMPARE_PART);
@@ -100,15 +102,19 @@ void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
     }
     bytes_text(bytes, "]");
     put_divergence(bytes, channel, parting, horizons);
+    return left;
 }
 
-void compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b) {
+size_t compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b) {
     const char *separator = "";
+    size_t compared = 0, left = 0;
     bytes_text(bytes, "[");
-    for (size_t i = 0; i < a->densities.count && i < CHANNELS; i++) {
+    for (size_t i = 0; i < a->densities.count; i++) {
         const Column *from = &a->densities.at[i], *to = columns_find(&b->densities, from->name);
-        if (to == NULL)
+        left += to != NULL && compared == CHANNELS;
+        if (to == NULL || compared == CHANNELS)
             continue;
+        compared++;
         const Distance distance =
             distance_measure(a, from->values, b, to->values, (double)NAN, (double)NAN);
         bytes_text(bytes, separator);
@@ -116,6 +122,7 @@ void compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b) {
         separator = ", ";
     }
     bytes_text(bytes, "]");
+    return left;
 }
 
 void compare_put_warning(Bytes *bytes, const char *format, ...) {
@@ -129,6 +136,17 @@ void compare_put_warning(Bytes *bytes, const char *format, ...) {
                                : ", {\"pointer\": \"\", \"detail\": ");
     bytes_json_string(bytes, text);
     bytes_text(bytes, "}");
+}
+
+void compare_warn_left(Bytes *bytes, size_t motions, size_t spectra) {
+    if (motions > 0)
+        compare_put_warning(bytes,
+                            "%zu more channels of both are not compared: at most %d are, and no "
+                            "more once they have %d samples in all",
+                            motions, CHANNELS, SAMPLES);
+    if (spectra > 0)
+        compare_put_warning(bytes, "%zu more spectra of both are not compared: at most %d are",
+                            spectra, CHANNELS);
 }
 
 void compare_warn(Bytes *bytes, const Response *a, const Response *b, const Spectrum *spectrum_a,

@@ -15,12 +15,16 @@ void compare_put_metrics(Bytes *bytes, const Summary *a, const Summary *b);
 
 // [{"channel", "unit", ...}] for every channel that both sampled, as many as can be looked at while
 // a client waits, and when the displacements part:
-// "channels" and "divergence", the members themselves. `horizons` are the summaries'.
-void compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
-                         const double horizons[2]);
+// "channels" and "divergence", the members themselves. `horizons` are the summaries'. Returns how
+// many channels were too many.
+size_t compare_put_motions(Bytes *bytes, const Response *a, const Response *b,
+                           const double horizons[2]);
 
-// [{"channel", "unit", ...}] for every density that both have.
-void compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b);
+// [{"channel", "unit", ...}] for every density that both have. Returns how many were too many.
+size_t compare_put_spectra(Bytes *bytes, const Spectrum *a, const Spectrum *b);
+
+// Says how many of what both have were not compared, if any.
+void compare_warn_left(Bytes *bytes, size_t motions, size_t spectra);
 
 // What differs in how they were sampled, added to an array of warnings.
 void compare_warn(Bytes *bytes, const Response *a, const Response *b, const Spectrum *spectrum_a,

@@ -79,17 +79,11 @@ static Status reply_look(App *app, Reply *reply, const Encoder *encoder, Look *l
         return problem_set(problem, look->status, "%s", look->problem.detail);
     Sheet sheet = {.own = look->closeup.columns};
     look->closeup.columns = (Columns){.count = 0};
-    const Column *time = &sheet.own.at[0];
-    const Status status = sheet_own(&sheet, problem);
+    const Status status = sheet_own_axis(&sheet, problem);
     if (status != STATUS_OK) {
         sheet_clear(&sheet);
         return status;
     }
-    sheet.table.axis_name = time->name;
-    sheet.table.axis_unit = time->unit;
-    sheet.table.axis = time->values;
-    sheet.table.columns = sheet.chosen + 1;
-    sheet.table.column_count--;
     return tables_reply(app, reply, encoder, &sheet, problem);
 }
 

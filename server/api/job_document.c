@@ -53,6 +53,10 @@ static void put(Bytes *bytes, const JobShow *show, int parts, JobSlots *slots, b
     }
     if (show->labels != NULL)
         write_raw(bytes, "labels", show->labels);
+    if ((parts & JOB_PUT_SENDER) != 0 && show->client != NULL) {
+        bytes_text(bytes, ", \"client\": ");
+        bytes_json_string(bytes, show->client);
+    }
     if (show->study != NULL)
         bytes_format(bytes, ", \"study\": \"%s\"", show->study);
     bytes_format(bytes, ", \"status\": \"%s\", \"progress\": ", job_state_names[show->state]);

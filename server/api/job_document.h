@@ -9,7 +9,8 @@
 enum {
     JOB_PUT_WHOLE =
         1, // with plan, summary, work and warnings, as one job is shown; without, as in a list
-    JOB_PUT_LINKS = 2, // where a server has it; without, "links" is empty
+    JOB_PUT_LINKS = 2,  // where a server has it; without, "links" is empty
+    JOB_PUT_SENDER = 4, // who sent it, if anybody in particular; whoever sends it knows
 };
 
 void job_put(Bytes *bytes, const JobShow *show, int parts);

@@ -10,6 +10,7 @@
 #include "server/api/job_document.h"
 #include "server/base/clock.h"
 #include "server/http/reply.h"
+#include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100, TEXT_MOST = 100 };
@@ -29,7 +30,7 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
         job_drop(job);
         if (status == STATUS_OK && is_meant) {
             bytes_text(bytes, separator);
-            job_put(bytes, &show, JOB_PUT_LINKS);
+            job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
         }
         job_show_clear(&show);
         if (status == STATUS_OK)
@@ -50,11 +51,12 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
                      .title = row->title,
                      .labels = row->labels,
                      .study = row->study,
+                     .client = row->client,
                      .is_result_deleted = !row->has_result};
     text_fit(show.id, sizeof show.id, row->id);
     text_fit(show.result, sizeof show.result, row->result);
     bytes_text(bytes, separator);
-    job_put(bytes, &show, JOB_PUT_LINKS); // borrows the row's texts
+    job_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
     return true;
 }
 
@@ -85,8 +87,7 @@ static Status read_choice(const Request *request, const char *name, const char *
             *choice = i;
             return STATUS_OK;
         }
-        const size_t used = strlen(list);
-        snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", names[i]);
+        text_list(list, sizeof list, names[i]);
     }
     return problem_set(problem, STATUS_USAGE,
                        "the query parameter \"%s\" must be one of %s, is \"%.40s\"", name, list,
@@ -121,6 +122,8 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     TRY(read_choice(request, "status", job_state_names, -1, state, problem));
     TRY(read_choice(request, "kind", kinds, -1, &kind, problem));
     TRY(read_text(request, "before", &search->before, problem));
+    if (search->before != NULL)
+        search->before_unix_ms = job_id_unix_ms(search->before);
     TRY(read_text(request, "q", &search->words, problem));
     TRY(read_text(request, "label", &search->label, problem));
     TRY(read_text(request, "result", &search->result, problem));
@@ -193,6 +196,7 @@ static Status list(App *app, JobSearch search, int state, Bytes *bytes, char las
             return STATUS_OK;
         }
         search.before = before;
+        search.before_unix_ms = job_id_unix_ms(before);
     }
 }
 

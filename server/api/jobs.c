@@ -9,6 +9,7 @@
 #include "server/api/job_document.h"
 #include "server/base/clock.h"
 #include "server/http/body.h"
+#include "server/http/doorman.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 
@@ -16,7 +17,8 @@ static const double wait_initial = 2, wait_most = 30; // [s]
 
 enum { KEEP_WAIT_MS = 10000 }; // then it is looked at again
 
-// Drops the hold on `job`. `code` 0: 200 if it is finished, else 202 and where to look.
+// Drops the hold on `job`. `code` 0: to its sender, 200 if it is finished, else 202 and where to
+// look.
 static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *problem) {
     JobShow show = {0};
     const Status status = job_show(job, &show);
@@ -26,6 +28,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
         return problem_set(problem, status, "the job cannot be shown");
     }
     const bool is_finished = job_state_is_final((int)show.state);
+    const int parts = JOB_PUT_WHOLE | JOB_PUT_LINKS | (code == 200 ? JOB_PUT_SENDER : 0);
     if (code == 0)
         code = is_finished ? 200 : 202;
     if (code == 202)
@@ -33,7 +36,7 @@ static Status reply_job(App *app, Reply *reply, Job *job, int code, Problem *pro
     if (!is_finished)
         reply->retry_after = 1;
     Bytes bytes = {.most = app->reply_most};
-    job_put(&bytes, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS);
+    job_put(&bytes, &show, parts);
     bytes_text(&bytes, "\n");
     job_show_clear(&show);
     return reply_bytes(reply, code, type_json, &bytes, problem);
@@ -143,6 +146,8 @@ static void learn(App *app, const Submission *submission, uint64_t mark, Job *jo
 
 // How long the client would wait, told in the reply.
 static double read_wait(const Request *request, Reply *reply) {
+    if (request->prefer == NULL)
+        return wait_initial;
     const Prefer prefer = header_prefer(request->prefer);
     double wait = prefer.responds_async ? 0 : wait_initial;
     char applied[24] = "";
@@ -198,8 +203,22 @@ static Status answer_job(App *app, const Request *request, Reply *reply, Job *jo
     return reply_job(app, reply, job, 0, problem);
 }
 
-Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
+static Submission submission_of(const Request *request, Reply *reply) {
+    return (Submission){.text = request->body,
+                        .size = request->body_size,
+                        .client = request->client,
+                        .idempotency_key = request->idempotency_key,
+                        .is_replayed = &reply->is_replayed};
+}
+
+static Status create(App *app, const Request *request, const Submission *submission, Reply *reply,
+                     Problem *problem) {
     Job *job = NULL;
+    TRY(submit(app, request, submission, reply, &job, problem));
+    return answer_job(app, request, reply, job, problem);
+}
+
+Status jobs_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     if (request->kept != NULL)
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     bool is_dry = false;
@@ -208,15 +227,10 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
     if (is_dry)
         return dry_run(app, request, reply, problem);
     TRY(refuse_stopping(app, problem));
-    const Submission submission = {.text = request->body,
-                                   .size = request->body_size,
-                                   .client = request->client,
-                                   .idempotency_key = request->idempotency_key,
-                                   .is_replayed = &reply->is_replayed};
+    const Submission submission = submission_of(request, reply);
     if (answer_known(app, request, &submission, reply))
         return STATUS_OK;
-    TRY(submit(app, request, &submission, reply, &job, problem));
-    return answer_job(app, request, reply, job, problem);
+    return create(app, request, &submission, reply, problem);
 }
 
 // The scene of a result, once more: what another engine's version made is made by this one.
@@ -254,26 +268,23 @@ static bool is_light(const Request *request) {
 }
 
 Status jobs_create_quick(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Submission submission = {.text = request->body,
-                                   .size = request->body_size,
-                                   .client = request->client,
-                                   .idempotency_key = request->idempotency_key};
     if (request->kept != NULL)
         return jobs_create(app, request, reply, problem);
     if (request->query_count > 0 || request->idempotency_key != NULL)
         return STATUS_OK;
-    if (is_light(request))
-        return jobs_create(app, request, reply, problem);
     TRY(body_require_json(request, problem));
-    if (!atomic_load(&app->is_stopping))
-        (void)answer_known(app, request, &submission, reply);
-    return STATUS_OK;
+    TRY(refuse_stopping(app, problem));
+    const Submission submission = submission_of(request, reply);
+    if (answer_known(app, request, &submission, reply) || !is_light(request))
+        return STATUS_OK;
+    return create(app, request, &submission, reply, problem);
 }
 
 Status jobs_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     double wait;
-    TRY(request_number(request, "wait", 0, wait_most, 0, &wait, problem));
+    TRY(request_number(request, "wait", 0, 1e9, 0, &wait, problem));
+    wait = wait < wait_most ? wait : wait_most; // as that of Prefer
     if (request->kept != NULL)
         job = pause_end(request->kept, reply);
     else
@@ -283,13 +294,26 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     return reply_job(app, reply, job, 200, problem);
 }
 
+// Whether the request may change what the job of that id came to.
+static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
+    Job *job = NULL;
+    char what[64];
+    TRY(intake_find(app->intake, id, &job, problem));
+    snprintf(what, sizeof what, "the job %.40s", id);
+    const Status status = doorman_owns(request, job_client(job), what, problem);
+    job_drop(job);
+    return status;
+}
+
 Status jobs_dismiss(App *app, const Request *request, Reply *reply, Problem *problem) {
     Job *job = NULL;
     bool is_paused;
-    if (request->kept != NULL)
+    if (request->kept != NULL) {
         job = pause_end(request->kept, reply);
-    else
+    } else {
+        TRY(require_own(app, request, request->parameters[0], problem));
         TRY(intake_dismiss(app->intake, request->parameters[0], &job, problem));
+    }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));
     if (is_paused)
         return STATUS_OK;
@@ -307,6 +331,7 @@ Status jobs_retry(App *app, const Request *request, Reply *reply, Problem *probl
                                        .idempotency_key = request->idempotency_key,
                                        .is_replayed = &reply->is_replayed};
         TRY(refuse_stopping(app, problem));
+        TRY(require_own(app, request, request->parameters[0], problem));
         TRY(submit(app, request, &submission, reply, &job, problem));
     }
     TRY(pause_until_kept(request, reply, job, &is_paused, problem));

@@ -1,10 +1,12 @@
-// Spectra, impacts and energies as columns beside their JSON documents. The JSON was saved when the
-// result was made; the numbers come from the Outcome, but for the energies, which are few.
+// Spectra, impacts and energies as columns. All of them come from the documents that were saved
+// when the result was made, so that they stay whatever engine made it.
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "server/api/results.h"
 #include "server/api/tables.h"
+#include "server/codec/kept.h"
 #include "server/codec/read.h"
 #include "server/encode/csv.h"
 #include "server/encode/impacts_csv.h"
@@ -12,75 +14,18 @@
 #include "server/encode/records.h"
 #include "server/http/reply.h"
 
-Status sheet_psd(Sheet *sheet, Problem *problem) {
-    const Spectrum *spectrum = &sheet->outcome->spectrum;
-    const Columns *densities = &spectrum->densities;
-    if (densities->count == 0)
-        return problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no psd");
-    TRY(sheet_make(sheet, densities->count, problem));
-    for (size_t i = 0; i < densities->count; i++)
-        sheet->chosen[i] = &densities->at[i];
-    sheet->table = (Table){.axis_name = "frequency",
-                           .axis_unit = "Hz",
-                           .count = densities->rows,
-                           .axis = spectrum->frequency,
-                           .columns = sheet->chosen,
-                           .column_count = densities->count};
-    return STATUS_OK;
+Status sheet_psd(Sheet *sheet, const char *text, Problem *problem) {
+    TRY(kept_spectra(text, &sheet->own, problem));
+    return sheet_own_axis(sheet, problem);
 }
 
-Status results_psd(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Encoder *encoder = NULL;
-    Sheet sheet = {.encoding = NULL};
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
-    if (encoder == &encoder_json)
-        return results_document(app, request, reply, DOCUMENT_PSD, problem);
-    TRY(tables_outcome(app, request, reply, "psd", encoder->extension, &sheet.outcome, problem));
-    if (sheet.outcome == NULL)
-        return STATUS_OK;
-    const Status status = sheet_psd(&sheet, problem);
-    if (status == STATUS_OK)
-        return tables_reply(app, reply, encoder, &sheet, problem);
-    sheet_clear(&sheet);
-    return status;
-}
-
-static Status reply_impacts_csv(App *app, Reply *reply, const Impacts *impacts, Problem *problem) {
-    Bytes bytes = {.most = app->reply_most};
-    impacts_csv(impacts, &bytes);
-    return reply_bytes(reply, 200, encoder_csv.content_type, &bytes, problem);
-}
-
-static Status reply_impacts(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet,
-                            Problem *problem) {
-    const Response *response = &sheet->outcome->response;
-    const Impacts *impacts = &response->impacts;
-    Status status = STATUS_OK;
-    if (response->is_unlisted)
-        status = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
-    else if (encoder == &encoder_csv)
-        status = reply_impacts_csv(app, reply, impacts, problem);
-    else
-        status = records_columns(impact_fields, impacts->at, impacts->count, sizeof *impacts->at,
-                                 &sheet->own, problem);
-    if (status == STATUS_OK && encoder != &encoder_csv &&
-        (status = sheet_own(sheet, problem)) == STATUS_OK)
-        return tables_reply(app, reply, encoder, sheet, problem);
-    sheet_clear(sheet);
-    return status;
-}
-
-Status results_impacts(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Encoder *encoder = NULL;
-    Sheet sheet = {.encoding = NULL};
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
-    if (encoder == &encoder_json)
-        return results_document(app, request, reply, DOCUMENT_IMPACTS, problem);
-    TRY(tables_outcome(app, request, reply, "impacts", encoder->extension, &sheet.outcome,
-                       problem));
-    if (sheet.outcome == NULL)
-        return STATUS_OK;
-    return reply_impacts(app, reply, encoder, &sheet, problem);
+static Status sheet_impacts(Sheet *sheet, const char *text, Problem *problem) {
+    Impacts impacts;
+    TRY(kept_impacts(text, &impacts, problem));
+    const Status status = records_columns(impact_fields, impacts.at, impacts.count,
+                                          sizeof *impacts.at, &sheet->own, problem);
+    free(impacts.at);
+    return status == STATUS_OK ? sheet_own(sheet, problem) : status;
 }
 
 // energy.json as it was saved.
@@ -110,28 +55,88 @@ static Status sheet_energy(Sheet *sheet, const char *text, Problem *problem) {
     return status == STATUS_OK ? sheet_own(sheet, problem) : status;
 }
 
-Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const Encoder *encoder = NULL;
-    TRY(tables_encoder(request, 1, reply, &encoder, problem));
-    if (encoder == &encoder_json)
-        return results_document(app, request, reply, DOCUMENT_ENERGY, problem);
-    ResultRow row = {.count = 0};
+static const char *const document_names[] = {
+    [DOCUMENT_PSD] = "psd",
+    [DOCUMENT_IMPACTS] = "impacts",
+    [DOCUMENT_ENERGY] = "energy",
+};
+
+// The text as it was saved, or why there is none.
+static Status result_document(const ResultRow *row, Document document, const char **text,
+                              Problem *problem) {
+    *text = results_document(row, document);
+    if (*text != NULL)
+        return STATUS_OK;
+    return document == DOCUMENT_IMPACTS
+               ? problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts)
+               : problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no %s",
+                             document_names[document]);
+}
+
+// What a saved document is as columns.
+typedef Status Maker(Sheet *sheet, const char *text, Problem *problem);
+static Maker *const makers[] = {
+    [DOCUMENT_PSD] = sheet_psd,
+    [DOCUMENT_IMPACTS] = sheet_impacts,
+    [DOCUMENT_ENERGY] = sheet_energy,
+};
+
+// Kinds and sides as words, which no column of numbers has.
+static Status reply_impacts_csv(App *app, Reply *reply, const char *text, Problem *problem) {
+    Bytes bytes = {.most = app->reply_most};
+    Impacts impacts;
+    TRY(kept_impacts(text, &impacts, problem));
+    impacts_csv(&impacts, &bytes);
+    free(impacts.at);
+    return reply_bytes(reply, 200, encoder_csv.content_type, &bytes, problem);
+}
+
+static Status reply_document(App *app, Reply *reply, const char *text, Problem *problem) {
+    Bytes bytes = {.most = app->reply_most};
+    bytes_text(&bytes, text);
+    bytes_text(&bytes, "\n");
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+static Status reply_columns(App *app, Reply *reply, const Encoder *encoder, Document document,
+                            const char *text, Problem *problem) {
+    if (document == DOCUMENT_IMPACTS && encoder == &encoder_csv)
+        return reply_impacts_csv(app, reply, text, problem);
     Sheet sheet = {.encoding = NULL};
-    char tag[104];
-    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
-    if (status == STATUS_OK) {
-        snprintf(tag, sizeof tag, "%.72s-energy.%s", row.id, encoder->extension);
-        if (reply_immutable(reply, request, tag)) {
-            result_row_clear(&row);
-            return STATUS_OK;
-        }
-        status = row.energy != NULL
-                     ? sheet_energy(&sheet, row.energy, problem)
-                     : problem_set(problem, STATUS_NOT_FOUND, "the result has no energies");
-    }
-    result_row_clear(&row);
+    const Status status = makers[document](&sheet, text, problem);
     if (status == STATUS_OK)
         return tables_reply(app, reply, encoder, &sheet, problem);
     sheet_clear(&sheet);
     return status;
+}
+
+static Status results_part(App *app, const Request *request, Reply *reply, Document document,
+                           Problem *problem) {
+    const Encoder *encoder = NULL;
+    TRY(tables_encoder(request, 1, reply, &encoder, problem));
+    ResultRow row = {.count = 0};
+    const char *text = NULL;
+    char tag[104];
+    Status status = store_result_load(app->store, request->parameters[0], &row, problem);
+    if (status == STATUS_OK)
+        status = result_document(&row, document, &text, problem);
+    snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, document_names[document], encoder->extension);
+    if (status == STATUS_OK && !reply_immutable(reply, request, tag))
+        status = encoder == &encoder_json
+                     ? reply_document(app, reply, text, problem)
+                     : reply_columns(app, reply, encoder, document, text, problem);
+    result_row_clear(&row);
+    return status;
+}
+
+Status results_psd(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, DOCUMENT_PSD, problem);
+}
+
+Status results_impacts(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, DOCUMENT_IMPACTS, problem);
+}
+
+Status results_energy(App *app, const Request *request, Reply *reply, Problem *problem) {
+    return results_part(app, request, reply, DOCUMENT_ENERGY, problem);
 }

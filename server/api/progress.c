@@ -63,7 +63,7 @@ static void tell_finished(Events *events) {
     JobShow show = {0};
     Bytes document = {.most = events->app->reply_most};
     if (job_show(events->job, &show) == STATUS_OK)
-        job_put(&document, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS);
+        job_put(&document, &show, JOB_PUT_WHOLE | JOB_PUT_LINKS | JOB_PUT_SENDER);
     job_show_clear(&show);
     char *told = bytes_take(&document, NULL);
     bytes_format(&events->text, "event: finished\nid: %d\n", FINISHED_ID);

@@ -9,16 +9,26 @@
 #include "server/api/app.h"
 #include "server/api/studies.h"
 #include "server/base/clock.h"
+#include "server/base/digest.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
+#include "server/http/doorman.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
 const char no_impacts[] =
     "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
     "energy.json; with \"output\": {\"impacts\": true} they are listed";
+
+const char *results_document(const ResultRow *row, Document document) {
+    const char *const texts[] = {[DOCUMENT_PSD] = row->psd,
+                                 [DOCUMENT_IMPACTS] = row->impacts,
+                                 [DOCUMENT_ENERGY] = row->energy};
+    const char *text = texts[document];
+    return text != NULL && strcmp(text, "null") != 0 ? text : NULL;
+}
 
 void results_link_gone(const char *id, Reply *reply) {
     snprintf(reply->link, sizeof reply->link,
@@ -71,22 +81,30 @@ static void write_units(Bytes *bytes, const Simulation *simulation) {
     bytes_text(bytes, "}");
 }
 
-static void write_links(Bytes *bytes, const char *id, const StudyAnswer *answer) {
-    static const char *const ways[] = {
-        "manifest",    "series.json", "series.csv",  "series.npy", "series.npz",   "series.mat",
-        "psd.json",    "psd.csv",     "psd.npz",     "psd.mat",    "impacts.json", "impacts.csv",
-        "impacts.npz", "impacts.mat", "energy.json", "energy.csv", "bundle.zip"};
-    bytes_format(bytes, "{\"self\": \"%s/v1/results/%s\"", link_base(), id);
-    for (size_t i = 0; i < COUNT(ways); i++) {
-        // "series" is the JSON one; the other formats are named in full.
-        const size_t size =
-            strstr(ways[i], ".json") != NULL ? strcspn(ways[i], ".") : strlen(ways[i]);
-        bytes_format(bytes, ", \"%.*s\": \"%s/v1/results/%s/%s\"", (int)size, ways[i], link_base(),
-                     id, ways[i]);
+// "series" is the JSON one; the other formats are named in full.
+static void write_ways(Bytes *bytes, const char *id, const char *part, const char *formats) {
+    bytes_format(bytes, ", \"%s\": \"%s/v1/results/%s/%s.json\"", part, link_base(), id, part);
+    for (size_t size; (size = strcspn(formats, " ")) > 0; formats += size + (formats[size] != '\0'))
+        bytes_format(bytes, ", \"%s.%.*s\": \"%s/v1/results/%s/%s.%.*s\"", part, (int)size, formats,
+                     link_base(), id, part, (int)size, formats);
+}
+
+static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *answer) {
+    const char *id = row->id;
+    bytes_format(bytes,
+                 "{\"self\": \"%s/v1/results/%s\", \"manifest\": \"%s/v1/results/%s/manifest\"",
+                 link_base(), id, link_base(), id);
+    write_ways(bytes, id, "series", "csv npy npz mat");
+    if (results_document(row, DOCUMENT_PSD) != NULL)
+        write_ways(bytes, id, "psd", "csv npy npz mat");
+    if (results_document(row, DOCUMENT_IMPACTS) != NULL) {
+        write_ways(bytes, id, "impacts", "csv npy npz mat");
+        // A template (RFC 6570): the impact's place in the ledger, from 1.
+        bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
+                     link_base(), id);
     }
-    // A template (RFC 6570): the impact's place in the ledger, from 1.
-    bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
-                 link_base(), id);
+    write_ways(bytes, id, "energy", "csv npy npz mat");
+    bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", link_base(), id);
     if (answer->study != NULL) {
         // A sweep's rows are a table of their own.
         const bool is_table = answer->study->kind == study_sweep.answer;
@@ -133,7 +151,7 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     else
         bytes_text(bytes, "null");
     bytes_text(bytes, ", \"links\": ");
-    write_links(bytes, row->id, answer);
+    write_links(bytes, row, answer);
     bytes_text(bytes, "}\n");
 }
 
@@ -243,13 +261,25 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
     return status;
 }
 
+bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
+                    const Bytes *content) {
+    char digits[65] = "", tag[104];
+    Digest *digest = digest_new();
+    if (digest != NULL) {
+        digest_take(digest, content->at, content->count);
+        digest_end(digest, digits);
+    }
+    snprintf(tag, sizeof tag, "%.72s-%.8s-%.16s", row->id, what, digits);
+    return reply_tagged(reply, request, tag);
+}
+
 Status results_manifest(App *app, const Request *request, Reply *reply, Problem *problem) {
     ResultRow row = {0};
     Bytes bytes = {.most = app->reply_most};
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = manifest_put(app, &row, &bytes, problem);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !results_tagged(request, reply, &row, "manifest", &bytes))
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     else
         bytes_clear(&bytes);
@@ -257,36 +287,19 @@ Status results_manifest(App *app, const Request *request, Reply *reply, Problem 
     return status;
 }
 
-Status results_document(App *app, const Request *request, Reply *reply, Document document,
-                        Problem *problem) {
-    static const char *const names[] = {"psd", "impacts", "energy"};
-    ResultRow row = {0};
-    const Status status = store_result_load(app->store, request->parameters[0], &row, problem);
-    if (status != STATUS_OK) {
-        result_row_clear(&row);
-        return status;
-    }
-    char tag[104];
-    snprintf(tag, sizeof tag, "%.72s-%s.json", row.id, names[document]);
-    const char *const texts[] = {row.psd, row.impacts, row.energy};
-    const char *text = texts[document];
-    Status answered = STATUS_OK;
-    if (document == DOCUMENT_IMPACTS && text != NULL && strcmp(text, "null") == 0) {
-        answered = problem_set(problem, STATUS_NOT_FOUND, "%s", no_impacts);
-    } else if (text == NULL || strcmp(text, "null") == 0) {
-        answered =
-            problem_set(problem, STATUS_NOT_FOUND, "the scene asked for no %s", names[document]);
-    } else if (!reply_immutable(reply, request, tag)) {
-        Bytes bytes = {.most = app->reply_most};
-        bytes_text(&bytes, text);
-        bytes_text(&bytes, "\n");
-        answered = reply_bytes(reply, 200, type_json, &bytes, problem);
-    }
-    result_row_clear(&row);
-    return answered;
+// Its jobs' clients share it: no one of them may take it from the others.
+static Status require_own(App *app, const Request *request, Problem *problem) {
+    char owner[72], what[128];
+    if (request->client == NULL || request->holder.is_admin)
+        return STATUS_OK;
+    store_job_settle(app->store);
+    TRY(store_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
+    snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
+    return doorman_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);
 }
 
 Status results_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
+    TRY(require_own(app, request, problem));
     TRY(intake_delete(app->intake, request->parameters[0], problem));
     reply_borrow(reply, 204, NULL, NULL, 0);
     return STATUS_OK;

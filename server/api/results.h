@@ -8,13 +8,17 @@
 
 typedef enum Document { DOCUMENT_PSD, DOCUMENT_IMPACTS, DOCUMENT_ENERGY } Document;
 
-// The JSON as it was saved, of the result in the request's first parameter; immutable.
-Status results_document(App *app, const Request *request, Reply *reply, Document document,
-                        Problem *problem);
+// The JSON as it was saved; NULL where the scene asked for none.
+const char *results_document(const ResultRow *row, Document document);
 
 // Append the documents of a result's row, as /v1/results/{id} and its manifest answer them.
 Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem);
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem);
+
+// The entity tag of what may change with a material's status or the base of links, by its content
+// (or by another that changes with it). True if the client has it.
+bool results_tagged(const Request *request, Reply *reply, const ResultRow *row, const char *what,
+                    const Bytes *content);
 
 // The links of a 410: how to have the result made by this engine, and what it is.
 void results_link_gone(const char *id, Reply *reply);

@@ -9,6 +9,8 @@ static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
 static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
+static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
+                                          "most_shift", "interval", "unit",  NULL};
 static const char *const of_materials[] = {"q", NULL};
 
 // clang-format off
@@ -49,7 +51,7 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/sensitivity.{format}", "read",   NULL,         "The study's slopes and bands as json, the slopes as csv, or its chart as svg", results_sensitivity},
     {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_sensitivity},
     {"GET",    "/v1/compare",                           "read",   of_compare,   "Two results side by side, and the inputs that differ", compare_results},
-    {"POST",   "/v1/compare",                           "read",   NULL,         "A result beside a measured motion", compare_measured},
+    {"POST",   "/v1/compare",                           "read",   of_measured,  "A result beside a measured motion", compare_measured},
     {"GET",    "/v1/cache",                             "read",   NULL,         "How often what is known already helped, by layer", cache_show},
     {"POST",   "/v1/cache/explain",                     "read",   NULL,         "Whether a scene is known, and in what it differs from the nearest that is", cache_explain},
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},

@@ -9,10 +9,16 @@
 #include "server/base/link.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
+#include "server/encode/chart_sweep.h"
+#include "server/encode/encoding.h"
+#include "server/encode/sweep_columns.h"
 #include "server/encode/sweep_table.h"
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep_rows.h"
+
+// Up to so many bytes a text is made at once.
+enum { WHOLE_MOST = 4 << 20 };
 
 // A path begins with a result, or with the job that makes it.
 static bool is_of_job(const Request *request) {
@@ -24,9 +30,8 @@ static bool is_of_job(const Request *request) {
 static bool is_known(const Request *request, Reply *reply, const SweepShow *show,
                      const char *extension) {
     char tag[112];
-    snprintf(tag, sizeof tag, "%.72s-t%llu-%llu.%.5s", show->row.result,
-             (unsigned long long)show->chunks_done, (unsigned long long)show->row.retries,
-             extension);
+    snprintf(tag, sizeof tag, "%.72s-t%zu-%llu.%.5s", show->row.result, show->chunks.count,
+             (unsigned long long)show->row.retries, extension);
     if (show->is_complete && show->sweep->table.failed == 0)
         return reply_immutable(reply, request, tag);
     if (show->is_complete)
@@ -35,22 +40,151 @@ static bool is_known(const Request *request, Reply *reply, const SweepShow *show
     return false;
 }
 
+// A table on its way: a text as far as it is made, or an archive whose every byte has its place.
+typedef struct Sending {
+    SweepShow show;
+    SweepSource source;
+    bool (*next)(SweepText *text, Bytes *bytes); // NULL: an archive
+    SweepText text;
+    Bytes made;
+    size_t taken; // of that
+    bool is_last;
+    const Encoder *encoder; // of an archive; NULL: NPZ
+    SweepArchive archive;
+    Encoding *encoding;
+} Sending;
+
+static void sending_free(void *context) {
+    Sending *sending = context;
+    encoding_close(sending->encoding);
+    bytes_clear(&sending->made);
+    sweep_show_clear(&sending->show);
+    free(sending);
+}
+
+static ptrdiff_t text_next(void *context, char *target, size_t size) {
+    Sending *sending = context;
+    Bytes *made = &sending->made;
+    size_t sent = 0;
+    while (sent < size) {
+        if (sending->taken == made->count) {
+            if (sending->is_last)
+                break;
+            made->count = sending->taken = 0;
+            sending->is_last = !sending->next(&sending->text, made);
+            if (sending->text.is_broken || made->is_failed)
+                return STREAM_BROKEN;
+        }
+        const size_t left = made->count - sending->taken;
+        const size_t count = left < size - sent ? left : size - sent;
+        memcpy(target + sent, made->at + sending->taken, count);
+        sending->taken += count;
+        sent += count;
+    }
+    return sent > 0 ? (ptrdiff_t)sent : STREAM_END;
+}
+
+static ptrdiff_t archive_next(void *context, char *target, size_t size) {
+    Sending *sending = context;
+    const size_t count = encoding_next(sending->encoding, target, size);
+    return sending->archive.is_broken ? STREAM_BROKEN : count > 0 ? (ptrdiff_t)count : STREAM_END;
+}
+
+static void archive_cut(void *context, uint64_t first, uint64_t size) {
+    encoding_cut(((Sending *)context)->encoding, first, size);
+}
+
+static Status refuse_changed(Problem *problem) {
+    return problem_set(
+        problem, STATUS_BUSY,
+        "the sweep's rows were deleted or made anew while they were read; ask again");
+}
+
+// The beginning at once: where that is all it can be kept, and compressed.
+static Status begin_text(Sending *sending, Problem *problem) {
+    Bytes *made = &sending->made;
+    while (!sending->is_last && made->count < WHOLE_MOST && !made->is_failed)
+        sending->is_last = !sending->next(&sending->text, made);
+    return sending->text.is_broken ? refuse_changed(problem)
+           : made->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the table")
+                             : STATUS_OK;
+}
+
+static Status begin_archive(Sending *sending, Problem *problem) {
+    Layout layout = {0};
+    const Status status =
+        sending->encoder != NULL
+            ? sweep_columns_lay(&sending->archive, sending->encoder, &layout, problem)
+            : sweep_npz_lay(&sending->archive, &layout, problem);
+    if (status != STATUS_OK) {
+        layout_clear(&layout);
+        return status == STATUS_CONFLICT ? refuse_changed(problem) : status;
+    }
+    return encoding_open_layout(&layout, &sending->encoding, problem);
+}
+
+// Takes `sending`, also when it fails.
+static Status send(Reply *reply, const char *content_type, Sending *sending, Problem *problem) {
+    Status status;
+    sending->source = (SweepSource){sending->show.rows, sweep_show_read, &sending->show};
+    sending->text = (SweepText){.sweep = sending->show.sweep,
+                                .source = &sending->source,
+                                .result = sending->show.row.result};
+    sending->archive = (SweepArchive){.sweep = sending->show.sweep, .source = &sending->source};
+    status = sending->next != NULL ? begin_text(sending, problem) : begin_archive(sending, problem);
+    if (status == STATUS_OK && sending->next != NULL && sending->is_last) {
+        status = reply_bytes(reply, 200, content_type, &sending->made, problem);
+        sending_free(sending);
+        return status;
+    }
+    if (status != STATUS_OK) {
+        sending_free(sending);
+        return status;
+    }
+    reply_borrow(reply, 200, content_type, NULL, 0);
+    // Of rows that still come there is no part that fits the next.
+    reply->accepts_ranges = sending->encoding != NULL && sending->show.is_complete;
+    reply->stream = sending->encoding != NULL ? (Stream){.next = archive_next,
+                                                         .size = encoding_size(sending->encoding),
+                                                         .cut = archive_cut}
+                                              : (Stream){.next = text_next, .size = UINT64_MAX};
+    reply->release = sending_free;
+    reply->context = sending;
+    return STATUS_OK;
+}
+
+static Status send_chart(App *app, Reply *reply, const char *content_type, Sending *sending,
+                         Problem *problem) {
+    const SweepSource source = {sending->show.rows, sweep_show_read, &sending->show};
+    Bytes bytes = {.most = app->reply_most};
+    Status status = chart_sweep(sending->show.sweep, &source, &bytes)
+                        ? reply_bytes(reply, 200, content_type, &bytes, problem)
+                        : refuse_changed(problem);
+    bytes_clear(&bytes);
+    sending_free(sending);
+    return status;
+}
+
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
     const AnswerFormat *format;
-    SweepShow show = {.sweep = NULL};
     TRY(study_format(request, answer_formats(study_sweep.answer), reply, &format, problem));
-    Status status = sweep_show_load(app->store, request->parameters[0], is_of_job(request), true,
-                                    &show, problem);
-    if (status == STATUS_OK && !is_known(request, reply, &show, format->extension)) {
-        Bytes bytes = {.most = app->reply_most};
-        if (format == answer_formats(study_sweep.answer))
-            sweep_json(show.sweep, show.row.result, &bytes);
-        else
-            format->write((const Variant *)(const void *)show.sweep, &bytes);
-        status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
+    Sending *sending = calloc(1, sizeof *sending);
+    if (sending == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
+    const Status status = sweep_show_load(app->store, request->parameters[0], is_of_job(request),
+                                          true, &sending->show, problem);
+    if (status != STATUS_OK || is_known(request, reply, &sending->show, format->extension)) {
+        sending_free(sending);
+        return status;
     }
-    sweep_show_clear(&show);
-    return status;
+    if (strcmp(format->extension, "svg") == 0)
+        return send_chart(app, reply, format->content_type, sending, problem);
+    sending->next = strcmp(format->extension, "json") == 0  ? sweep_json_next
+                    : strcmp(format->extension, "csv") == 0 ? sweep_csv_next
+                                                            : NULL;
+    if (strcmp(format->extension, "npz") != 0)
+        sending->encoder = encoder_find(format->extension);
+    return send(reply, format->content_type, sending, problem);
 }
 
 static Status read_index(const Request *request, uint64_t *index, Problem *problem) {

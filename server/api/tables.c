@@ -40,15 +40,25 @@ Status sheet_own(Sheet *sheet, Problem *problem) {
     return STATUS_OK;
 }
 
+Status sheet_own_axis(Sheet *sheet, Problem *problem) {
+    TRY(sheet_own(sheet, problem));
+    Table *table = &sheet->table;
+    const Column *axis = &sheet->own.at[0];
+    table->axis_name = axis->name;
+    table->axis_unit = axis->unit;
+    table->axis = axis->values;
+    table->columns = sheet->chosen + 1;
+    table->column_count--;
+    return STATUS_OK;
+}
+
 Status tables_encoder(const Request *request, size_t parameter, Reply *reply,
                       const Encoder **encoder, Problem *problem) {
     const char *extension = request->parameters[parameter];
     char known[96] = "";
     const char *types[16] = {NULL};
     for (size_t i = 0; encoders[i] != NULL && i + 1 < COUNT(types); i++) {
-        const size_t used = strlen(known);
-        snprintf(known + used, sizeof known - used, "%s%s", i > 0 ? ", " : "",
-                 encoders[i]->extension);
+        text_list(known, sizeof known, encoders[i]->extension);
         types[i] = encoders[i]->content_type;
         types[i + 1] = NULL;
     }

@@ -22,8 +22,11 @@ Status sheet_make(Sheet *sheet, size_t count, Problem *problem);
 // Chooses all columns that are the sheet's own.
 Status sheet_own(Sheet *sheet, Problem *problem);
 
-// The table of an outcome's spectra; the sheet holds the outcome. (ledgers.c)
-Status sheet_psd(Sheet *sheet, Problem *problem);
+// The same with the first of them as the axis.
+Status sheet_own_axis(Sheet *sheet, Problem *problem);
+
+// The table of spectra as they were saved. (ledgers.c)
+Status sheet_psd(Sheet *sheet, const char *text, Problem *problem);
 
 // The encoder asked for by extension (a parameter of the path), else by Accept.
 Status tables_encoder(const Request *request, size_t parameter, Reply *reply,

@@ -271,7 +271,7 @@ typedef struct Judgement {
     unsigned scopes;
 } Judgement;
 
-static Judgement judge(Tokens *tokens, const unsigned char *digest, char client[TOKEN_NAME_SIZE]) {
+static Judgement judge(Tokens *tokens, const unsigned char *digest, Holder *holder) {
     Judgement found = {0};
     pthread_mutex_lock(&tokens->lock);
     const int64_t now = tokens->now_unix_ms;
@@ -282,7 +282,8 @@ static Judgement judge(Tokens *tokens, const unsigned char *digest, char client[
         found.is_revoked = entry->revoked_unix_ms != 0;
         found.is_expired = !found.is_revoked && !is_usable(entry, now);
         found.scopes = entry->scopes;
-        memcpy(client, entry->name, TOKEN_NAME_SIZE);
+        memcpy(holder->name, entry->name, sizeof holder->name);
+        holder->is_admin = (entry->scopes & scope_bit("admin")) != 0;
         if (is_usable(entry, now))
             entry->seen_unix_ms = now;
     }
@@ -313,28 +314,28 @@ static Status refuse(const Judgement *found, const char *authorization, Problem 
                                              "\"Authorization: Bearer TOKEN\"");
 }
 
-Status tokens_check(Tokens *tokens, const char *authorization, const char *scope,
-                    char client[TOKEN_NAME_SIZE], Problem *problem) {
+Status tokens_check(Tokens *tokens, const char *authorization, const char *scope, Holder *holder,
+                    Problem *problem) {
     unsigned char digest[DIGEST_BYTES];
     size_t size = 0;
     const char *token = authorization != NULL ? bearer(authorization, &size) : NULL;
-    client[0] = '\0';
+    *holder = (Holder){.name = ""};
     if (token != NULL)
         digest_sum(token, size, digest);
-    Judgement found = judge(tokens, token != NULL ? digest : NULL, client);
+    Judgement found = judge(tokens, token != NULL ? digest : NULL, holder);
     if (token != NULL && found.is_asked && !found.is_known && look_again(tokens))
-        found = judge(tokens, digest, client);
+        found = judge(tokens, digest, holder);
     if (!found.is_asked)
         return STATUS_OK;
     if (!found.is_known || found.is_revoked || found.is_expired) {
-        client[0] = '\0';
+        *holder = (Holder){.name = ""};
         return refuse(&found, authorization, problem);
     }
-    if ((found.scopes & (scope_bit(scope) | scope_bit("admin"))) != 0)
+    if ((found.scopes & scope_bit(scope)) != 0 || holder->is_admin)
         return STATUS_OK;
     return problem_set(problem, STATUS_FORBIDDEN,
                        "this needs the scope \"%s\", which the token \"%s\" has not", scope,
-                       client);
+                       holder->name);
 }
 
 Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,

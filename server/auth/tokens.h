@@ -19,11 +19,17 @@ void tokens_close(Tokens *tokens);
 // How many could be used now.
 size_t tokens_usable(Tokens *tokens);
 
-// Whether a request with this Authorization header (NULL: none) may use what needs `scope`.
-// `client` becomes the token's name, "" where none is asked for. STATUS_UNAUTHORIZED,
-// STATUS_FORBIDDEN. From any thread; no SQL unless the token is unknown, and then seldom.
-Status tokens_check(Tokens *tokens, const char *authorization, const char *scope,
-                    char client[TOKEN_NAME_SIZE], Problem *problem);
+// Whose token it is.
+typedef struct Holder {
+    char name[TOKEN_NAME_SIZE]; // the token's; "" where none is asked for
+    bool is_admin;
+} Holder;
+
+// Whether a request with this Authorization header (NULL: none) may use what needs `scope`, and who
+// sends it. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN. From any thread; no SQL unless the token is
+// unknown, and then seldom.
+Status tokens_check(Tokens *tokens, const char *authorization, const char *scope, Holder *holder,
+                    Problem *problem);
 
 enum { TOKEN_SIZE = 73 }; // "impactd_", 64 digits and a NUL
 // Makes a token of 256 random bits and fills the row but for its name. `scopes` is a list with

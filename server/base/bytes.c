@@ -90,20 +90,13 @@ void bytes_real(Bytes *bytes, double value) {
 
 void bytes_reals(Bytes *bytes, const double *values, size_t count) {
     for (size_t i = 0; i < count; i += CHUNK) {
-        const size_t end = count - i < CHUNK ? count : i + CHUNK;
-        if (!bytes_reserve(bytes, (end - i) * (SHORTEST_SIZE + 1)))
+        const size_t some = count - i < CHUNK ? count - i : CHUNK;
+        if (!bytes_reserve(bytes, some * (SHORTEST_SIZE + 1) + 1))
             return;
         char *at = bytes->at + bytes->count;
-        for (size_t j = i; j < end; j++) {
-            if (j > 0)
-                *at++ = ',';
-            if (isfinite(values[j])) {
-                at += shortest_write(at, values[j]);
-            } else {
-                memcpy(at, "null", 4);
-                at += 4;
-            }
-        }
+        if (i > 0)
+            *at++ = ',';
+        at += shortest_list(at, values + i, some);
         *at = '\0';
         bytes->count = (size_t)(at - bytes->at);
     }

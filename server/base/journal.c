@@ -1,7 +1,10 @@
 #include "server/base/journal.h"
 
+#include <poll.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 void journal_put(Bytes *bytes, const char *name, const char *text, size_t most) {
     if (text == NULL)
@@ -17,7 +20,23 @@ void journal_put(Bytes *bytes, const char *name, const char *text, size_t most) 
     bytes_text(bytes, strnlen(text, most + 1) > most ? "...\"" : "\"");
 }
 
+// A pipe that nobody empties must not hold up who writes: where there is no room the line is lost.
+// The lock keeps the room that was found for the line that it was found for.
 void journal_write(const Bytes *line) {
-    if (line->at != NULL)
+    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+    static unsigned long lost;
+    if (line->at == NULL)
+        return;
+    struct pollfd end = {.fd = STDERR_FILENO, .events = POLLOUT};
+    pthread_mutex_lock(&lock);
+    if (poll(&end, 1, 0) == 0) {
+        lost++;
+    } else if (lost > 0) {
+        fprintf(stderr, "impactd: %lu lines were lost, nobody took them\nimpactd: %s\n", lost,
+                line->at);
+        lost = 0;
+    } else {
         fprintf(stderr, "impactd: %s\n", line->at);
+    }
+    pthread_mutex_unlock(&lock);
 }

@@ -16,6 +16,10 @@ extern "C" {
 // length. `target` has room for SHORTEST_SIZE bytes, all of which may be written to.
 size_t shortest_write(char *target, double value);
 
+// Many of them with commas between, "null" where one is not finite; returns the length. `target`
+// has room for SHORTEST_SIZE + 1 bytes for each.
+size_t shortest_list(char *target, const double *values, size_t count);
+
 #ifdef __cplusplus
 }
 #endif

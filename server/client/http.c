@@ -214,8 +214,17 @@ static size_t body_take(char *piece, size_t one, size_t count, void *of) {
     return 0;
 }
 
+static const char *behind_scheme(const char *url) {
+    return strstr(url, "://") != NULL ? strstr(url, "://") + 3 : url;
+}
+
 static Status failure_tell(const Transfer *transfer, CURLcode code, Problem *problem) {
     const char *url = transfer->http->url;
+    // A TLS server closes on whoever speaks plainly, before a byte of an answer.
+    const bool may_be_tls = !transfer->http->is_tls && transfer->answer->code == 0 &&
+                            transfer->headers == 0 && transfer->taken == 0;
+    const char *hint = may_be_tls ? "; if the server speaks TLS, name it as https://" : "";
+    const char *hinted = may_be_tls ? behind_scheme(url) : "";
     switch (code) {
     case CURLE_COULDNT_CONNECT:
     case CURLE_COULDNT_RESOLVE_HOST:
@@ -225,24 +234,28 @@ static Status failure_tell(const Transfer *transfer, CURLcode code, Problem *pro
             "no server answers at %s (%s); start one with \"impactd serve\", or name "
             "another by --server URL or IMPACTD_SERVER",
             url, curl_easy_strerror(code));
+    case CURLE_SSL_CONNECT_ERROR:
+        return problem_set(problem, STATUS_UNREACHABLE,
+                           "no TLS connection to %s can be made (%s); if the server speaks plain "
+                           "HTTP, name it as http://%s",
+                           url, curl_easy_strerror(code), behind_scheme(url));
     case CURLE_PEER_FAILED_VERIFICATION:
     case CURLE_SSL_CACERT_BADFILE:
-    case CURLE_SSL_CONNECT_ERROR:
         return problem_set(problem, STATUS_UNREACHABLE,
                            "%s cannot be trusted (%s); --ca-file FILE names the certificate that "
                            "signed the server's",
                            url, curl_easy_strerror(code));
     case CURLE_UNSUPPORTED_PROTOCOL:
     case CURLE_WEIRD_SERVER_REPLY:
-        return problem_set(problem, STATUS_UNREACHABLE, "what answers at %s does not speak HTTP",
-                           url);
+        return problem_set(problem, STATUS_UNREACHABLE,
+                           "what answers at %s does not speak HTTP%s%s", url, hint, hinted);
     case CURLE_OPERATION_TIMEDOUT:
         return problem_set(problem, STATUS_UNREACHABLE, "%s has been silent for too long", url);
     case CURLE_OUT_OF_MEMORY:
         return problem_set(problem, STATUS_NO_MEMORY, "no memory");
     default:
-        return problem_set(problem, STATUS_UNREACHABLE, "the connection to %s broke: %s", url,
-                           curl_easy_strerror(code));
+        return problem_set(problem, STATUS_UNREACHABLE, "the connection to %s broke: %s%s%s", url,
+                           curl_easy_strerror(code), hint, hinted);
     }
 }
 
@@ -294,6 +307,9 @@ static CURLcode exchange(Transfer *transfer, const char *url, struct curl_slist 
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)HTTP_SILENCE);
     curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
+    if (ask->within > 0)
+        curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS,
+                         ask->within < 1e6 ? (long)(1000 * ask->within) + 1 : 0L);
     if (http->is_loopback) // a proxy of the environment is not meant for these
         curl_easy_setopt(curl, CURLOPT_PROXY, "");
     if (http->ca_file != NULL)

@@ -42,6 +42,7 @@ typedef struct HttpAsk {
     Status (*take)(void *context, const void *bytes, size_t size, Problem *problem);
     void *context;
     uint64_t most;
+    double within; // [s] for the whole, above 0; 0: any
 } HttpAsk;
 
 typedef struct HttpAnswer {

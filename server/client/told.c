@@ -1,6 +1,7 @@
 #include "server/client/told.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "server/codec/read.h"
@@ -61,6 +62,16 @@ Status job_told_read(const HttpAnswer *answer, JobTold *job, Problem *problem) {
     tame(job->status);
     tame(job->result);
     return STATUS_OK;
+}
+
+bool job_told_event(const char *text, size_t size, const char *id, JobTold *job) {
+    (void)read_json(text, size, job_fields, job, NULL);
+    free(job->id);
+    job->id = strdup(id);
+    if (job->id == NULL || job->status == NULL || strlen(job->status) > 40)
+        return false;
+    tame(job->status);
+    return true;
 }
 
 void job_told_clear(JobTold *job) {

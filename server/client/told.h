@@ -22,6 +22,9 @@ typedef struct JobTold {
 
 // STATUS_UNREACHABLE if the answer is no job. Cleared by job_told_clear in any case.
 Status job_told_read(const HttpAnswer *answer, JobTold *job, Problem *problem);
+// The same of the data of an event of progress, which names no job: it is `id`. False if it is
+// none.
+bool job_told_event(const char *text, size_t size, const char *id, JobTold *job);
 void job_told_clear(JobTold *job);
 bool job_told_is_final(const JobTold *job);
 

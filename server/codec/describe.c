@@ -211,8 +211,7 @@ static void print_item(Printer *printer, const Field *field) {
     close_bracket(printer, "]");
 }
 
-// One schema per kind. Only the default kind may stand without its tag, so exactly one of them
-// fits.
+// One schema per kind. Only a default kind may stand without its tag, so exactly one of them fits.
 static void print_variant(Printer *printer, const Field *field) {
     open_member(printer, "oneOf", "[");
     const Kind *kind;
@@ -346,7 +345,7 @@ static void print_object(Printer *printer, const Field *fields, const KindTable 
     name_member(printer, "required");
     bytes_text(printer->bytes, "[");
     size_t count = 0;
-    if (kind != NULL && kind != kinds->at(0)) {
+    if (kind != NULL && (kinds->is_named || kind != kinds->at(0))) {
         bytes_json_string(printer->bytes, kinds->tag);
         count++;
     }

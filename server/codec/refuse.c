@@ -86,17 +86,32 @@ void refuse_type(Reader *reader, const char *pointer, const json_t *value, const
                  type_name(value));
 }
 
+enum { NAMES_SIZE = sizeof((Fault){0}.detail) };
+
+static void list_names(const char *const *names, char list[NAMES_SIZE]) {
+    size_t length = 0;
+    list[0] = '\0';
+    for (size_t i = 0; names[i] != NULL && length < NAMES_SIZE; i++)
+        length += (size_t)snprintf(list + length, NAMES_SIZE - length, "%s%s", i > 0 ? ", " : "",
+                                   names[i]);
+}
+
+void refuse_unnamed(Reader *reader, const char *pointer, const char *const *names) {
+    char list[NAMES_SIZE];
+    if (!refuse_wants_detail(reader))
+        return;
+    list_names(names, list);
+    problem_add(reader->problem, STATUS_INVALID, pointer, "is required, one of %s", list);
+}
+
 const char *refuse_name(Reader *reader, const char *pointer, const json_t *value,
                         const char *const *names) {
     const char *name = json_string_value(value);
     const char *meant = texts_nearest(names, name);
     if (!refuse_wants_detail(reader))
         return meant;
-    char list[sizeof((Fault){0}.detail)] = "", shown[64];
-    size_t length = 0;
-    for (size_t i = 0; names[i] != NULL && length < sizeof list; i++)
-        length += (size_t)snprintf(list + length, sizeof list - length, "%s%s", i > 0 ? ", " : "",
-                                   names[i]);
+    char list[NAMES_SIZE], shown[64];
+    list_names(names, list);
     text_quote(shown, sizeof shown, name);
     refuse_value(reader, pointer, value, NULL, meant, "must be one of %s, is %s", list, shown);
     return meant;

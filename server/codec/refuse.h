@@ -27,6 +27,9 @@ void refuse_value(Reader *reader, const char *pointer, const json_t *value, cons
 void refuse_type(Reader *reader, const char *pointer, const json_t *value, const Field *field,
                  const char *wanted);
 
+// "is required, one of a, b, c" of a name that is not there.
+void refuse_unnamed(Reader *reader, const char *pointer, const char *const *names);
+
 // "must be one of a, b, c, is "x"" of a string, with the nearest of the names, which is returned
 // (NULL if none is near).
 const char *refuse_name(Reader *reader, const char *pointer, const json_t *value,

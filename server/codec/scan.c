@@ -31,6 +31,11 @@ static bool is_too_deep(const Scan *scan) {
     return scan->depth > READ_DEPTH;
 }
 
+static bool has_too_many_members(const Scan *scan) {
+    const Frame *frame = scan->depth > 0 ? &scan->frames[scan->depth - 1] : NULL;
+    return frame != NULL && !frame->is_array && frame->index >= SCAN_MEMBERS;
+}
+
 static void open_container(Scan *scan, bool is_array) {
     if (scan->depth < READ_DEPTH)
         scan->frames[scan->depth] = (Frame){.is_array = is_array};
@@ -101,6 +106,11 @@ bool scan_allows(const char *text, size_t size, size_t *position, const char **s
             *sentence = "objects and arrays are nested more than 32 deep";
             return false;
         }
+        if (has_too_many_members(&scan)) {
+            *position = scan.at - 1;
+            *sentence = "there are more than 4096 members in one object";
+            return false;
+        }
         if (scan.containers > SCAN_CONTAINERS) {
             *position = scan.at - 1;
             *sentence = "there are more than 131072 objects and arrays";
@@ -109,7 +119,8 @@ bool scan_allows(const char *text, size_t size, size_t *position, const char **s
     }
     return true;
 }
-_Static_assert(READ_DEPTH == 32 && SCAN_CONTAINERS == 131072, "the sentences name these numbers");
+_Static_assert(READ_DEPTH == 32 && SCAN_CONTAINERS == 131072 && SCAN_MEMBERS == 4096,
+               "the sentences name these numbers");
 
 // The key as people know it: escapes decoded by the parser itself, or left where they are none.
 static void key_name(const Scan *scan, const Frame *frame, char name[KEY_SIZE]) {

@@ -11,6 +11,8 @@ enum {
     // A parsed container costs some hundred bytes where its text takes two: the number of them is
     // bounded too.
     SCAN_CONTAINERS = 1 << 17,
+    // Of one object: more than any row table has, and a table of a million keys costs seconds.
+    SCAN_MEMBERS = 1 << 12,
 };
 
 typedef struct ScanPlace {

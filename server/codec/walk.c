@@ -146,7 +146,7 @@ static const Kind *read_kind(Reader *reader, const json_t *object, const KindTab
                              const char *pointer, bool *is_known) {
     const json_t *tag = json_object_get(object, kinds->tag);
     *is_known = true;
-    if (tag == NULL)
+    if (tag == NULL && !kinds->is_named)
         return kinds->at(0);
     const Kind *kind = json_is_string(tag) ? kind_find(kinds, json_string_value(tag)) : NULL;
     if (kind != NULL)
@@ -154,13 +154,17 @@ static const Kind *read_kind(Reader *reader, const json_t *object, const KindTab
     *is_known = false;
     char place[POINTER_SIZE];
     pointer_join(place, sizeof place, pointer, kinds->tag);
+    const char *names[KINDS_SHOWN + 1] = {NULL};
+    for (size_t i = 0; i < KINDS_SHOWN && kinds->at(i) != NULL; i++)
+        names[i] = kinds->at(i)->name;
+    if (tag == NULL) {
+        refuse_unnamed(reader, place, names);
+        return NULL;
+    }
     if (!json_is_string(tag)) {
         refuse_type(reader, place, tag, NULL, "a string");
         return NULL;
     }
-    const char *names[KINDS_SHOWN + 1] = {NULL};
-    for (size_t i = 0; i < KINDS_SHOWN && kinds->at(i) != NULL; i++)
-        names[i] = kinds->at(i)->name;
     const char *meant = refuse_name(reader, place, tag, names);
     return meant != NULL ? kind_find(kinds, meant) : NULL;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/simulation/simulation.h"
+#include "server/api/app.h"
 #include "server/command/any_study.h"
 #include "server/command/cancel.h"
 #include "server/command/check.h"
@@ -33,7 +34,7 @@ static const Command command_help = {
 };
 static const Command command_version = {
     .name = "version",
-    .summary = "print the engine's name and version",
+    .summary = "print the versions of program and engine",
     .help = "  impactd version\n",
     .run = version_run,
 };
@@ -50,7 +51,7 @@ static const char overview[] =
     "\n"
     "  impactd serve                        start the daemon on http://127.0.0.1:8080\n"
     "  impactd run scene.json               run one scene here and print the finished job\n"
-    "  impactd run scene.json -o out.csv    write its time series (json, csv, npy)\n"
+    "  impactd run scene.json -o out.csv    write its time series (npy, npz, mat)\n"
     "  impactd check scene.json             say what is wrong with a scene, or show its plan\n"
     "  impactd tradeoff scene.json          try solvers and steps on it: error against CPU time\n"
     "  impactd ensemble scene.json          many seeds of a random base: means and confidence\n"
@@ -131,7 +132,7 @@ static int version_run(int argc, char *const *argv) {
         fprintf(stderr, "impactd version: takes no arguments, is given %s\n", argv[0]);
         return COMMAND_USAGE;
     }
-    printf("%s\n", engine_version);
+    printf("impactd %s (engine %s)\n", program_version, engine_version);
     return COMMAND_OK;
 }
 

@@ -152,6 +152,75 @@ static Status look(Daemon *daemon, const char *id, double wait, bool was_there, 
     }
 }
 
+// A job's events as they come, line by line; longer lines than one of progress are passed over.
+typedef struct Events {
+    Show *show;
+    const char *id;
+    const HttpAnswer *answer;
+    bool is_progress; // what the lines of data belong to
+    size_t length;    // of the line so far, also beyond its room
+    char line[1024];
+} Events;
+
+static void line_take(Events *events) {
+    static const char name[] = "event: ", data[] = "data: ";
+    JobTold job = {0};
+    const size_t size = events->length;
+    events->length = 0;
+    if (size >= sizeof events->line)
+        return;
+    events->line[size] = '\0';
+    if (strncmp(events->line, name, sizeof name - 1) == 0)
+        events->is_progress = strcmp(events->line + sizeof name - 1, "progress") == 0;
+    if (!events->is_progress || strncmp(events->line, data, sizeof data - 1) != 0)
+        return;
+    if (job_told_event(events->line + sizeof data - 1, size - (sizeof data - 1), events->id, &job))
+        show_job(events->show, &job);
+    job_told_clear(&job);
+}
+
+static bool are_events(const HttpAnswer *answer) {
+    return strcmp(answer->content_type, "text/event-stream") == 0;
+}
+
+static Status events_take(void *context, const void *bytes, size_t size, Problem *problem) {
+    Events *events = context;
+    const char *text = bytes;
+    if (!are_events(events->answer))
+        return problem_set(problem, STATUS_UNSUPPORTED_TYPE, "the answer is no stream of events");
+    for (size_t i = 0; i < size; i++) {
+        if (text[i] == '\n') {
+            line_take(events);
+        } else {
+            if (events->length < sizeof events->line)
+                events->line[events->length] = text[i];
+            events->length++;
+        }
+    }
+    return STATUS_OK;
+}
+
+// Shows what the server tells of the job for as long as it does. False where it has no such stream:
+// it is not asked for it again.
+static bool events_follow(Daemon *daemon, const char *id, Show *show) {
+    enum { EVENTS_MOST = 256 << 20 }; // [B]
+    char path[160];
+    HttpAnswer answer;
+    Problem *ignored = NULL; // the look that follows tells what is wrong
+    Events events = {.show = show, .id = id, .answer = &answer};
+    snprintf(path, sizeof path, "/v1/jobs/%s/events", id);
+    const HttpAsk ask = {.method = "GET",
+                         .path = path,
+                         .take = events_take,
+                         .context = &events,
+                         .most = EVENTS_MOST,
+                         .within = daemon_left(daemon)};
+    (void)http_ask(daemon->http, &ask, &answer, ignored);
+    const bool is_there = are_events(&answer);
+    http_answer_clear(&answer);
+    return is_there;
+}
+
 Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobTold *job,
                      Problem *problem) {
     char farewell[256];
@@ -162,6 +231,7 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
     output_farewell(farewell);
     bar_start(&show.bar);
     Status status = STATUS_OK;
+    bool has_events = true;
     for (bool was_there = false;; was_there = true) {
         const double poll = show.bar.is_terminal ? bar_poll : lines_poll;
         const double left = daemon_left(daemon);
@@ -178,6 +248,7 @@ Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *an
         }
         job_told_clear(job);
         http_answer_clear(answer);
+        has_events = has_events && events_follow(daemon, id, &show);
     }
     bar_stop(&show.bar);
     output_farewell(NULL);

@@ -44,9 +44,10 @@ Status daemon_job(Daemon *daemon, const char *id, double wait, HttpAnswer *answe
 // STATUS_TIMEOUT: it goes on.
 Status daemon_result(Daemon *daemon, const char *id, char result[96], Problem *problem);
 
-// Follows a job to its end: a bar on a terminal, else lines on `lines` (NULL: none). A daemon that
-// is started anew meanwhile is found again. STATUS_TIMEOUT when patience ends: the job goes on. The
-// last answer and what it tells stay with the caller, who clears both.
+// Follows a job to its end, by its events where the server has them, else by asking again and
+// again: a bar on a terminal, else lines on `lines` (NULL: none). A daemon that is started anew
+// meanwhile is found again. STATUS_TIMEOUT when patience ends: the job goes on. The last answer and
+// what it tells stay with the caller, who clears both.
 Status daemon_follow(Daemon *daemon, const char *id, FILE *lines, HttpAnswer *answer, JobTold *job,
                      Problem *problem);
 

@@ -101,18 +101,22 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
     return status;
 }
 
-static Status read_tls(const ReachSettings *settings, Reach *reach, Problem *problem) {
+Status reach_read_tls(const ReachSettings *settings, Problem *problem) {
     const char *cert = settings->tls_cert, *key = settings->tls_key;
+    char *cert_text = NULL, *key_text = NULL;
     if (cert == NULL && key == NULL)
         return STATUS_OK;
     if (cert == NULL || key == NULL)
         return problem_add(problem, STATUS_USAGE, cert != NULL ? "--tls-cert" : "--tls-key",
                            "needs %s FILE beside it", cert != NULL ? "--tls-key" : "--tls-cert");
-    const Status first = read_file("--tls-cert", cert, false, &reach->tls_cert, problem);
-    const Status second = read_file("--tls-key", key, true, &reach->tls_key, problem);
-    TRY(first);
-    TRY(second);
-    return certificate_check(reach->tls_cert, cert, reach->tls_key, key, problem);
+    const Status first = read_file("--tls-cert", cert, false, &cert_text, problem);
+    const Status second = read_file("--tls-key", key, true, &key_text, problem);
+    Status status = first != STATUS_OK ? first : second;
+    if (status == STATUS_OK)
+        status = certificate_use(cert_text, cert, key_text, key, problem);
+    free(cert_text);
+    free(key_text);
+    return status;
 }
 
 Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
@@ -121,7 +125,7 @@ Status reach_read(const ReachSettings *settings, const Address *address, Reach *
     if (settings->base_url != NULL)
         TRY(base_url_read(settings->base_url, &reach->url, problem));
     const Status names = add_names(settings, address, reach, problem);
-    const Status tls = read_tls(settings, reach, problem);
+    const Status tls = reach_read_tls(settings, problem);
     return names != STATUS_OK ? names : tls;
 }
 
@@ -129,8 +133,6 @@ void reach_clear(Reach *reach) {
     for (size_t i = 0; i < reach->name_count; i++)
         free(reach->names[i]);
     free(reach->names);
-    free(reach->tls_cert);
-    free(reach->tls_key);
     *reach = (Reach){0};
 }
 

@@ -19,13 +19,16 @@ typedef struct Reach {
     GateHosts hosts;
     char **names; // of hosts
     size_t name_count;
-    char *tls_cert, *tls_key; // PEM; NULL: no TLS
     bool needs_tokens;
 } Reach;
 
-// Adds all faults (STATUS_USAGE). `reach` is cleared by reach_clear in any case.
+// Adds all faults (STATUS_USAGE); the certificate is in use then. `reach` is cleared by reach_clear
+// in any case.
 Status reach_read(const ReachSettings *settings, const Address *address, Reach *reach,
                   Problem *problem);
+// The files of the certificate once more, if there are any: where they are wrong (STATUS_USAGE),
+// the one in use stays.
+Status reach_read_tls(const ReachSettings *settings, Problem *problem);
 void reach_clear(Reach *reach);
 
 // STATUS_FORBIDDEN where tokens are a must and none can be used; says how to make one.

@@ -181,9 +181,11 @@ static Status encoder_choose(const char *output, const Encoder **encoder, Proble
     if (*encoder != NULL)
         return STATUS_OK;
     char known[128] = "";
-    for (size_t i = 0, used = 0; encoders[i] != NULL && used < sizeof known; i++)
-        used += (size_t)snprintf(known + used, sizeof known - used, "%s.%s", i > 0 ? ", " : "",
-                                 encoders[i]->extension);
+    for (size_t i = 0; encoders[i] != NULL; i++) {
+        char ending[16];
+        snprintf(ending, sizeof ending, ".%s", encoders[i]->extension);
+        text_list(known, sizeof known, ending);
+    }
     return problem_add(problem, STATUS_USAGE, "--output", "must end in one of %s, is %.200s", known,
                        output);
 }

@@ -14,6 +14,7 @@
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"
+#include "server/base/journal.h"
 #include "server/base/notify.h"
 #include "server/base/process.h"
 #include "server/command/data_folder.h"
@@ -138,41 +139,65 @@ static void forget_answers(void *hot) {
         hot_clear(hot);
 }
 
-// Waits for a signal to end, and tells systemd meanwhile that we live.
-static int wait_for_end(const sigset_t *stops) {
+// SIGHUP: a certificate that was renewed is used from now on.
+static void read_anew(const ReachSettings *asked, Problem *problem) {
+    problem_clear(problem);
+    if (asked->tls_cert == NULL)
+        fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to read anew\n");
+    else if (reach_read_tls(asked, problem) == STATUS_OK)
+        fprintf(stderr, "impactd: SIGHUP: the certificate in %s is used from now on\n",
+                asked->tls_cert);
+    else
+        fprintf(stderr, "impactd: SIGHUP: the certificate stays as it was: %s\n", problem->detail);
+}
+
+// Waits for a signal to end, and tells systemd meanwhile that we live. A terminal that is gone ends
+// what was started in it, as it always does.
+static int wait_for_end(const sigset_t *signals, const ReachSettings *asked, Problem *problem) {
+    const bool has_terminal = isatty(STDIN_FILENO) != 0;
     const int64_t period_ms = notify_watchdog_ms();
     const struct timespec period = {.tv_sec = (time_t)(period_ms / 1000),
                                     .tv_nsec = (long)(period_ms % 1000) * 1000000};
     for (;;) {
         const int signal =
-            period_ms > 0 ? sigtimedwait(stops, NULL, &period) : sigwaitinfo(stops, NULL);
-        if (signal > 0)
+            period_ms > 0 ? sigtimedwait(signals, NULL, &period) : sigwaitinfo(signals, NULL);
+        if (signal == SIGHUP && (!has_terminal || isatty(STDIN_FILENO) != 0))
+            read_anew(asked, problem);
+        else if (signal > 0)
             return signal;
-        if (errno == EAGAIN)
+        else if (errno == EAGAIN)
             notify_send("WATCHDOG=1");
     }
 }
 
 // From here on a second signal ends us at once; what is acknowledged is in the database.
-static void let_signals_kill(const sigset_t *stops) {
+static void let_signals_kill(const sigset_t *signals) {
+    signal(SIGHUP, SIG_IGN);
     signal(SIGTERM, SIG_DFL);
     signal(SIGINT, SIG_DFL);
-    pthread_sigmask(SIG_UNBLOCK, stops, NULL);
+    pthread_sigmask(SIG_UNBLOCK, signals, NULL);
 }
 
 static void run_until_stopped(App *app, Listener *listener, const ServeSettings *settings,
-                              const sigset_t *stops) {
+                              const ReachSettings *asked, const sigset_t *signals,
+                              Problem *problem) {
     atomic_store(&app->listener, listener);
     greet(listener, settings, app);
     notify_send("READY=1");
-    const int signal = wait_for_end(stops);
+    const int signal = wait_for_end(signals, asked, problem);
     notify_send("STOPPING=1");
     atomic_store(&app->is_stopping, true);
-    let_signals_kill(stops);
-    fprintf(stderr, "impactd: %s, stopping\n", signal == SIGINT ? "interrupted" : "asked to end");
+    let_signals_kill(signals);
+    Bytes line = {0};
+    bytes_format(&line, "%s, stopping",
+                 signal == SIGINT   ? "interrupted"
+                 : signal == SIGHUP ? "its terminal is gone"
+                                    : "asked to end");
+    journal_write(&line);
+    bytes_clear(&line);
 }
 
-static Status serve(const ServeSettings *settings, const sigset_t *stops, Problem *problem) {
+static Status serve(const ServeSettings *settings, const sigset_t *signals, Problem *problem) {
     App app = {.reply_most = (size_t)1 << 30, .started_unix_ms = clock_unix_ms()};
     Doorman doorman = {.journal = (JournalMode)settings->journal};
     const size_t hot_bytes = settings->cache_bytes / HOT_SHARE;
@@ -181,6 +206,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
                              .answer_at_once = dispatch_at_once,
                              .answer = dispatch,
                              .admits = dispatch_admits,
+                             .still_admits = dispatch_still_admits,
                              .note = dispatch_note,
                              .context = &dispatcher};
     const IntakeSettings work = {.workers = settings->workers,
@@ -228,16 +254,15 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     if (status == STATUS_OK) {
         link_base_set(ready.url.path);
         text_fit(app.base_url, sizeof app.base_url, ready.url.text);
-        app.has_tls = ready.tls_cert != NULL;
+        app.has_tls = certificate_source() != NULL;
         app.meter = doorman.meter = meter;
         app.hot = dispatcher.hot;
         door.hosts = &ready.hosts;
-        door.tls_cert = ready.tls_cert;
-        door.tls_key = ready.tls_key;
+        door.certificate = certificate_source();
         status = listener_open(&door, &listener, problem);
     }
     if (status == STATUS_OK)
-        run_until_stopped(&app, listener, settings, stops);
+        run_until_stopped(&app, listener, settings, &asked, signals, problem);
     listener_stop(listener, GRACE_MS);
     keeper_stop(keeper);
     asides_close(app.asides);
@@ -249,16 +274,18 @@ static Status serve(const ServeSettings *settings, const sigset_t *stops, Proble
     store_close(app.store);
     meter_free(meter);
     reach_clear(&ready);
+    certificate_forget();
     return status;
 }
 
 // Before any thread starts, so that only sigwait sees them, and when the settings have been read:
 // until then they end us as they end anything.
-static void hold_signals(sigset_t *stops) {
-    sigemptyset(stops);
-    sigaddset(stops, SIGTERM);
-    sigaddset(stops, SIGINT);
-    pthread_sigmask(SIG_BLOCK, stops, NULL);
+static void hold_signals(sigset_t *signals) {
+    sigemptyset(signals);
+    sigaddset(signals, SIGTERM);
+    sigaddset(signals, SIGINT);
+    sigaddset(signals, SIGHUP);
+    pthread_sigmask(SIG_BLOCK, signals, NULL);
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN); // a limit on a file's size is an error of writing like any other
 }
@@ -283,9 +310,9 @@ static int run(int argc, char *const *argv) {
     if (status == STATUS_OK && settings.print_config) {
         options_print(serve_fields, &settings, &options, stdout);
     } else if (status == STATUS_OK) {
-        sigset_t stops;
-        hold_signals(&stops);
-        status = serve(&settings, &stops, problem);
+        sigset_t signals;
+        hold_signals(&signals);
+        status = serve(&settings, &signals, problem);
     }
     if (status == STATUS_OK) {
         code = COMMAND_OK;
@@ -313,7 +340,9 @@ const Command command_serve = {
         "\n"
         "Prints its URL and a curl line. SIGTERM or Ctrl-C ends it within 5 seconds; "
         "unfinished jobs go on at\n"
-        "the next start. GET / of the URL shows what it can do.\n",
+        "the next start. SIGHUP reads the certificate and its key anew; where they are faulty the "
+        "old "
+        "ones stay. GET / of the URL shows what it can do.\n",
     .options = serve_fields,
     .groups = serve_groups,
     .run = run,

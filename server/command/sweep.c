@@ -14,7 +14,8 @@ typedef struct SweepSettings {
 
 static const Field sweep_fields[] = {
     FIELD_TEXTS(SweepSettings, output, NULL, NULL, STUDY_OUTPUTS, PRESENCE_OPTIONAL, 0,
-                "write to this file, .json, .csv or .npz the table or .svg the chart; may be given "
+                "write to this file, .json, .csv, .npy, .npz or .mat the table or .svg the chart; "
+                "may be given "
                 "again"),
     SCENE_FILE_CPU_ROW(SweepSettings),
     FIELD_END,

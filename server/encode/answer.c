@@ -10,8 +10,11 @@
 #include "server/encode/chart_sweep.h"
 #include "server/encode/compare_csv.h"
 #include "server/encode/ensemble_csv.h"
+#include "server/encode/mat.h"
+#include "server/encode/npy.h"
 #include "server/encode/sensitivity_csv.h"
 #include "server/encode/svg.h"
+#include "server/encode/sweep_columns.h"
 #include "server/encode/sweep_npz.h"
 #include "server/encode/sweep_table.h"
 #include "server/jobs/documents.h"
@@ -41,8 +44,18 @@ static void sweep_archive(const Variant *answer, Bytes *bytes) {
     sweep_npz((const Sweep *)(const void *)answer, bytes);
 }
 
+static void sweep_array(const Variant *answer, Bytes *bytes) {
+    sweep_columns((const Sweep *)(const void *)answer, &encoder_npy, bytes);
+}
+
+static void sweep_variables(const Variant *answer, Bytes *bytes) {
+    sweep_columns((const Sweep *)(const void *)answer, &encoder_mat, bytes);
+}
+
 static void sweep_chart(const Variant *answer, Bytes *bytes) {
-    chart_sweep((const Sweep *)(const void *)answer, bytes);
+    const Sweep *sweep = (const Sweep *)(const void *)answer;
+    const SweepSource source = sweep_source(sweep);
+    (void)chart_sweep(sweep, &source, bytes);
 }
 
 static void sweep_table(const Variant *answer, Bytes *bytes) {
@@ -72,33 +85,36 @@ static const struct {
     AnswerFormat formats[ANSWER_FORMATS];
 } all[] = {
     {&study_tradeoff,
-     {{"json", "application/json", json_write},
-      {"svg", svg_type, tradeoff_chart},
-      {NULL, NULL, NULL}}},
+     {{"json", "application/json", false, json_write},
+      {"svg", svg_type, false, tradeoff_chart},
+      {NULL, NULL, false, NULL}}},
     {&study_ensemble,
-     {{"json", "application/json", json_write},
-      {"csv", csv_type, ensemble_table},
-      {"svg", svg_type, ensemble_chart},
-      {NULL, NULL, NULL}}},
+     {{"json", "application/json", false, json_write},
+      {"csv", csv_type, false, ensemble_table},
+      {"svg", svg_type, false, ensemble_chart},
+      {NULL, NULL, false, NULL}}},
     {&study_sweep,
-     {{"json", "application/json", sweep_whole},
-      {"csv", csv_type, sweep_table},
-      {"npz", "application/x-npz", sweep_archive},
-      {"svg", svg_type, sweep_chart},
-      {NULL, NULL, NULL}}},
+     {{"json", "application/json", false, sweep_whole},
+      {"csv", csv_type, false, sweep_table},
+      {"npy", "application/x-npy", true, sweep_array},
+      {"npz", "application/x-npz", true, sweep_archive},
+      {"mat", "application/x-matlab-data", true, sweep_variables},
+      {"svg", svg_type, false, sweep_chart},
+      {NULL, NULL, false, NULL}}},
     {&study_compare,
-     {{"json", "application/json", json_write},
-      {"csv", csv_type, compare_table},
-      {"svg", svg_type, compare_chart},
-      {NULL, NULL, NULL}}},
+     {{"json", "application/json", false, json_write},
+      {"csv", csv_type, false, compare_table},
+      {"svg", svg_type, false, compare_chart},
+      {NULL, NULL, false, NULL}}},
     {&study_sensitivity,
-     {{"json", "application/json", json_write},
-      {"csv", csv_type, sensitivity_table},
-      {"svg", svg_type, sensitivity_chart},
-      {NULL, NULL, NULL}}},
+     {{"json", "application/json", false, json_write},
+      {"csv", csv_type, false, sensitivity_table},
+      {"svg", svg_type, false, sensitivity_chart},
+      {NULL, NULL, false, NULL}}},
 };
 
-static const AnswerFormat none[] = {{"json", "application/json", json_write}, {NULL, NULL, NULL}};
+static const AnswerFormat none[] = {{"json", "application/json", false, json_write},
+                                    {NULL, NULL, false, NULL}};
 
 const AnswerFormat *answer_formats(const Kind *kind) {
     for (size_t i = 0; i < COUNT(all); i++)
@@ -116,9 +132,9 @@ const AnswerFormat *answer_format_find(const AnswerFormat *formats, const char *
 void answer_formats_name(const AnswerFormat *formats, const char *before, char *target,
                          size_t size) {
     *target = '\0';
-    for (size_t length = 0; formats->extension != NULL && length < size; formats++) {
-        snprintf(target + length, size - length, "%s%s%s", length > 0 ? ", " : "", before,
-                 formats->extension);
-        length = strlen(target);
+    for (; formats->extension != NULL; formats++) {
+        char name[16];
+        snprintf(name, sizeof name, "%.4s%.8s", before, formats->extension);
+        text_list(target, size, name);
     }
 }

@@ -6,11 +6,12 @@
 #include "core/study/study.h"
 #include "server/base/bytes.h"
 
-enum { ANSWER_FORMATS = 5 }; // at most, with the end
+enum { ANSWER_FORMATS = 7 }; // at most, with the end
 
 typedef struct AnswerFormat {
     const char *extension; // "svg"; NULL: the end
     const char *content_type;
+    bool is_binary;                                     // Range requests make sense
     void (*write)(const Variant *answer, Bytes *bytes); // appends the whole document
 } AnswerFormat;
 

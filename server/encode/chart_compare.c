@@ -47,6 +47,7 @@ static void put_spectra(const Comparison *comparison, const CompareEntry *const 
                  .bottom = 330,
                  .legend = width - 42,
                  .is_logarithmic = true,
+                 .decades = PLOT_PSD_DECADES,
                  .x_title = "frequency [Hz]",
                  .bytes = bytes};
     plot_begin(&plot);
@@ -95,24 +96,16 @@ static void put_traces(const Comparison *comparison, const CompareEntry *const d
 void chart_compare(const Comparison *comparison, Bytes *bytes) {
     const CompareEntry *drawn[PLOT_COLOURS];
     const size_t count = choose(comparison, drawn);
-    bytes_format(
-        bytes,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n"
-        "<title>Contact models compared</title>\n",
-        width, height);
+    char heading[160];
+    snprintf(heading, sizeof heading, "%.100s [%.40s]",
+             comparison->channel != NULL ? comparison->channel : "",
+             comparison->unit != NULL ? comparison->unit : "");
+    svg_open(bytes, width, height, "Contact models compared");
     put_description(comparison, bytes);
-    bytes_text(bytes, "<style>\n");
-    plot_style(bytes);
-    bytes_format(bytes,
-                 "</style>\n<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n"
-                 "<text x=\"70\" y=\"26\" font-size=\"14\">",
-                 width, height);
-    svg_text(bytes, comparison->channel != NULL ? comparison->channel : "");
-    bytes_text(bytes, " [");
-    svg_text(bytes, comparison->unit != NULL ? comparison->unit : "");
-    bytes_text(bytes, "]</text>\n<text x=\"70\" y=\"390\" font-size=\"14\">displacement "
-                      "[m]</text>\n");
+    svg_page(bytes, width, height, NULL);
+    svg_heading(bytes, 70, 26, heading);
+    svg_heading(bytes, 70, 390, "displacement [m]");
     put_spectra(comparison, drawn, count, bytes);
     put_traces(comparison, drawn, count, bytes);
-    bytes_text(bytes, "</svg>\n");
+    svg_close(bytes);
 }

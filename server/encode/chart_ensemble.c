@@ -17,15 +17,9 @@ static const double width = 640, left = 62, right = 626, top = 44, bottom = 300;
 static const double label_right = 190, value_left = 470;                         // of the lines
 static const double row_height = 24;
 
-static void put_style(Bytes *bytes) {
-    bytes_text(bytes, "<style>\n");
-    plot_style(bytes);
-    bytes_text(bytes, ".all { stroke: #888888; } .half { fill: #888888; fill-opacity: 0.35; }\n"
-                      ".mean { stroke: #222222; stroke-width: 2; fill: none; }\n"
-                      "@media (prefers-color-scheme: dark) {\n"
-                      ".all { stroke: #8a8f98; } .half { fill: #8a8f98; } "
-                      ".mean { stroke: #f2f2f2; }\n}\n</style>\n");
-}
+static const char rules[] =
+    ".all { stroke: #888888; } .half { fill: #888888; fill-opacity: 0.35; }\n"
+    ".mean { stroke-width: 2; }\n";
 
 static size_t drawn(const Ensemble *ensemble) {
     return ensemble->spectra.count < SPECTRA_DRAWN ? ensemble->spectra.count : SPECTRA_DRAWN;
@@ -92,7 +86,7 @@ static void put_row(Bytes *bytes, const Scale *of, int metric, const EnsembleSta
                      "<rect class=\"half\" x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"12\"/>",
                      half, y - 6, row_x(of, statistic, statistic->q75) - half);
         bytes_format(
-            bytes, "<path class=\"mean\" d=\"M%.1f %.0fv8M%.1f %.0fv8M%.1f %.0fH%.1f",
+            bytes, "<path class=\"strong mean\" d=\"M%.1f %.0fv8M%.1f %.0fv8M%.1f %.0fH%.1f",
             row_x(of, statistic, statistic->low), y - 4, row_x(of, statistic, statistic->high),
             y - 4, row_x(of, statistic, statistic->low), y, row_x(of, statistic, statistic->high));
         bytes_format(bytes, "M%.1f %.0fv16\"><title>%s: %.4g to %.4g</title></path>\n",
@@ -140,6 +134,7 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
                  .top = top,
                  .bottom = bottom,
                  .is_logarithmic = true,
+                 .decades = PLOT_PSD_DECADES,
                  .x_title = "frequency [Hz]",
                  .bytes = bytes};
     EnsembleStatistics statistics = ensemble->statistics; // a borrowed view
@@ -148,21 +143,16 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
         plot_fit(&plot, &ensemble->frequency, &ensemble->spectra.at[i].mean);
     const bool has_spectra = plot.x_most > plot.x_least;
     const double from = has_spectra ? bottom + 62 : top + 12;
-    bytes_format(
-        bytes,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n",
-        width, from + row_height * ENSEMBLE_STATISTICS + 12);
-    bytes_format(bytes, "<title>Mean of %llu runs</title>\n",
-                 (unsigned long long)(ensemble->made - ensemble->failed));
+    const double height = from + row_height * ENSEMBLE_STATISTICS + 12;
+    char text[96];
+    snprintf(text, sizeof text, "Mean of %llu runs",
+             (unsigned long long)(ensemble->made - ensemble->failed));
+    svg_open(bytes, width, height, text);
     put_description(ensemble, bytes);
-    put_style(bytes);
-    bytes_format(bytes, "<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n", width,
-                 from + row_height * ENSEMBLE_STATISTICS + 12);
-    bytes_format(bytes,
-                 "<text x=\"%.0f\" y=\"26\" font-size=\"14\">Mean of %llu runs, with its %g %% "
-                 "interval</text>\n",
-                 left, (unsigned long long)(ensemble->made - ensemble->failed),
-                 100 * ensemble->confidence);
+    svg_page(bytes, width, height, rules);
+    snprintf(text, sizeof text, "Mean of %llu runs, with its %g %% interval",
+             (unsigned long long)(ensemble->made - ensemble->failed), 100 * ensemble->confidence);
+    svg_heading(bytes, left, 26, text);
     if (plot_axes(&plot))
         for (size_t i = 0; i < drawn(ensemble); i++)
             put_spectrum(&plot, ensemble, i);
@@ -170,5 +160,5 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
     for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
         put_row(bytes, &of, metric, ensemble_statistic(&statistics, metric),
                 from + row_height * (metric + 0.5));
-    bytes_text(bytes, "</svg>\n");
+    svg_close(bytes);
 }

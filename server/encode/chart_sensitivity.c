@@ -35,14 +35,15 @@ static void put_plain(Bytes *bytes, const char *name) {
 }
 
 static void put_slope(Bytes *bytes, const SensitivitySlope *slope, double x, double y) {
-    bytes_format(bytes, "<text class=\"%s\" x=\"%.0f\" y=\"%.0f\" text-anchor=\"end\">",
-                 slope->is_settled ? "sure" : "unsure", x, y);
+    bytes_format(bytes, "<text%s x=\"%.0f\" y=\"%.0f\" text-anchor=\"end\">",
+                 slope->is_settled ? "" : " class=\"faint\"", x, y);
     if (isnan(slope->derivative))
         bytes_text(bytes, "not known");
     else
         bytes_format(bytes, "%.2g", slope->derivative);
     if (!slope->is_settled && !isnan(slope->spread))
-        bytes_format(bytes, " (%.1g)", slope->spread);
+        bytes_format(bytes, slope->spread < 10 ? " (%.1g)" : " (%.4g)",
+                     slope->spread < 10 ? slope->spread : rint(slope->spread));
     bytes_text(bytes, "</text>\n");
 }
 
@@ -71,6 +72,7 @@ void chart_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
                  .top = 44,
                  .bottom = 330,
                  .is_logarithmic = true,
+                 .decades = PLOT_PSD_DECADES,
                  .x_title = "frequency [Hz]",
                  .bytes = bytes};
     plot_begin(&plot);
@@ -79,30 +81,24 @@ void chart_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
         plot_fit(&plot, &sensitivity->frequency, &sensitivity->spectra.at[i].q95);
     }
     const double top = plot.x_most > plot.x_least ? 420 : 60;
-    const double height = top + row_height * (ENSEMBLE_STATISTICS + 1);
-    bytes_format(
-        bytes,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" role=\"img\">\n"
-        "<title>Sensitivity</title>\n<desc>Relative change of each statistic over the relative "
-        "change of each parameter; grey ones do not settle, their spread stands in brackets. "
-        "Bands: "
-        "5 to 95 %% of %llu drawn runs. ",
-        width, height, (unsigned long long)(sensitivity->made - sensitivity->failed));
+    const double height = top + row_height * (ENSEMBLE_STATISTICS + 2);
+    svg_open(bytes, width, height, "Sensitivity");
+    bytes_format(bytes,
+                 "<desc>Relative change of each statistic over the relative change of each "
+                 "parameter; grey ones do not settle, their spread stands in brackets. Bands: 5 to "
+                 "95 %% of %llu drawn runs. ",
+                 (unsigned long long)(sensitivity->made - sensitivity->failed));
     svg_text(bytes, sensitivity->why != NULL ? sensitivity->why : "");
-    bytes_text(bytes, "</desc>\n<style>\n");
-    plot_style(bytes);
-    bytes_format(bytes,
-                 ".unsure { fill: #888888; }\n</style>\n"
-                 "<rect class=\"page\" width=\"%.0f\" height=\"%.0f\"/>\n",
-                 width, height);
+    bytes_text(bytes, "</desc>\n");
+    svg_page(bytes, width, height, NULL);
     if (top > 60)
-        bytes_text(bytes, "<text x=\"70\" y=\"26\" font-size=\"14\">Spectra, with 5 to 95 % of the "
-                          "drawn runs</text>\n");
-    bytes_format(bytes,
-                 "<text x=\"20\" y=\"%.0f\" font-size=\"14\">Relative change of the statistic over "
-                 "that of the parameter</text>\n",
-                 top - 28);
+        svg_heading(bytes, 70, 26, "Spectra, with 5 to 95 % of the drawn runs");
+    svg_heading(bytes, 20, top - 28, "Relative change of the statistic over that of the parameter");
     put_spectra(&plot, sensitivity);
     put_table(sensitivity, top, bytes);
-    bytes_text(bytes, "</svg>\n");
+    bytes_format(bytes,
+                 "<text class=\"faint\" x=\"20\" y=\"%.0f\">grey: does not settle, its spread in "
+                 "brackets</text>\n",
+                 height - 10);
+    svg_close(bytes);
 }

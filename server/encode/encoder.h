@@ -22,11 +22,21 @@ typedef struct Table {
     // `samples`) from number `first` on: it lies at (first + i bucket) / axis_rate and is row i of
     // the columns, which come in pairs, "NAME_min" and "NAME_max".
     size_t bucket, samples;
+    // Where the columns' numbers lie instead, by their place in `columns`; NULL: in memory. For
+    // formats that are laid out.
+    const LayoutSource *source;
 } Table;
 
 // Where the values of a column, or of the axis, that are written begin.
 static inline const double *table_values(const Table *table, const double *values) {
     return values + (table->bucket > 0 ? 0 : table->first);
+}
+
+static inline void table_lay_column(const Table *table, size_t column, Layout *layout) {
+    if (table->source != NULL)
+        layout_source(layout, table->source, column, sizeof(double) * (uint64_t)table->count);
+    else
+        layout_values(layout, table_values(table, table->columns[column]->values), table->count);
 }
 
 // A division, so that row 50 at 1000 Hz reads 0.05.

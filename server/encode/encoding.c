@@ -39,11 +39,8 @@ Status encoding_write(const Encoder *encoder, const Table *table, Bytes *bytes, 
     Status status = encoder->lay(table, &layout, problem);
     if (status == STATUS_OK)
         status = tell(&layout, problem);
-    if (status == STATUS_OK && bytes_reserve(bytes, (size_t)layout.size)) {
-        layout_read(&layout, 0, bytes->at + bytes->count, (size_t)layout.size);
-        bytes->count += (size_t)layout.size;
-        bytes->at[bytes->count] = '\0';
-    }
+    if (status == STATUS_OK)
+        layout_write(&layout, bytes);
     layout_clear(&layout);
     return status;
 }

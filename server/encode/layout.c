@@ -38,7 +38,7 @@ static Segment *add(Layout *layout, uint64_t size) {
 }
 
 static bool is_text(const Segment *segment) {
-    return segment->values == NULL && segment->rate == 0;
+    return segment->values == NULL && segment->rate == 0 && segment->source == NULL;
 }
 
 void layout_put(Layout *layout, const void *data, size_t size) {
@@ -82,6 +82,14 @@ void layout_counted(Layout *layout, size_t first, size_t step, double rate, size
     segment->rate = rate;
 }
 
+void layout_source(Layout *layout, const LayoutSource *source, size_t column, uint64_t size) {
+    Segment *segment = add(layout, size);
+    if (segment == NULL)
+        return;
+    segment->source = source;
+    segment->column = column;
+}
+
 void layout_join(Layout *layout, const Layout *other) {
     layout->is_failed = layout->is_failed || other->is_failed;
     for (size_t i = 0; i < other->count && !layout->is_failed; i++) {
@@ -97,6 +105,8 @@ void layout_join(Layout *layout, const Layout *other) {
         segment->first = from->first;
         segment->step = from->step;
         segment->rate = from->rate;
+        segment->source = from->source;
+        segment->column = from->column;
     }
 }
 
@@ -150,11 +160,23 @@ void layout_read(const Layout *layout, uint64_t start, void *target, size_t size
             memcpy(to, (const char *)segment->values + offset, taken);
         else if (segment->rate != 0)
             read_counted(segment, offset, to, taken);
+        else if (segment->source != NULL)
+            segment->source->read(segment->source->context, segment->column, offset, to, taken);
         else
             memcpy(to, layout->text.at + segment->text + offset, taken);
         to += taken;
         start += taken;
         size -= taken;
+    }
+}
+
+void layout_write(const Layout *layout, Bytes *bytes) {
+    if (layout->is_failed) {
+        bytes->is_failed = true;
+    } else if (bytes_reserve(bytes, (size_t)layout->size)) {
+        layout_read(layout, 0, bytes->at + bytes->count, (size_t)layout->size);
+        bytes->count += (size_t)layout->size;
+        bytes->at[bytes->count] = '\0';
     }
 }
 
@@ -165,6 +187,14 @@ uint32_t layout_crc32(const Layout *layout) {
         const Segment *segment = &layout->at[i];
         if (segment->values != NULL) {
             crc = deflate_crc32(crc, segment->values, (size_t)segment->size);
+        } else if (segment->source != NULL) {
+            for (uint64_t at = 0; at < segment->size;) {
+                const uint64_t left = segment->size - at;
+                const size_t size = left < sizeof numbers ? (size_t)left : sizeof numbers;
+                segment->source->read(segment->source->context, segment->column, at, numbers, size);
+                crc = deflate_crc32(crc, numbers, size);
+                at += size;
+            }
         } else if (segment->rate == 0) {
             crc = deflate_crc32(crc, layout->text.at + segment->text, (size_t)segment->size);
         } else {

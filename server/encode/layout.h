@@ -8,11 +8,20 @@
 
 #include "server/base/bytes.h"
 
+// Bytes that are somewhere else: `read` copies `size` of them from `offset` of column `column` on,
+// and keeps for itself where it cannot.
+typedef struct LayoutSource {
+    void (*read)(void *context, size_t column, uint64_t offset, void *target, size_t size);
+    void *context;
+} LayoutSource;
+
 typedef struct Segment {
-    uint64_t start, size;     // in the document
-    const double *values;     // borrowed; NULL: text, or counted
-    size_t text;              // where it begins in the layout's text
-    double first, step, rate; // counted: number i is (first + i step) / rate; rate 0: it is text
+    uint64_t start, size;       // in the document
+    const double *values;       // borrowed; NULL: text, or counted
+    size_t text;                // where it begins in the layout's text
+    double first, step, rate;   // counted: number i is (first + i step) / rate; else rate 0
+    const LayoutSource *source; // borrowed; NULL: not from there
+    size_t column;              // of the source
 } Segment;
 
 // All zero is empty. Once it failed (memory) it stays so, like Bytes.
@@ -32,10 +41,13 @@ void layout_fill(Layout *layout, char with, size_t count);
 void layout_values(Layout *layout, const double *values, size_t count); // borrowed
 // (first + i step) / rate for i = 0 ... count - 1.
 void layout_counted(Layout *layout, size_t first, size_t step, double rate, size_t count);
+// All `size` bytes of a column of `source`, which is borrowed.
+void layout_source(Layout *layout, const LayoutSource *source, size_t column, uint64_t size);
 void layout_join(Layout *layout, const Layout *other); // behind; borrows what `other` borrows
 
 // Copies `size` bytes from `start` on; both within the document.
 void layout_read(const Layout *layout, uint64_t start, void *target, size_t size);
-uint32_t layout_crc32(const Layout *layout); // of the whole
+void layout_write(const Layout *layout, Bytes *bytes); // appends the whole
+uint32_t layout_crc32(const Layout *layout);           // of the whole
 
 #endif

@@ -81,7 +81,7 @@ static Status mat_lay(const Table *table, Layout *layout, Problem *problem) {
     }
     for (size_t c = 0; c < table->column_count; c++) {
         TRY(open_variable(layout, table->columns[c]->name, table->count, problem));
-        layout_values(layout, table_values(table, table->columns[c]->values), table->count);
+        table_lay_column(table, c, layout);
     }
     return STATUS_OK;
 }

@@ -43,7 +43,7 @@ static Status npy_lay(const Table *table, Layout *layout, Problem *problem) {
     npy_put_header(layout, table->count, table->column_count + (table->axis_name != NULL ? 1 : 0));
     npy_put_axis(layout, table);
     for (size_t c = 0; c < table->column_count; c++)
-        layout_values(layout, table_values(table, table->columns[c]->values), table->count);
+        table_lay_column(table, c, layout);
     return STATUS_OK;
 }
 

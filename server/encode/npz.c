@@ -22,7 +22,7 @@ static Status npz_lay(const Table *table, Layout *layout, Problem *problem) {
         if (c == 0)
             npy_put_axis(&array, table);
         else
-            layout_values(&array, table_values(table, table->columns[c - 1]->values), table->count);
+            table_lay_column(table, c - 1, &array);
         status =
             put(&zip, c == 0 ? table->axis_name : table->columns[c - 1]->name, &array, problem);
         layout_clear(&array);

@@ -5,30 +5,7 @@
 
 #include "server/encode/svg.h"
 
-enum { COLUMNS = 1300, DECADES = 8, TICKS = 12 };
-
-static const char *const light[PLOT_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#a8509a",
-                                                "#7a6a00", "#444444", "#b0003a", "#3f51b5"};
-static const char *const dark[PLOT_COLOURS] = {"#56b4e9", "#f0944d", "#3ad1a4", "#e29ad0",
-                                               "#e0cf50", "#c8c8c8", "#ff7a9c", "#9fa8ff"};
-
-void plot_style(Bytes *bytes) {
-    bytes_text(bytes,
-               "svg { font: 12px system-ui, sans-serif; color-scheme: light dark; }\n"
-               ".page { fill: #ffffff; } text { fill: #222222; }\n"
-               ".grid { stroke: #dddddd; fill: none; } .frame { stroke: #777777; fill: none; }\n"
-               ".line { fill: none; stroke-width: 1.5; } .band { fill-opacity: 0.4; }\n");
-    for (size_t i = 0; i < PLOT_COLOURS; i++)
-        bytes_format(bytes, ".line.s%zu { stroke: %s; } .band.s%zu { fill: %s; }\n", i, light[i], i,
-                     light[i]);
-    bytes_text(bytes, "@media (prefers-color-scheme: dark) {\n"
-                      ".page { fill: #16181c; } text { fill: #e4e4e4; } .grid { stroke: #363a41; } "
-                      ".frame { stroke: #8a8f98; }\n");
-    for (size_t i = 0; i < PLOT_COLOURS; i++)
-        bytes_format(bytes, ".line.s%zu { stroke: %s; } .band.s%zu { fill: %s; }\n", i, dark[i], i,
-                     dark[i]);
-    bytes_text(bytes, "}\n");
-}
+enum { COLUMNS = 1300, LABELS = 8, TICKS = 12 };
 
 void plot_begin(Plot *plot) {
     plot->x_least = plot->y_least = DBL_MAX;
@@ -39,56 +16,71 @@ static bool is_shown(const Plot *plot, double x, double y) {
     return isfinite(x) && isfinite(y) && (!plot->is_logarithmic || (x > 0 && y > 0));
 }
 
-void plot_fit(Plot *plot, const Reals *x, const Reals *y) {
-    for (size_t i = 0; i < x->count && i < y->count; i++) {
-        if (!is_shown(plot, x->at[i], y->at[i]))
-            continue;
-        plot->x_least = fmin(plot->x_least, x->at[i]);
-        plot->x_most = fmax(plot->x_most, x->at[i]);
-        plot->y_least = fmin(plot->y_least, y->at[i]);
-        plot->y_most = fmax(plot->y_most, y->at[i]);
-    }
+void plot_fit_point(Plot *plot, double x, double y) {
+    if (!is_shown(plot, x, y))
+        return;
+    plot->x_least = fmin(plot->x_least, x);
+    plot->x_most = fmax(plot->x_most, x);
+    plot->y_least = fmin(plot->y_least, y);
+    plot->y_most = fmax(plot->y_most, y);
 }
 
-static double x_of(const Plot *plot, double x) {
+void plot_fit(Plot *plot, const Reals *x, const Reals *y) {
+    for (size_t i = 0; i < x->count && i < y->count; i++)
+        plot_fit_point(plot, x->at[i], y->at[i]);
+}
+
+double plot_x(const Plot *plot, double x) {
     const double share = plot->is_logarithmic
                              ? log(x / plot->x_least) / log(plot->x_most / plot->x_least)
                              : (x - plot->x_least) / (plot->x_most - plot->x_least);
     return plot->left + (plot->right - plot->left) * share;
 }
 
-static double y_of(const Plot *plot, double y) {
+double plot_y(const Plot *plot, double y) {
     double share = (y - plot->y_least) / (plot->y_most - plot->y_least);
     if (plot->is_logarithmic)
         share = y > 0 ? log(y / plot->y_least) / log(plot->y_most / plot->y_least) : 0;
     return plot->bottom - (plot->bottom - plot->top) * fmin(fmax(share, 0), 1);
 }
 
-static void put_tick(const Plot *plot, bool is_x, double value, bool is_decade, int decade) {
+// The line, and where its label begins. False: it lies outside.
+static bool put_grid(const Plot *plot, bool is_x, double value, bool has_label) {
     Bytes *bytes = plot->bytes;
-    const double at = is_x ? x_of(plot, value) : y_of(plot, value);
+    const double at = is_x ? plot_x(plot, value) : plot_y(plot, value);
     if (is_x && (at < plot->left - 0.5 || at > plot->right + 0.5))
-        return;
+        return false;
     if (is_x)
-        bytes_format(bytes,
-                     "<path class=\"grid\" d=\"M%.1f %.0fV%.0f\"/><text x=\"%.1f\" y=\"%.0f\" "
-                     "text-anchor=\"middle\">",
-                     at, plot->top, plot->bottom, at, plot->bottom + 18);
+        bytes_format(bytes, "<path class=\"grid\" d=\"M%.1f %.0fV%.0f\"/>", at, plot->top,
+                     plot->bottom);
     else
-        bytes_format(bytes,
-                     "<path class=\"grid\" d=\"M%.0f %.1fH%.0f\"/><text x=\"%.0f\" y=\"%.1f\" "
-                     "text-anchor=\"end\">",
-                     plot->left, at, plot->right, plot->left - 8, at + 4);
-    if (is_decade)
-        svg_power(bytes, decade);
+        bytes_format(bytes, "<path class=\"grid\" d=\"M%.0f %.1fH%.0f\"/>", plot->left, at,
+                     plot->right);
+    if (!has_label)
+        bytes_text(bytes, "\n");
+    else if (is_x)
+        bytes_format(bytes, "<text x=\"%.1f\" y=\"%.0f\" text-anchor=\"middle\">", at,
+                     plot->bottom + 18);
     else
-        bytes_format(bytes, "%.4g", value);
-    bytes_text(bytes, "</text>\n");
+        bytes_format(bytes, "<text x=\"%.0f\" y=\"%.1f\" text-anchor=\"end\">", plot->left - 8,
+                     at + 4);
+    return has_label;
 }
 
+// Not all are labelled where they are many; the floor stands for 0.
 static void put_decades(const Plot *plot, bool is_x, int from, int to) {
-    for (int d = from; d <= to; d++)
-        put_tick(plot, is_x, pow(10, d), true, d);
+    const int every =
+        (to - from + LABELS) / (LABELS + 1) > 1 ? (to - from + LABELS) / (LABELS + 1) : 1;
+    for (int d = from; d <= to; d++) {
+        const bool is_floor = !is_x && plot->has_floor && d == from;
+        if (!put_grid(plot, is_x, pow(10, d), (to - d) % every == 0 || is_floor))
+            continue;
+        if (is_floor)
+            bytes_text(plot->bytes, "0");
+        else
+            svg_power(plot->bytes, d);
+        bytes_text(plot->bytes, "</text>\n");
+    }
 }
 
 // 1, 2 or 5 times a power of ten.
@@ -103,20 +95,26 @@ static void put_steps(const Plot *plot, bool is_x) {
     const double to = is_x ? plot->x_most : plot->y_most, step = tick_step(to - from);
     const double first = ceil(from / step - 1e-9);
     for (int i = 0; i < TICKS && (first + i) * step <= to + 1e-9 * step; i++)
-        put_tick(plot, is_x, (first + i) * step, false, 0);
+        if (put_grid(plot, is_x, (first + i) * step, true))
+            bytes_format(plot->bytes, "%.4g</text>\n", (first + i) * step);
 }
 
 bool plot_axes(Plot *plot) {
-    if (!(plot->x_most > plot->x_least))
+    if (!(plot->x_most > plot->x_least) && !(plot->has_whole_decades && plot->x_most > 0))
         return false;
     if (plot->is_logarithmic) {
         int x_from, x_to, y_from, y_to;
         svg_decades(plot->y_least, plot->y_most, &y_from, &y_to);
-        if (y_from < y_to - DECADES)
-            y_from = y_to - DECADES;
+        if (plot->decades > 0 && y_from < y_to - plot->decades)
+            y_from = y_to - plot->decades;
+        y_from -= plot->has_floor;
         plot->y_least = pow(10, y_from);
         plot->y_most = pow(10, y_to);
         svg_decades(plot->x_least, plot->x_most, &x_from, &x_to);
+        if (plot->has_whole_decades) {
+            plot->x_least = pow(10, x_from);
+            plot->x_most = pow(10, x_to);
+        }
         put_decades(plot, true, x_from, x_to);
         put_decades(plot, false, y_from, y_to);
     } else {
@@ -151,10 +149,10 @@ static void curve_make(const Plot *plot, const Reals *x, const Reals *y, Curve *
     while (k < count && !(x->at[k] >= plot->x_least))
         k++;
     while (k < count && curve->count < COLUMNS) {
-        const double from = x_of(plot, x->at[k]);
+        const double from = plot_x(plot, x->at[k]);
         double along = 0, sum = 0, among = 0;
         for (; k < count && x->at[k] <= plot->x_most; k++) {
-            const double at = x_of(plot, x->at[k]);
+            const double at = plot_x(plot, x->at[k]);
             if (at - from > column)
                 break;
             along += at;
@@ -164,7 +162,7 @@ static void curve_make(const Plot *plot, const Reals *x, const Reals *y, Curve *
         if (among == 0)
             break;
         curve->x[curve->count] = along / among;
-        curve->y[curve->count++] = y_of(plot, sum / among);
+        curve->y[curve->count++] = plot_y(plot, sum / among);
     }
 }
 

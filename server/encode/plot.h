@@ -6,26 +6,31 @@
 #include "core/base/field.h"
 #include "server/base/bytes.h"
 
-enum { PLOT_COLOURS = 8 };
+enum { PLOT_COLOURS = 8, PLOT_PSD_DECADES = 8 };
 
 typedef struct Plot {
     double left, right, top, bottom; // of the frame
     double legend;                   // right end of its texts; 0: inside the frame
     bool is_logarithmic;             // both axes
+    bool has_whole_decades;          // also across
+    int decades;                     // shown upwards, at most; 0: all
+    bool has_floor;                  // the lowest decade stands for 0
     const char *x_title;
     double x_least, x_most, y_least, y_most; // what was fitted in
     Bytes *bytes;
 } Plot;
 
-// The colours, as classes "line s0" and "band s0", and those of page, grid and text.
-void plot_style(Bytes *bytes);
-
 // An empty one; then everything that will be drawn is fitted in, as far as the axes can show it.
 void plot_begin(Plot *plot);
 void plot_fit(Plot *plot, const Reals *x, const Reals *y);
+void plot_fit_point(Plot *plot, double x, double y);
 
 // Rounds the axes and draws them. False where there is nothing to draw.
 bool plot_axes(Plot *plot);
+
+// Where a number lies on the page, once there are axes.
+double plot_x(const Plot *plot, double x);
+double plot_y(const Plot *plot, double y);
 
 // Where points lie closer than a third of a pixel their mean is drawn.
 void plot_line(const Plot *plot, const Reals *x, const Reals *y, size_t colour, const char *title);

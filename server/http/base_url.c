@@ -1,6 +1,7 @@
 #include "server/http/base_url.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const char name_characters[] =
@@ -33,10 +34,11 @@ Status base_url_read(const char *text, BaseUrl *url, Problem *problem) {
         return refuse(text, "must name a host", problem);
     const char *path = host + size;
     if (*path == ':') {
-        const size_t port = strspn(path + 1, digits);
-        if (port == 0 || port > 5)
-            return refuse(text, "has a port that is none", problem);
-        path += 1 + port;
+        const size_t size_of_port = strspn(path + 1, digits);
+        const long port = size_of_port <= 5 ? strtol(path + 1, NULL, 10) : 0;
+        if (port < 1 || port > 65535)
+            return refuse(text, "must have a port from 1 to 65535, or none", problem);
+        path += 1 + size_of_port;
     }
     size_t path_size = strlen(path);
     while (path_size > 0 && path[path_size - 1] == '/')

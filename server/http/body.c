@@ -17,6 +17,10 @@ Status body_require_json(const Request *request, Problem *problem) {
             "the body must be application/json, is %.60s; with curl use --json @scene.json, or "
             "-H 'Content-Type: application/json'",
             request->content_type != NULL ? request->content_type : "of no given type");
+    return body_require(request, problem);
+}
+
+Status body_require(const Request *request, Problem *problem) {
     if (request->is_too_large)
         return problem_set(problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes",
                            request->body_most);
@@ -48,6 +52,7 @@ void body_problem(Reply *reply, const Problem *problem, int code, const char *in
     if (code == 401)
         reply->authenticate = "Bearer realm=\"impactd\"";
     reply->etag[0] = '\0';
+    reply->cache_control[0] = '\0'; // of what it would have been
     reply->accepts_ranges = false;
     reply->location[0] = '\0';
 }

@@ -9,6 +9,8 @@
 // STATUS_UNSUPPORTED_TYPE unless the request's body is JSON by its type, STATUS_TOO_LARGE if it was
 // over the limit, STATUS_UNREADABLE if there is none.
 Status body_require_json(const Request *request, Problem *problem);
+// The same of any type.
+Status body_require(const Request *request, Problem *problem);
 
 // Makes the reply problem+json. `code` 0: write_problem_code(problem->status). Headers already set
 // in `reply` (Allow, Retry-After, Content-Range) stay. Never fails: without memory the body is a

@@ -21,10 +21,8 @@ static Status check_queries(const Route *route, const Request *request, Problem 
             continue;
         const char *nearest = texts_nearest(allowed, name);
         char list[160] = "";
-        for (size_t k = 0; allowed[k] != NULL; k++) {
-            const size_t used = strlen(list);
-            snprintf(list + used, sizeof list - used, "%s%s", k > 0 ? ", " : "", allowed[k]);
-        }
+        for (size_t k = 0; allowed[k] != NULL; k++)
+            text_list(list, sizeof list, allowed[k]);
         if (nearest != NULL)
             return problem_set(problem, STATUS_USAGE,
                                "unknown query parameter \"%.40s\"; did you mean \"%s\"?", name,
@@ -73,7 +71,9 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
                      const RouteSpan *spans, size_t count, Request *request, Reply *reply,
                      Problem *problem) {
     char scratch[512];
-    TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
+    if (!request->is_admitted)
+        TRY(doorman_admit(dispatcher->doorman, route->scope, request, problem));
+    request->is_admitted = false; // whoever sleeps is judged again
     TRY(check_queries(route, request, problem));
     TRY(set_parameters(request, spans, count, scratch, sizeof scratch, problem));
     const uint64_t age = dispatcher->hot != NULL ? hot_age(dispatcher->hot) : 0;
@@ -95,9 +95,10 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
     }
     if (route_nearest(dispatcher->table, request->path, near, sizeof near))
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is nothing at this path; did you mean %s?", near);
+                           "there is nothing at this path; did you mean %s%s?", link_base(), near);
     return problem_set(problem, STATUS_NOT_FOUND,
-                       "there is nothing at this path; GET /openapi.json lists what there is");
+                       "there is nothing at this path; GET %s/openapi.json lists what there is",
+                       link_base());
 }
 
 // Turns a fault into its problem document, and has the answer noted if it is one.
@@ -148,10 +149,17 @@ bool dispatch_admits(void *context, Request *request, Reply *reply) {
     const Status status = route != NULL
                               ? doorman_admit(dispatcher->doorman, route->scope, request, &problem)
                               : refuse(dispatcher, request, allow, reply, &problem);
-    if (status == STATUS_OK)
+    request->is_admitted = status == STATUS_OK;
+    if (request->is_admitted)
         return true;
     close_up(dispatcher, request, status, &problem, reply);
     return false;
+}
+
+bool dispatch_still_admits(void *context, Request *request) {
+    const Dispatcher *dispatcher = context;
+    return request->route == NULL ||
+           doorman_admit(dispatcher->doorman, request->route->scope, request, NULL) == STATUS_OK;
 }
 
 void dispatch_note(void *context, const Request *request, const Reply *reply) {

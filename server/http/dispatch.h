@@ -26,6 +26,9 @@ bool dispatch_at_once(void *context, Request *request, Reply *reply);
 // Judges a request by its head, before its body is taken: false where dispatch would refuse it for
 // its path or its token, with the refusal in `reply`.
 bool dispatch_admits(void *context, Request *request, Reply *reply);
+// Whether whoever sent an admitted request may still have its answer: a token may be revoked
+// meanwhile.
+bool dispatch_still_admits(void *context, Request *request);
 // Notes an answer that did not come from here: a refusal of the listener's.
 void dispatch_note(void *context, const Request *request, const Reply *reply);
 

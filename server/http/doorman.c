@@ -12,10 +12,19 @@ Status doorman_admit(const Doorman *doorman, const char *scope, Request *request
     request->client = NULL;
     if (doorman == NULL || doorman->tokens == NULL || strcmp(scope, "open") == 0)
         return STATUS_OK;
-    TRY(tokens_check(doorman->tokens, request->authorization, scope, request->client_name,
-                     problem));
-    request->client = request->client_name[0] != '\0' ? request->client_name : NULL;
+    TRY(tokens_check(doorman->tokens, request->authorization, scope, &request->holder, problem));
+    request->client = request->holder.name[0] != '\0' ? request->holder.name : NULL;
     return STATUS_OK;
+}
+
+Status doorman_owns(const Request *request, const char *owner, const char *what, Problem *problem) {
+    if (request->client == NULL || request->holder.is_admin || owner == NULL ||
+        strcmp(owner, request->client) == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_FORBIDDEN,
+                       "%s is of the token \"%s\": that alone or one of the scope \"admin\" may do "
+                       "this, and this one is \"%s\"",
+                       what, owner, request->client);
 }
 
 static void write_line(const Request *request, const Reply *reply, int64_t ns, uint64_t sent) {

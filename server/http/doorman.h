@@ -25,6 +25,11 @@ typedef struct Doorman {
 // becomes who it is. STATUS_UNAUTHORIZED, STATUS_FORBIDDEN.
 Status doorman_admit(const Doorman *doorman, const char *scope, Request *request, Problem *problem);
 
+// Whether an admitted request may undo what `owner` (a token's name; NULL: nobody in particular)
+// made: its own and nobody's, all with the scope admin or where no tokens are asked for.
+// STATUS_FORBIDDEN says of `what` ("the job j-7f3a") whose it is.
+Status doorman_owns(const Request *request, const char *owner, const char *what, Problem *problem);
+
 // Once per answer, when it is ready to be sent; request->route may be NULL.
 void doorman_note(const Doorman *doorman, const Request *request, const Reply *reply);
 

@@ -109,8 +109,15 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
             return sending_queue(exchange, &refusal, true);
     }
     exchange->body.most = most;
+    exchange->is_reading = has_body;
+    exchange->loop->reading += has_body;
     seat_limit(exchange->seat, has_body ? BODY_MS : 0);
     return MHD_YES;
+}
+
+static void end_reading(Exchange *exchange) {
+    exchange->loop->reading -= exchange->is_reading;
+    exchange->is_reading = false;
 }
 
 static void drop_body(Exchange *exchange) {
@@ -205,6 +212,7 @@ static enum MHD_Result hand_over(Exchange *exchange) {
 }
 
 static enum MHD_Result answer(Exchange *exchange) {
+    end_reading(exchange);
     const ListenerSettings *settings = &exchange->desk->settings;
     Request *request = &exchange->request;
     if (exchange->is_answered) {
@@ -278,24 +286,44 @@ void exchange_connection(void *context, struct MHD_Connection *connection, void 
     atomic_fetch_sub(&loop->connections, 1);
 }
 
+// A few are kept for the next requests: they are too large for the allocator's quick ways.
+static Exchange *exchange_take(Loop *loop) {
+    if (loop->spare_count == 0)
+        return calloc(1, sizeof(Exchange));
+    Exchange *exchange = loop->spare[--loop->spare_count];
+    memset(exchange, 0, sizeof *exchange);
+    return exchange;
+}
+
+static void exchange_put(Loop *loop, Exchange *exchange) {
+    if (loop->spare_count < EXCHANGES_KEPT)
+        loop->spare[loop->spare_count++] = exchange;
+    else
+        free(exchange);
+}
+
+void exchange_forget(Loop *loop) {
+    while (loop->spare_count > 0)
+        free(loop->spare[--loop->spare_count]);
+}
+
 // The request line is in; `target` is as sent.
 void *exchange_open(void *context, const char *target, struct MHD_Connection *connection) {
     Loop *loop = context;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     Seat *seat = info != NULL ? info->socket_context : NULL;
-    Exchange *exchange = seat != NULL ? calloc(1, sizeof *exchange) : NULL;
+    Exchange *exchange = seat != NULL ? exchange_take(loop) : NULL;
     if (exchange == NULL)
         return NULL;
     exchange->target = strdup(target);
     if (exchange->target == NULL) {
-        free(exchange);
+        exchange_put(loop, exchange);
         return NULL;
     }
     exchange->loop = loop;
     exchange->desk = loop->desk;
     exchange->seat = seat;
-    reply_default(&exchange->reply);
     atomic_fetch_add(&loop->desk->exchanges, 1);
     seat_limit(seat, HEAD_MS);
     return exchange;
@@ -321,7 +349,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
 
 void exchange_close(void *context, struct MHD_Connection *connection, void **state,
                     enum MHD_RequestTerminationCode code) {
-    (void)connection, (void)code;
+    (void)connection;
     Loop *loop = context;
     Exchange *exchange = *state;
     if (exchange == NULL)
@@ -329,13 +357,17 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     *state = NULL;
     if (exchange->forget != NULL)
         exchange->forget(exchange->request.kept);
-    // The client left before its answer was there.
-    exchange->reply.forget = NULL;
-    reply_clear(&exchange->reply);
+    if (exchange->is_answered) {
+        // The client may have left before it was sent.
+        exchange->reply.forget = NULL;
+        reply_clear(&exchange->reply);
+    }
     drop_body(exchange);
+    end_reading(exchange);
     request_close(&exchange->request);
-    seat_limit(exchange->seat, IDLE_MS);
+    // One that ended in an error the library closes only when its client is heard of again.
+    seat_limit(exchange->seat, code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? IDLE_MS : 1);
     free(exchange->target);
-    free(exchange);
+    exchange_put(loop, exchange);
     atomic_fetch_sub(&loop->desk->exchanges, 1);
 }

@@ -28,19 +28,24 @@ typedef struct Desk {
     atomic_size_t held;      // bytes of bodies
 } Desk;
 
+enum { EXCHANGES_KEPT = 32 };
+
 // An event loop: its daemon and its thread alone, but for what is locked.
 typedef struct Loop {
     Desk *desk;
     struct MHD_Daemon *daemon;
     pthread_t thread;
-    Bell bell;    // there are arrivals, or connections to go on with, or it is to stop
-    size_t turns; // calls of exchange_go_on
+    Bell bell;      // there are arrivals, or connections to go on with, or it is to stop
+    size_t turns;   // calls of exchange_go_on
+    size_t reading; // exchanges whose body is still to come
     pthread_mutex_t lock;
     int *arrivals; // descriptors, locked
     size_t arrival_count, arrival_room;
     atomic_bool is_stopping;
     atomic_size_t connections; // with the arrivals
     SentAgain sent_again[SENT_AGAIN];
+    struct Exchange *spare[EXCHANGES_KEPT];
+    size_t spare_count;
 } Loop;
 
 typedef struct Exchange {
@@ -56,7 +61,7 @@ typedef struct Exchange {
     char *target;
     Reply reply; // once it is answered in the pool
     void (*forget)(void *kept);
-    bool is_begun, is_counted, is_busy;
+    bool is_begun, is_reading, is_counted, is_busy;
     bool is_asleep;   // the handler asked to wait
     bool is_in_pool;  // it is answered there, its connection suspended
     bool is_answered; // there, with `reply`
@@ -74,5 +79,7 @@ enum MHD_Result exchange_go_on(void *loop, struct MHD_Connection *connection, co
                                size_t *size, void **exchange);
 void exchange_close(void *loop, struct MHD_Connection *connection, void **exchange,
                     enum MHD_RequestTerminationCode code);
+// Frees what the loop kept for the next requests.
+void exchange_forget(Loop *loop);
 
 #endif

@@ -74,7 +74,8 @@ static bool has_control(const char *text, size_t size) {
 static bool is_token(const char *text, size_t size) {
     for (size_t i = 0; i < size; i++) {
         const unsigned char c = (unsigned char)text[i];
-        if (c <= 0x20 || c >= 0x7f || strchr("\"(),/:;<=>?@[\\]{}", c) != NULL)
+        const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-';
+        if (!is_plain && (c <= 0x20 || c >= 0x7f || strchr("\"(),/:;<=>?@[\\]{}", c) != NULL))
             return false;
     }
     return size > 0;
@@ -130,7 +131,7 @@ static const char *path_fault(const char *target) {
             dots = others = 0;
         } else if (target[i] == '.') {
             dots++;
-        } else if (i + 2 < size && strncasecmp(target + i, "%2e", 3) == 0) {
+        } else if (target[i] == '%' && strncasecmp(target + i, "%2e", 3) == 0) {
             dots++;
             i += 2;
         } else {
@@ -163,8 +164,8 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
         return refuse(problem, 505, "this server speaks HTTP/1.1 and HTTP/1.0");
     bool is_known = false;
-    for (size_t i = 0; i < COUNT(known_methods); i++)
-        is_known = is_known || strcmp(method, known_methods[i]) == 0;
+    for (size_t i = 0; i < COUNT(known_methods) && !is_known; i++)
+        is_known = strcmp(method, known_methods[i]) == 0;
     if (!is_known)
         return refuse(problem, 501,
                       "unknown method; known are GET, HEAD, POST, PUT, PATCH, DELETE and OPTIONS");
@@ -174,6 +175,8 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
         return refuse(problem, 414, "the target is longer than 4096 bytes");
     if (has_control(target, strlen(target)))
         return refuse(problem, 400, "the target holds a control character");
+    if (strchr(target, ' ') != NULL)
+        return refuse(problem, 400, "the target holds a space; write it as %20");
     const char *fault = path_fault(target);
     if (fault != NULL)
         return refuse(problem, 400, fault);

@@ -23,9 +23,10 @@ enum {
     THREADS = 16,            // that answer what takes a while
     CONNECTIONS_MOST = 8192, // over all loops, where as many files may be open
     FILES_KEPT = 64,         // for everything else
-    TOGETHER = 12,           // connections that one loop takes before another does
+    TOGETHER = 16,           // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
+    IN_VAIN = 16,   // runs in a row that called nothing, before a pause
 };
 
 struct Listener {
@@ -68,22 +69,27 @@ static void *run_loop(void *context) {
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(loop->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     struct pollfd events[] = {{.fd = info->epoll_fd, .events = POLLIN},
                               {.fd = loop->bell.descriptor, .events = POLLIN}};
-    bool is_idle = true;
+    size_t idle = 1; // runs in a row that called nothing
     while (!atomic_load(&loop->is_stopping)) {
         // Where there was something to do there mostly is more: no call to wait for it, then.
-        if (is_idle && !atomic_load(&loop->bell.is_rung)) {
+        if (idle > 0 && !atomic_load(&loop->bell.is_rung)) {
             // What is ready in memory shows in no descriptor.
             MHD_UNSIGNED_LONG_LONG left_ms;
             int wait_ms = -1;
             if (MHD_get_timeout(loop->daemon, &left_ms) == MHD_YES)
                 wait_ms = left_ms < 1000 ? (int)left_ms : 1000;
+            // A chunk's head that fills the connection's memory stays ready until its time is up,
+            // and nothing comes of it. An answer that is being sent calls nothing either: no long
+            // pauses, therefore.
+            if (wait_ms == 0 && loop->reading > 0 && idle % IN_VAIN == 0)
+                wait_ms = 1;
             (void)poll(events, 2, wait_ms);
         }
         if (bell_answer(&loop->bell))
             take_arrivals(loop);
         const size_t turns = loop->turns;
         MHD_run(loop->daemon);
-        is_idle = loop->turns == turns;
+        idle = loop->turns == turns ? idle + 1 : 0;
     }
     return NULL;
 }
@@ -143,12 +149,10 @@ static void *accept_all(void *context) {
 static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) {
     const ListenerSettings *settings = &desk->settings;
     loop->desk = desk;
-    const bool is_tls = settings->tls_key != NULL;
+    const bool is_tls = settings->certificate != NULL;
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            MHD_USE_TURBO | (is_tls ? (unsigned)MHD_USE_TLS : 0);
     const struct MHD_OptionItem tls[] = {
-        {MHD_OPTION_HTTPS_MEM_KEY, 0, (void *)(uintptr_t)settings->tls_key},
-        {MHD_OPTION_HTTPS_MEM_CERT, 0, (void *)(uintptr_t)settings->tls_cert},
         {MHD_OPTION_HTTPS_PRIORITIES, 0,
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.2:+VERS-TLS1.3"},
         {MHD_OPTION_END, 0, NULL}};
@@ -159,7 +163,9 @@ static Status loop_start(Loop *loop, Desk *desk, size_t most, Problem *problem) 
         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S, MHD_OPTION_STRICT_FOR_CLIENT, 0,
         MHD_OPTION_URI_LOG_CALLBACK, exchange_open, loop, MHD_OPTION_NOTIFY_CONNECTION,
         exchange_connection, loop, MHD_OPTION_NOTIFY_COMPLETED, exchange_close, loop,
-        MHD_OPTION_ARRAY, is_tls ? tls : none, MHD_OPTION_END);
+        MHD_OPTION_ARRAY, is_tls ? tls : none,
+        is_tls ? MHD_OPTION_HTTPS_CERT_CALLBACK : MHD_OPTION_END, settings->certificate,
+        MHD_OPTION_END);
     if (loop->daemon == NULL)
         return problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
                            is_tls ? " with this certificate and key" : "");
@@ -187,6 +193,7 @@ static void loop_end(Loop *loop) {
     free(loop->arrivals);
     MHD_stop_daemon(loop->daemon);
     sending_forget(loop->sent_again);
+    exchange_forget(loop);
     pthread_mutex_destroy(&loop->lock);
     bell_close(&loop->bell);
 }
@@ -211,7 +218,7 @@ static Status start(Listener *listener, Problem *problem) {
     TRY(hall_open(&exchange_calls, &desk->hall, problem));
     TRY(pool_open(THREADS, &desk->pool, problem));
     TRY(address_open(&settings->address, &listener->descriptor, problem));
-    address_url(&settings->address, settings->tls_key != NULL, listener->url);
+    address_url(&settings->address, settings->certificate != NULL, listener->url);
     desk->url = listener->url;
     desk->first_id = (uint64_t)clock_unix_ms() << 16;
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);

@@ -5,6 +5,7 @@
 #ifndef SERVER_HTTP_LISTENER_H
 #define SERVER_HTTP_LISTENER_H
 
+#include "server/base/certificate.h"
 #include "server/http/address.h"
 #include "server/http/gate.h"
 #include "server/http/request.h"
@@ -21,11 +22,14 @@ typedef struct ListenerSettings {
     void (*answer)(void *context, Request *request, Reply *reply);
     // Asked before a body is taken, on the event loop: false and a refusal in `reply`. May be NULL.
     bool (*admits)(void *context, Request *request, Reply *reply);
+    // Asked now and then while a body is made piece by piece, on the event loop: false ends it. May
+    // be NULL.
+    bool (*still_admits)(void *context, Request *request);
     // Told of refusals that none of them made. May be NULL.
     void (*note)(void *context, const Request *request, const Reply *reply);
     void *context;
     const GateHosts *hosts;         // NULL: gate_loopback
-    const char *tls_cert, *tls_key; // PEM; NULL: no TLS
+    CertificateSource *certificate; // NULL: no TLS
 } ListenerSettings;
 
 // Fails as address_open does.

@@ -60,19 +60,23 @@ static bool tag(Reply *reply, const Request *request, const char *text, const ch
 }
 
 bool reply_is_known(Reply *reply, const Request *request) {
+    if (request->if_none_match == NULL)
+        return false;
     char packed[sizeof reply->etag + 8];
     // The client may have it as it is, or packed.
     snprintf(packed, sizeof packed, "%.*s" PACKED "\"", (int)strlen(reply->etag) - 1, reply->etag);
-    if (!header_etag_matches(request->if_none_match, reply->etag) &&
-        !header_etag_matches(request->if_none_match, packed))
+    const bool has_plain = header_etag_matches(request->if_none_match, reply->etag);
+    const bool has_packed = !has_plain && header_etag_matches(request->if_none_match, packed);
+    if (!has_plain && !has_packed)
         return false;
-    char etag[sizeof reply->etag], cache_control[sizeof reply->cache_control];
-    memcpy(etag, reply->etag, sizeof etag);
+    // Told is the tag of what the client has: a cache freshens the form that bears it.
+    char etag[sizeof packed], cache_control[sizeof reply->cache_control];
+    snprintf(etag, sizeof etag, "%s", has_packed ? packed : reply->etag);
     memcpy(cache_control, reply->cache_control, sizeof cache_control);
-    const bool varies_by_encoding = reply->varies_by_encoding;
+    const bool varies_by_encoding = reply->varies_by_encoding || has_packed;
     const bool varies_by_accept = reply->varies_by_accept;
     reply_clear(reply);
-    memcpy(reply->etag, etag, sizeof etag);
+    text_fit(reply->etag, sizeof reply->etag, etag);
     memcpy(reply->cache_control, cache_control, sizeof cache_control);
     reply->varies_by_encoding = varies_by_encoding;
     reply->varies_by_accept = varies_by_accept;

@@ -94,6 +94,25 @@ void request_close(Request *request) {
     request->storage = NULL;
 }
 
+// Of these the first value is kept.
+#define KEPT(name, member)                                                                         \
+    { name, offsetof(Request, member) }
+static const struct {
+    const char *name;
+    size_t offset;
+} kept[] = {KEPT("Host", host),
+            KEPT("Content-Type", content_type),
+            KEPT("Accept", accept),
+            KEPT("If-None-Match", if_none_match),
+            KEPT("If-Range", if_range),
+            KEPT("Range", range),
+            KEPT("Expect", expect),
+            KEPT("Authorization", authorization),
+            KEPT("Accept-Encoding", accept_encoding),
+            KEPT("If-Match", if_match),
+            KEPT("Idempotency-Key", idempotency_key),
+            KEPT("Last-Event-ID", last_event_id)};
+
 void request_header(Request *request, const char *name, const char *value) {
     if (strcasecmp(name, "Prefer") == 0) {
         // One preference may stand in several headers (RFC 7240, section 2).
@@ -111,24 +130,13 @@ void request_header(Request *request, const char *name, const char *value) {
             memcpy(request->id, value, size + 1);
         return;
     }
-    const struct {
-        const char *name;
-        const char **target;
-    } kept[] = {{"Host", &request->host},
-                {"Content-Type", &request->content_type},
-                {"Accept", &request->accept},
-                {"If-None-Match", &request->if_none_match},
-                {"If-Range", &request->if_range},
-                {"Range", &request->range},
-                {"Expect", &request->expect},
-                {"Authorization", &request->authorization},
-                {"Accept-Encoding", &request->accept_encoding},
-                {"If-Match", &request->if_match},
-                {"Idempotency-Key", &request->idempotency_key},
-                {"Last-Event-ID", &request->last_event_id}};
     for (size_t i = 0; i < COUNT(kept); i++)
-        if (*kept[i].target == NULL && strcasecmp(name, kept[i].name) == 0)
-            *kept[i].target = value;
+        if (((name[0] ^ kept[i].name[0]) & 0xDF) == 0 && strcasecmp(name, kept[i].name) == 0) {
+            const char **target = (const char **)(void *)((char *)request + kept[i].offset);
+            if (*target == NULL)
+                *target = value;
+            return;
+        }
 }
 
 const char *request_query(const Request *request, const char *name) {

@@ -40,17 +40,18 @@ typedef struct Request {
         *range; // NULL if absent
     const char *expect, *authorization, *accept_encoding, *if_match, *idempotency_key,
         *last_event_id;
-    char prefers[128];  // all Prefer headers in one: `prefer` points here
-    const char *client; // the name of the token it came with; NULL: none was asked for
-    char client_name[TOKEN_NAME_SIZE]; // `client` points here
-    char id[REQUEST_ID_SIZE];          // the client's own or ours; for the client and the journal
-    const struct Route *route;         // that fits; NULL before and where there is none
-    int64_t started_ns;                // monotonic
-    bool is_woken;                     // the handler asked to wait and is called again
-    bool is_expired;                   // ... because the time was up
-    void *kept;                        // what the handler kept when it asked to wait; see Reply
-    const Waker *waker; // wakes this request; outlives it, so that a late call does no harm
-    char *storage;      // what the texts above point into
+    char prefers[128];         // all Prefer headers in one: `prefer` points here
+    const char *client;        // the name of the token it came with; NULL: none was asked for
+    Holder holder;             // `client` points here
+    char id[REQUEST_ID_SIZE];  // the client's own or ours; for the client and the journal
+    const struct Route *route; // that fits; NULL before and where there is none
+    bool is_admitted;          // it was judged just now, before its body
+    int64_t started_ns;        // monotonic
+    bool is_woken;             // the handler asked to wait and is called again
+    bool is_expired;           // ... because the time was up
+    void *kept;                // what the handler kept when it asked to wait; see Reply
+    const Waker *waker;        // wakes this request; outlives it, so that a late call does no harm
+    char *storage;             // what the texts above point into
 } Request;
 
 // Takes `target` apart: path, queries, percent-decoded. The rest of `request` stays. STATUS_USAGE
@@ -79,10 +80,11 @@ Status request_count(const Request *request, const char *name, size_t least, siz
 // A body made piece by piece while it is sent, for what is too long to hold and for what is not
 // known yet. `next` writes up to `size` bytes and returns how many, STREAM_END behind the last, or
 // STREAM_WAIT to be called again when the request's waker (which the context may keep) is called or
-// after `wait_ms`. It is called from one thread at a time, must be quick, and knows no Request:
+// after `wait_ms`, or STREAM_BROKEN where the rest cannot be had: the client sees that it is cut
+// off. It is called from one thread at a time, must be quick, and knows no Request:
 // that is gone once the handler has returned. `release(context)` is called once, also if the client
 // leaves early.
-enum { STREAM_END = -1, STREAM_WAIT = -2 };
+enum { STREAM_END = -1, STREAM_WAIT = -2, STREAM_BROKEN = -3 };
 typedef struct Stream {
     ptrdiff_t (*next)(void *context, char *target, size_t size);
     uint64_t size; // of the whole body; UINT64_MAX: not known

@@ -36,9 +36,9 @@ bool route_match(const char *pattern, const char *path, RouteSpan spans[REQUEST_
 }
 
 static void allow_add(char allow[64], const char *method) {
-    const size_t used = strlen(allow);
-    snprintf(allow + used, 64 - used, "%s%s%s", used > 0 ? ", " : "", method,
-             strcmp(method, "GET") == 0 ? ", HEAD" : "");
+    text_list(allow, 64, method);
+    if (strcmp(method, "GET") == 0)
+        text_list(allow, 64, "HEAD");
 }
 
 const Route *route_find(const Route *table, const char *method, const char *path,

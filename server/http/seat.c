@@ -20,7 +20,7 @@ struct Seat {
     Waker waker;
     int descriptor; // -1: empty
     void *asleep;   // the suspended connection, or NULL
-    bool is_woken;
+    atomic_bool is_woken;
     int64_t wake_ns;           // INT64_MAX: none
     _Atomic(int64_t) limit_ns; // the same; set without the lock, several times a request
 };
@@ -32,7 +32,8 @@ struct Hall {
     pthread_t clock;
     Seat *all, *empty;
     _Atomic(int64_t) next_ns; // when the clock thread wakes; lowered without the lock as well
-    bool is_closing, is_closed;
+    atomic_bool is_closing;
+    bool is_closed;
 };
 
 static void wake_locked(Seat *seat) {
@@ -127,10 +128,7 @@ void hall_wake_all(Hall *hall) {
 }
 
 bool hall_is_closing(Hall *hall) {
-    pthread_mutex_lock(&hall->lock);
-    const bool is_closing = hall->is_closing;
-    pthread_mutex_unlock(&hall->lock);
-    return is_closing;
+    return atomic_load(&hall->is_closing);
 }
 
 void hall_close(Hall *hall) {
@@ -210,9 +208,7 @@ void seat_limit(Seat *seat, int64_t most_ms) {
 }
 
 void seat_begin(Seat *seat) {
-    pthread_mutex_lock(&seat->hall->lock);
-    seat->is_woken = false;
-    pthread_mutex_unlock(&seat->hall->lock);
+    atomic_store(&seat->is_woken, false);
 }
 
 bool seat_sleep(Seat *seat, void *connection, int64_t most_ms) {
@@ -233,9 +229,5 @@ bool seat_sleep(Seat *seat, void *connection, int64_t most_ms) {
 }
 
 bool seat_was_woken(Seat *seat) {
-    pthread_mutex_lock(&seat->hall->lock);
-    const bool was_woken = seat->is_woken;
-    seat->is_woken = false;
-    pthread_mutex_unlock(&seat->hall->lock);
-    return was_woken;
+    return atomic_exchange(&seat->is_woken, false);
 }

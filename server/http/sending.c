@@ -2,7 +2,9 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "server/base/clock.h"
 #include "server/http/exchange.h"
 #include "server/http/reply.h"
 #include "server/http/shield.h"
@@ -10,21 +12,38 @@
 // What a streamed body needs while it is sent.
 typedef struct Sending {
     Exchange *exchange;
+    int64_t admitted_ns; // when its client was last looked at
     Stream stream;
     void (*release)(void *context);
     void *context;
 } Sending;
+
+// A body that takes long outlives what its client may do.
+static bool is_still_admitted(Sending *sending) {
+    enum { LOOK_MS = 500 };
+    const ListenerSettings *settings = &sending->exchange->desk->settings;
+    const int64_t now_ns = clock_monotonic_ns();
+    if (settings->still_admits == NULL || now_ns - sending->admitted_ns < LOOK_MS * 1000000LL)
+        return true;
+    sending->admitted_ns = now_ns;
+    return settings->still_admits(settings->context, &sending->exchange->request);
+}
 
 static ssize_t send_next(void *context, uint64_t position, char *target, size_t size) {
     (void)position;
     Sending *sending = context;
     Exchange *exchange = sending->exchange;
     for (;;) {
+        // Cut off, so that nobody takes it for whole.
+        if (!is_still_admitted(sending))
+            return MHD_CONTENT_READER_END_WITH_ERROR;
         // Forgotten before looking: whoever wakes it from here on has it look again.
         (void)seat_was_woken(exchange->seat);
         const ptrdiff_t count = sending->stream.next(sending->context, target, size);
         if (count == STREAM_END)
             return MHD_CONTENT_READER_END_OF_STREAM;
+        if (count == STREAM_BROKEN)
+            return MHD_CONTENT_READER_END_WITH_ERROR;
         if (count != STREAM_WAIT)
             return count;
         if (hall_is_closing(exchange->desk->hall))
@@ -46,7 +65,8 @@ static struct MHD_Response *stream_response(Exchange *exchange, const Reply *rep
     Sending *sending = malloc(sizeof *sending);
     if (sending == NULL)
         return NULL;
-    *sending = (Sending){exchange, reply->stream, reply->release, reply->context};
+    *sending =
+        (Sending){exchange, clock_monotonic_ns(), reply->stream, reply->release, reply->context};
     struct MHD_Response *response = MHD_create_response_from_callback(
         reply->stream.size == UINT64_MAX ? MHD_SIZE_UNKNOWN : reply->stream.size, PIECE, send_next,
         sending, sending_free);
@@ -68,6 +88,8 @@ static const char *vary(const Reply *reply) {
 
 // All headers but those of one request alone.
 static void add_headers(struct MHD_Response *response, const Reply *reply, bool has_tls) {
+    const bool is_events =
+        reply->content_type != NULL && strcmp(reply->content_type, "text/event-stream") == 0;
     char retry_after[16] = "";
     if (reply->retry_after >= 0)
         snprintf(retry_after, sizeof retry_after, "%d", reply->retry_after);
@@ -83,6 +105,8 @@ static void add_headers(struct MHD_Response *response, const Reply *reply, bool 
     add_header(response, MHD_HTTP_HEADER_ALLOW, reply->allow);
     add_header(response, MHD_HTTP_HEADER_CONTENT_RANGE, reply->content_range);
     add_header(response, MHD_HTTP_HEADER_RETRY_AFTER, retry_after);
+    // A proxy that gathers an answer would hold events back.
+    add_header(response, "X-Accel-Buffering", is_events ? "no" : NULL);
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     add_header(response, MHD_HTTP_HEADER_VARY, vary(reply));
     add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
@@ -104,7 +128,7 @@ static struct MHD_Response *make(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        add_headers(response, reply, exchange->desk->settings.tls_cert != NULL);
+        add_headers(response, reply, exchange->desk->settings.certificate != NULL);
     return response;
 }
 

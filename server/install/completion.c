@@ -16,6 +16,19 @@ static bool has_operand(const Command *command, const char *part) {
     return command->operands != NULL && strstr(command->operands, part) != NULL;
 }
 
+// "create list" of "create|list [NAME]", where the first operand is one of a list.
+enum { ACTIONS_SIZE = 96 };
+static bool actions_of(const Command *command, char actions[ACTIONS_SIZE]) {
+    const char *operands = command->operands != NULL ? command->operands : "";
+    const size_t length = strcspn(operands, " ");
+    if (memchr(operands, '|', length) == NULL || length >= ACTIONS_SIZE)
+        return false;
+    snprintf(actions, ACTIONS_SIZE, "%.*s", (int)length, operands);
+    for (char *bar = actions; (bar = strchr(bar, '|')) != NULL;)
+        *bar = ' ';
+    return true;
+}
+
 static void names_print(FILE *file) {
     for (size_t i = 0; commands[i] != NULL; i++)
         fprintf(file, "%s%s", i > 0 ? " " : "", commands[i]->name);
@@ -72,7 +85,7 @@ void completion_bash(FILE *file) {
     }
     fputs("    esac\n    case ${COMP_WORDS[1]}:$cur in\n", file);
     for (size_t i = 0; commands[i] != NULL; i++) {
-        char name[OPTION_NAME];
+        char name[OPTION_NAME], actions[ACTIONS_SIZE];
         fprintf(file, "    %s:-*) mapfile -t COMPREPLY < <(compgen -W '--help", commands[i]->name);
         for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
              row++) {
@@ -89,6 +102,11 @@ void completion_bash(FILE *file) {
                     "    %s:*) [ \"$COMP_CWORD\" -lt 3 ] || mapfile -t COMPREPLY < <(compgen -W "
                     "'%s' -- \"$cur\") ;;\n",
                     commands[i]->name, parts);
+        } else if (actions_of(commands[i], actions)) {
+            fprintf(file,
+                    "    %s:*) [ \"$COMP_CWORD\" -ne 2 ] || mapfile -t COMPREPLY < <(compgen -W "
+                    "'%s' -- \"$cur\") ;;\n",
+                    commands[i]->name, actions);
         }
     }
     fputs("    esac\n"
@@ -153,6 +171,7 @@ void completion_zsh(FILE *file) {
           "    case $chosen in\n",
           file);
     for (size_t i = 0; commands[i] != NULL; i++) {
+        char actions[ACTIONS_SIZE];
         fprintf(file, "    %s)\n        _arguments \\\n", commands[i]->name);
         for (const Field *row = commands[i]->options; row != NULL && row->kind != FIELD_KIND_END;
              row++)
@@ -163,6 +182,8 @@ void completion_zsh(FILE *file) {
             fputs(")'\n", file);
         } else if (has_operand(commands[i], "WHAT")) {
             fprintf(file, "            '1:id:' '2:what:(%s)'\n", parts);
+        } else if (actions_of(commands[i], actions)) {
+            fprintf(file, "            '1:action:(%s)' '2:name:'\n", actions);
         } else {
             fputs("            '*:file:_files'\n", file);
         }
@@ -175,6 +196,10 @@ void completion_fish(FILE *file) {
     fputs("# fish completion of impactd, printed from its tables.\n", file);
     for (size_t i = 0; commands[i] != NULL; i++) {
         const Command *command = commands[i];
+        char actions[ACTIONS_SIZE];
+        if (actions_of(command, actions))
+            fprintf(file, "complete -c impactd -n '__fish_seen_subcommand_from %s' -f -a '%s'\n",
+                    command->name, actions);
         fprintf(file, "complete -c impactd -n __fish_use_subcommand -f -a %s -d '", command->name);
         quoted(file, command->summary, "\\", "\\'");
         fputs("'\n", file);

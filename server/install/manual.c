@@ -209,7 +209,7 @@ static void rows_print(FILE *file, const Field *fields, const char *place) {
             fprintf(file, " \" with %s \" ", row->kinds->tag);
             fprintf(file, "\"%s\"\n", kind->name);
             escaped(file, kind->doc != NULL ? kind->doc : "", true);
-            fputs(i == 0 ? " (taken where none is named)\n" : "\n", file);
+            fputs(i == 0 && !row->kinds->is_named ? " (taken where none is named)\n" : "\n", file);
             rows_print(file, kind->fields, inner);
         }
     }

@@ -11,7 +11,7 @@ typedef struct Entry {
     struct Entry *newer, *older;
     Outcome *outcome; // or NULL
     Head *head;       // or NULL
-    size_t bytes;
+    size_t series_bytes, head_bytes;
     char id[72];
 } Entry;
 
@@ -19,7 +19,7 @@ struct Cache {
     Index *index;
     Entry *newest, *oldest;
     size_t most_bytes;
-    LayerTally series, heads; // `bytes` of both stand in the series'
+    LayerTally series, heads;
 };
 
 Cache *cache_new(size_t most_bytes) {
@@ -50,7 +50,8 @@ static void link_newest(Cache *cache, Entry *entry) {
 static void evict(Cache *cache, Entry *entry) {
     unlink_entry(cache, entry);
     index_remove(cache->index, &entry->indexed);
-    cache->series.bytes -= entry->bytes;
+    cache->series.bytes -= entry->series_bytes;
+    cache->heads.bytes -= entry->head_bytes;
     cache->series.count -= entry->outcome != NULL;
     cache->heads.count -= entry->head != NULL;
     outcome_drop(entry->outcome);
@@ -78,15 +79,16 @@ void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head) {
     entry->head = head_hold(head != NULL ? head : old != NULL ? old->head : NULL);
     if (old != NULL)
         evict(cache, old);
-    entry->bytes = sizeof *entry + (kept != NULL ? outcome_bytes(kept) : 0) +
-                   (entry->head != NULL ? entry->head->bytes : 0);
+    entry->series_bytes = kept != NULL ? outcome_bytes(kept) : 0;
+    entry->head_bytes = sizeof *entry + (entry->head != NULL ? entry->head->bytes : 0);
     entry->indexed.key = entry->id;
     index_add(cache->index, &entry->indexed);
     link_newest(cache, entry);
-    cache->series.bytes += entry->bytes;
+    cache->series.bytes += entry->series_bytes;
+    cache->heads.bytes += entry->head_bytes;
     cache->series.count += entry->outcome != NULL;
     cache->heads.count += entry->head != NULL;
-    while (cache->series.bytes > cache->most_bytes && cache->oldest != entry) {
+    while (cache->series.bytes + cache->heads.bytes > cache->most_bytes && cache->oldest != entry) {
         cache->series.evictions += cache->oldest->outcome != NULL;
         cache->heads.evictions += cache->oldest->head != NULL;
         evict(cache, cache->oldest);
@@ -133,5 +135,4 @@ void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads) {
     *series = cache->series;
     *heads = cache->heads;
     series->most_bytes = heads->most_bytes = cache->most_bytes;
-    heads->bytes = series->bytes;
 }

@@ -20,7 +20,7 @@ Outcome *cache_find(Cache *cache, const char *id); // a hold for the caller, or 
 Head *cache_head(Cache *cache, const char *id);    // a hold for the caller, or NULL
 bool cache_has(const Cache *cache, const char *id, bool with_series); // is not a use of it
 void cache_forget(Cache *cache, const char *id);
-// Of the series, and of the documents: how often asked for, and kept. Bytes are of both together.
+// Of the series, and of the documents: how often asked for, and kept. Both share the budget.
 void cache_tally(const Cache *cache, LayerTally *series, LayerTally *heads);
 
 #endif

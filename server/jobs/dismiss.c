@@ -57,6 +57,8 @@ static Status dismiss(Intake *intake, Job *job, const char *id, Problem *problem
         job->row.run = 1e-9 * (double)(clock_monotonic_ns() - job->started_ns);
     job->row.finished_unix_ms = clock_unix_ms();
     job->row.total = 1e-9 * (double)(clock_monotonic_ns() - job->submitted_ns);
+    if (job->started_ns == 0)
+        job->row.queued = job->row.total;
     intake_withdraw(job);
     job->is_closing = true;
     job->closing = job->row;

@@ -4,8 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Keys are random ids and digests, at most some ten thousand of them: no growing is needed.
-enum { BUCKETS = 16384 };
+// Keys are random ids and digests, at most some hundred thousand of them: no growing is needed, and
+// buckets that are not used take no memory.
+enum { BUCKETS = 65536 };
 
 struct Index {
     IndexEntry *buckets[BUCKETS];

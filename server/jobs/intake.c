@@ -386,7 +386,7 @@ void intake_tally(Intake *intake, IntakeTally *tally) {
                            .stored = intake->stored};
     cache_tally(intake->cache, &tally->series, &tally->heads);
     tally->cached_outcomes = tally->series.count;
-    tally->cached_bytes = tally->series.bytes;
+    tally->cached_bytes = tally->series.bytes + tally->heads.bytes;
     known_tally(intake->known, &tally->known);
     for (size_t i = 0; i < intake->worker_count; i++)
         tally->running += intake->workers[i].running != NULL || intake->workers[i].study != NULL;

@@ -84,6 +84,10 @@ bool job_is_finished(Job *job) {
     return is_finished;
 }
 
+const char *job_client(const Job *job) {
+    return job->row.client; // never changes
+}
+
 static bool copy(char **target, const char *text) {
     *target = text == NULL ? NULL : strdup(text);
     return text == NULL || *target != NULL;
@@ -123,7 +127,8 @@ Status job_show(Job *job, JobShow *show) {
     }
     const bool is_whole = copy(&show->problem, row->problem) &&
                           copy(&show->warnings, row->warnings) && copy(&show->title, row->title) &&
-                          copy(&show->labels, row->labels) && copy(&show->study, row->study);
+                          copy(&show->labels, row->labels) && copy(&show->study, row->study) &&
+                          copy(&show->client, row->client);
     show->head = head_hold(job->head);
     unlock(job);
     if (show->head != NULL) {
@@ -141,6 +146,7 @@ void job_show_clear(JobShow *show) {
     free(show->title);
     free(show->labels);
     free(show->study);
+    free(show->client);
     head_drop(show->head);
     *show = (JobShow){0};
 }
@@ -161,6 +167,8 @@ Status job_kept(Job *job, bool *is_kept, Problem *problem) {
     Status status = STATUS_OK;
     if (!job->is_kept && job->refusal != STATUS_OK)
         status = problem_set(problem, job->refusal, "%s", job->refused);
+    if (job->ticket != NULL)
+        store_hurry(job->intake->store, job->ticket);
     unlock(job);
     return status;
 }

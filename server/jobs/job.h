@@ -44,6 +44,7 @@ typedef struct JobShow {
     struct Head *head;   // holds plan, summary, work and notes; NULL: they are the maker's
     char *labels;        // JSON array; NULL: none
     char *study;         // the kind of its study; NULL: none
+    char *client;        // who sent it: a token's name; NULL: nobody in particular
     bool is_result_deleted;
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
 } JobShow;
@@ -51,14 +52,16 @@ typedef struct JobShow {
 Job *job_hold(Job *job);
 void job_drop(Job *job);
 bool job_is_finished(Job *job);
+// Who sent it, as JobShow has it; lives as long as the job.
+const char *job_client(const Job *job);
 Status job_show(Job *job, JobShow *show);
 void job_show_clear(JobShow *show);
 // Its state and, in *progress, percent: what may be looked at often.
 JobState job_glance(Job *job, double *progress);
 
 // Whether the store has the job as it is now, that is accepted or in its final state: nobody may be
-// told of it before. STATUS_OK with *is_kept false while that is under way; otherwise why it could
-// not be kept. A job that could not be accepted never was.
+// told of it before. STATUS_OK with *is_kept false while that is under way, which asking hurries;
+// otherwise why it could not be kept. A job that could not be accepted never was.
 Status job_kept(Job *job, bool *is_kept, Problem *problem);
 
 // Has `waker` called once when the job finishes (at once if it is finished). False without memory.

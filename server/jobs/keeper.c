@@ -25,9 +25,9 @@ struct Keeper {
 
 // Until then, a second at most. False where it is to stop.
 static bool pause_for(Keeper *keeper, int64_t until_ns) {
-    const int64_t left_ms = (until_ns - clock_monotonic_ns()) / 1000000;
-    const int64_t until = clock_unix_ms() + (left_ms < RETRY_MS ? left_ms : RETRY_MS);
-    const struct timespec end = {(time_t)(until / 1000), (long)(until % 1000) * 1000000};
+    const int64_t retry_ns = clock_monotonic_ns() + RETRY_MS * 1000000LL;
+    const int64_t end_ns = until_ns < retry_ns ? until_ns : retry_ns;
+    const struct timespec end = {(time_t)(end_ns / 1000000000), (long)(end_ns % 1000000000)};
     pthread_mutex_lock(&keeper->lock);
     while (!keeper->is_stopping &&
            pthread_cond_timedwait(&keeper->wake, &keeper->lock, &end) == 0) {
@@ -72,7 +72,11 @@ Status keeper_start(Store *store, Intake *intake, const KeepRules *rules, Keeper
     made->intake = intake;
     made->rules = *rules;
     pthread_mutex_init(&made->lock, NULL);
-    pthread_cond_init(&made->wake, NULL);
+    pthread_condattr_t monotonic; // a clock that is set back makes no pause longer
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&made->wake, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     if (pthread_create(&made->thread, NULL, work, made) != 0) {
         keeper_free(made);
         return problem_set(problem, STATUS_INTERNAL, "the keeper's thread cannot be started");

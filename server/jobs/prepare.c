@@ -1,5 +1,5 @@
 // A scene's text made ready: read, its materials' names turned into numbers, judged and completed,
-// and its id.
+// and its id; the same for who only asks what it would be.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 #include "server/base/bytes.h"
 #include "server/base/digest.h"
 #include "server/codec/read.h"
-#include "server/jobs/intake.h"
+#include "server/jobs/intake_state.h"
 
 // "slug" or "slug@revision"; false if what stands behind @ is no revision.
 static bool split_name(const char *name, char slug[128], uint64_t *revision) {
@@ -321,4 +321,22 @@ void intake_result_id(const Inquiry *inquiry, char target[72]) {
     canonical_write(inquiry_fields, inquiry, digest_take, digest);
     digest_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
+}
+
+void dry_run_clear(DryRun *dry_run) {
+    inquiry_clear(&dry_run->inquiry);
+    warnings_clear(&dry_run->warnings);
+    fields_clear(plan_report_fields, &dry_run->plan);
+}
+
+Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
+                      Problem *problem) {
+    memset(dry_run, 0, sizeof *dry_run);
+    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->inquiry,
+                       &dry_run->warnings, problem));
+    intake_result_id(&dry_run->inquiry, dry_run->result);
+    TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
+    TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
+    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
+    return STATUS_OK;
 }

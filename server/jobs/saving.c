@@ -197,13 +197,19 @@ static void give_up(Saving *saving, Status status, const char *detail) {
     }
 }
 
+// With the lock held: whether others will have run in a moment, to be saved together with this.
+static bool is_followed(const Intake *intake) {
+    static const double moment = 5e-3; // [s]
+    return queue_seconds(intake->queue) < moment * (double)queue_count(intake->queue);
+}
+
 // With the lock held.
 static Status post(Saving *saving) {
     const bool has_result = saving->findings.status == STATUS_OK && !saving->is_saved;
     const StoreDone done = {saved, saving};
-    const Status status =
-        store_result_post(saving->intake->store, has_result ? &saving->findings.result : NULL,
-                          saving->rows, saving->count, &done);
+    const Status status = store_result_post(
+        saving->intake->store, has_result ? &saving->findings.result : NULL, saving->rows,
+        saving->count, is_followed(saving->intake) ? STORE_SOON : STORE_NOW, &done);
     if (status == STATUS_OK)
         saving->intake->posted++;
     return status;

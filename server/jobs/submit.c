@@ -73,10 +73,10 @@ static void opened(void *context, Status status, const char *detail) {
 }
 
 // With the lock held.
-static Status post(Intake *intake, Job *job, Problem *problem) {
+static Status post(Intake *intake, Job *job, StoreTurn turn, Problem *problem) {
     const StoreDone done = {opened, job_hold(job)};
     job->opening = job->row;
-    const Status status = store_job_post(intake->store, &job->opening, &done, &job->ticket);
+    const Status status = store_job_post(intake->store, &job->opening, turn, &done, &job->ticket);
     if (status == STATUS_OK) {
         intake->posted++;
         return STATUS_OK;
@@ -100,7 +100,7 @@ static Status finish_known(Intake *intake, Job *job, Problem *problem) {
         return STATUS_OK;
     }
     pthread_mutex_lock(&intake->lock);
-    const Status status = post(intake, job, problem);
+    const Status status = post(intake, job, STORE_NOW, problem);
     pthread_mutex_unlock(&intake->lock);
     if (status == STATUS_OK)
         totals_ended(&intake->totals, JOB_SUCCESSFUL, true);
@@ -145,6 +145,10 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
+    // Where others wait it mostly has run before anyone must be told that it was accepted, and is
+    // then written once. But a sweep's rows need their job beside them.
+    const bool may_wait = job->row.study == NULL && queue_count(intake->queue) > 0;
+    const StoreTurn turn = may_wait ? STORE_LATER : STORE_NOW;
     // It may have become known meanwhile.
     if (other == NULL && !is_retry &&
         (job->head = cache_head(intake->cache, job->row.result)) != NULL) {
@@ -154,7 +158,7 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
     }
     Status status = find_room(intake, job, problem);
     if (status == STATUS_OK)
-        status = post(intake, job, problem);
+        status = post(intake, job, turn, problem);
     if (status == STATUS_OK) {
         intake_admit(intake, job);
         if (other == NULL)
@@ -384,22 +388,4 @@ Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     warnings_clear(&warnings);
     free(fault);
     return status;
-}
-
-void dry_run_clear(DryRun *dry_run) {
-    inquiry_clear(&dry_run->inquiry);
-    warnings_clear(&dry_run->warnings);
-    fields_clear(plan_report_fields, &dry_run->plan);
-}
-
-Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry_run,
-                      Problem *problem) {
-    memset(dry_run, 0, sizeof *dry_run);
-    TRY(intake_prepare(intake->store, text, size, &intake->settings.limits, &dry_run->inquiry,
-                       &dry_run->warnings, problem));
-    intake_result_id(&dry_run->inquiry, dry_run->result);
-    TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
-    TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
-    dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
-    return STATUS_OK;
 }

@@ -8,6 +8,7 @@
 
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);
 size_t sweep_row_size(const SweepRow *row);
+double sweep_row_cell(const unsigned char *row, size_t cell); // 0 its status, 1 ... its metrics
 SweepStatus sweep_row_status(const SweepRow *row, const SweepChunkRow *chunk, size_t place);
 void sweep_row_values(const SweepRow *row, const SweepChunkRow *chunk, size_t place,
                       double *values);

@@ -20,23 +20,34 @@ static const unsigned char *row_at(const SweepRow *row, const SweepChunkRow *chu
                : NULL;
 }
 
+// A byte that no status has stands for one that failed.
+static SweepStatus status_of(const unsigned char *row) {
+    return *row < SWEEP_PENDING ? (SweepStatus)*row : SWEEP_FAILED;
+}
+
+static double metric_of(const unsigned char *row, size_t metric) {
+    uint64_t bits = 0;
+    double value;
+    for (size_t k = 0; k < sizeof bits; k++)
+        bits |= (uint64_t)row[1 + 8 * metric + k] << (8 * k);
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+double sweep_row_cell(const unsigned char *row, size_t cell) {
+    return cell == 0 ? (double)status_of(row) : metric_of(row, cell - 1);
+}
+
 SweepStatus sweep_row_status(const SweepRow *row, const SweepChunkRow *chunk, size_t place) {
     const unsigned char *at = row_at(row, chunk, place);
-    return at == NULL ? SWEEP_PENDING : *at < SWEEP_PENDING ? (SweepStatus)*at : SWEEP_FAILED;
+    return at == NULL ? SWEEP_PENDING : status_of(at);
 }
 
 void sweep_row_values(const SweepRow *row, const SweepChunkRow *chunk, size_t place,
                       double *values) {
     const unsigned char *at = row_at(row, chunk, place);
-    for (size_t i = 0; i < row->metrics; i++) {
-        uint64_t bits = 0;
-        for (size_t k = 0; at != NULL && k < sizeof bits; k++)
-            bits |= (uint64_t)at[1 + 8 * i + k] << (8 * k);
-        if (at == NULL)
-            values[i] = (double)NAN;
-        else
-            memcpy(&values[i], &bits, sizeof bits);
-    }
+    for (size_t i = 0; i < row->metrics; i++)
+        values[i] = at != NULL ? metric_of(at, i) : (double)NAN;
 }
 
 void sweep_row_put(const SweepRow *row, SweepChunkRow *chunk, size_t place, SweepStatus status,

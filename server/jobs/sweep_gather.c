@@ -107,7 +107,7 @@ static size_t list_missing(StudyRun *run, const SweepChunkRows *there, Chunk *ch
 
 static Status rows_submit(StudyRun *run, Problem *problem) {
     SweepChunkRows there = {NULL, 0};
-    TRY(store_sweep_chunks(run->intake->store, run->row.number, false, &there, problem));
+    TRY(store_sweep_chunks(run->intake->store, run->row.number, &there, problem));
     Chunk *chunks = calloc(run->row.chunks, sizeof *chunks);
     Status status = chunks != NULL ? STATUS_OK : no_memory(problem);
     if (status == STATUS_OK)

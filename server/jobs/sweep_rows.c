@@ -7,6 +7,9 @@
 #include "server/jobs/job.h"
 #include "server/jobs/sweep.h"
 
+// Bytes of rows that are read at once, more only where one of each chunk is.
+enum { WINDOW = 4 << 20 };
+
 static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep's table");
 }
@@ -41,54 +44,56 @@ static Status tell(SweepShow *show, Problem *problem) {
     return sweep_tell(study_of(show), &show->inquiry.simulation, show->sweep, problem);
 }
 
-static bool make_room(SweepTable *table, size_t rows, size_t metrics) {
-    if (rows == 0)
-        return true;
-    table->points.at = calloc(rows, sizeof(double));
-    table->statuses.at = calloc(rows, sizeof(double));
-    table->values.at = calloc(rows * metrics, sizeof(double));
-    if (table->points.at == NULL || table->statuses.at == NULL || table->values.at == NULL)
-        return false;
-    table->points.count = table->statuses.count = rows;
-    table->values.count = rows * metrics;
-    return true;
+// What became of the points that failed in one way.
+typedef struct Failed {
+    uint64_t count, first;
+    char why[200];
+} Failed;
+
+static void take_failures(const SweepRow *row, const SweepChunkRow *chunk, Failed *failed) {
+    for (size_t place = 0; place < sweep_rows_of(row, chunk->chunk); place++) {
+        const uint64_t point = chunk->chunk + place * row->chunks;
+        const SweepStatus status = sweep_row_status(row, chunk, place);
+        Failed *one = &failed[status];
+        if (status == SWEEP_MADE)
+            continue;
+        // Only the first of each kind is told in words.
+        if (one->count == 0 || point < one->first) {
+            one->first = point;
+            sweep_row_reason(chunk, place, one->why, sizeof one->why);
+        }
+        one->count++;
+    }
 }
 
-// Rows in the order of their points: place by place, in each the chunks that are there.
-static Status fill(const SweepShow *show, const SweepChunkRows *chunks, Problem *problem) {
-    const SweepRow *row = &show->row;
+// Chunk by chunk, those alone that have any.
+static Status find_failures(SweepShow *show, Problem *problem) {
+    Failed failed[SWEEP_STATUSES] = {{0}};
     SweepTable *table = &show->sweep->table;
-    size_t rows = 0, at = 0;
-    for (size_t i = 0; i < chunks->count; i++)
-        rows += sweep_rows_of(row, chunks->at[i].chunk);
+    for (size_t i = 0; i < show->chunks.count; i++) {
+        const SweepChunkRow *head = &show->chunks.at[i];
+        SweepChunkRow chunk = {0};
+        if (head->failed == 0)
+            continue;
+        TRY(store_sweep_chunk(show->store, show->row.number, head->chunk, &chunk, problem));
+        take_failures(&show->row, &chunk, failed);
+        sweep_chunk_row_clear(&chunk);
+    }
     table->failed = 0;
-    if (!make_room(table, rows, row->metrics))
-        return no_memory(problem);
-    for (size_t place = 0; at < rows; place++)
-        for (size_t i = 0; i < chunks->count && at < rows; i++) {
-            const SweepChunkRow *chunk = &chunks->at[i];
-            const size_t point = chunk->chunk + place * row->chunks;
-            if (point >= row->points)
-                continue;
-            const SweepStatus status = sweep_row_status(row, chunk, place);
-            table->points.at[at] = (double)point;
-            table->statuses.at[at] = status;
-            sweep_row_values(row, chunk, place, &table->values.at[at * row->metrics]);
-            at++;
-            if (status == SWEEP_MADE)
-                continue;
-            char why[200] = "";
-            table->failed++;
-            // Only the first of each kind is told in words.
-            bool is_known = false;
-            for (size_t k = 0; k < table->failures.count; k++)
-                is_known = is_known || table->failures.at[k].status == (int)status;
-            if (!is_known)
-                sweep_row_reason(chunk, place, why, sizeof why);
-            if (sweep_add_failure(&table->failures, status, point, why) != STATUS_OK)
-                return no_memory(problem);
-        }
-    return STATUS_OK;
+    for (;;) {
+        Failed *first = NULL;
+        for (size_t i = 0; i < SWEEP_STATUSES; i++)
+            if (failed[i].count > 0 && (first == NULL || failed[i].first < first->first))
+                first = &failed[i];
+        if (first == NULL)
+            return STATUS_OK;
+        if (sweep_add_failure(&table->failures, (SweepStatus)(first - failed), first->first,
+                              first->why) != STATUS_OK)
+            return no_memory(problem);
+        table->failures.at[table->failures.count - 1].count = first->count;
+        table->failed += first->count;
+        first->count = 0;
+    }
 }
 
 // A sweep that has not begun has no rows, but is one.
@@ -109,26 +114,72 @@ static Status find(Store *store, const char *id, bool is_job, SweepRow *row, Pro
 
 Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
                        Problem *problem) {
-    SweepChunkRows chunks = {NULL, 0};
     memset(show, 0, sizeof *show);
+    show->store = store;
     TRY(find(store, id, is_job, &show->row, problem));
     TRY(read_scene(show, problem));
     TRY(tell(show, problem));
-    TRY(store_sweep_chunks(store, show->row.number, has_rows, &chunks, problem));
-    show->chunks_done = chunks.count;
-    show->is_complete = show->row.chunks > 0 && chunks.count == show->row.chunks;
-    for (size_t i = 0; i < chunks.count; i++)
-        show->is_complete = show->is_complete && !chunks.at[i].is_open;
-    const Status status = has_rows ? fill(show, &chunks, problem) : STATUS_OK;
-    sweep_chunk_rows_clear(&chunks);
-    return status;
+    TRY(store_sweep_chunks(store, show->row.number, &show->chunks, problem));
+    show->is_complete = show->row.chunks > 0 && show->chunks.count == show->row.chunks;
+    for (size_t i = 0; i < show->chunks.count; i++) {
+        show->is_complete = show->is_complete && !show->chunks.at[i].is_open;
+        show->rows += sweep_rows_of(&show->row, show->chunks.at[i].chunk);
+    }
+    return has_rows ? find_failures(show, problem) : STATUS_OK;
 }
 
 void sweep_show_clear(SweepShow *show) {
     sweep_row_clear(&show->row);
     inquiry_clear(&show->inquiry);
     variant_free((Variant *)(void *)show->sweep);
+    sweep_chunk_rows_clear(&show->chunks);
+    free(show->window);
     *show = (SweepShow){.sweep = NULL};
+}
+
+// Rows at these places of all chunks that are there: as many places as fit, the last perhaps not
+// there.
+static bool load_window(SweepShow *show, size_t place) {
+    const size_t size = sweep_row_size(&show->row) * show->chunks.count;
+    if (show->window == NULL) {
+        const size_t all = (size_t)((show->row.points + show->row.chunks - 1) / show->row.chunks);
+        const size_t fit = WINDOW / size > 0 ? WINDOW / size : 1;
+        show->places = fit < all ? fit : all;
+        show->window = malloc(size * show->places);
+        if (show->window == NULL)
+            return false;
+    }
+    show->is_loaded =
+        store_sweep_read(show->store, &show->row, &show->chunks, place * sweep_row_size(&show->row),
+                         show->places * sweep_row_size(&show->row), show->window,
+                         NULL) == STATUS_OK;
+    show->place = place;
+    return show->is_loaded;
+}
+
+bool sweep_show_read(void *of, size_t cell, size_t first, size_t count, double *target) {
+    SweepShow *show = of;
+    const size_t wide = show->chunks.count, size = sweep_row_size(&show->row);
+    if (count == 0)
+        return true;
+    if (count > show->rows || first > show->rows - count)
+        return false;
+    // Chunks lie beside each other: row number wide of them is the first one's second.
+    size_t place = first / wide, among = first % wide;
+    for (size_t i = 0; i < count; i++) {
+        if (!show->is_loaded || place < show->place || place >= show->place + show->places)
+            if (!load_window(show, place))
+                return false;
+        const unsigned char *row =
+            show->window + (among * show->places + place - show->place) * size;
+        target[i] = cell == 0 ? (double)(show->chunks.at[among].chunk + place * show->row.chunks)
+                              : sweep_row_cell(row, cell - 1);
+        if (++among == wide) {
+            among = 0;
+            place++;
+        }
+    }
+    return true;
 }
 
 Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,

@@ -11,16 +11,27 @@
 typedef struct SweepShow {
     SweepRow row;
     Inquiry inquiry; // with its study
-    Sweep *sweep;    // the answer, its table filled where it was asked for
-    uint64_t chunks_done;
-    bool is_complete; // every chunk is there and none is open
+    Sweep *sweep;    // the answer; of its table what failed, where it was asked for
+    Store *store;
+    SweepChunkRows chunks; // that are there, without their rows
+    size_t rows;           // of those
+    bool is_complete;      // every chunk is there and none is open
+    // What was read last: of each chunk the rows at `places` places from `place` on.
+    unsigned char *window;
+    size_t place, places;
+    bool is_loaded;
 } SweepShow;
 
-// By its result, or (`is_job`) by a job that makes it or did. `has_rows`: the table too. Cleared by
-// sweep_show_clear in any case.
+// By its result, or (`is_job`) by a job that makes it or did. `has_rows`: what failed too. Cleared
+// by sweep_show_clear in any case.
 Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows, SweepShow *show,
                        Problem *problem);
 void sweep_show_clear(SweepShow *show);
+
+// Cell `cell` (0 the point, 1 its status, 2 ... the metrics) of rows first ... first + count - 1,
+// which stand in the order of their points; `show` is a SweepShow. Memory is one window, whatever
+// their number. False: the rows are no longer what they were when it was loaded, or cannot be read.
+bool sweep_show_read(void *show, size_t cell, size_t first, size_t count, double *target);
 
 // One point of it.
 typedef struct SweepPointShow {

@@ -20,14 +20,13 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
 // The same without waiting: `done` is told. `size` bytes of `work` are copied; 0: it is borrowed
 // until then. *ticket (may be NULL) is set before `done` can be told. STATUS_NO_MEMORY: nothing was
 // queued.
-Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
+Status store_post(Store *store, StoreApply *apply, const void *work, size_t size, StoreTurn turn,
                   const StoreDone *done, StoreTicket **ticket);
-
-// The same when nothing else is queued; `work` is borrowed until then.
-Status store_post_low(Store *store, StoreApply *apply, const void *work, const StoreDone *done);
 
 atomic_uint_fast64_t *store_evictions(Store *store); // of series
 struct Late *store_late(Store *store);               // NULL: its database is in memory
+struct MaterialMemory *store_material_memory(Store *store);
+struct ResultFilter *store_result_filter(Store *store);
 
 // A connection for reading, to be put back soon: there are few. Waits for one.
 Database *store_take(Store *store);

@@ -79,6 +79,13 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     if (is_full(connection))
         return report_full(path, problem);
     const bool has_path = path != NULL && path[0] != '\0';
+    const int code = sqlite3_errcode(connection) & 0xFF;
+    if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT))
+        return problem_set(
+            problem, status,
+            "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
+            "move it away, with the files beside it, to begin anew",
+            path, sqlite3_errmsg(connection));
     return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
                        has_path ? ", in " : "", has_path ? path : "");
 }
@@ -156,6 +163,19 @@ void statement_end(Statement *statement) {
         return;
     sqlite3_reset(statement);
     sqlite3_clear_bindings(statement);
+}
+
+Status database_read_part(Database *database, const char *table, const char *column, int64_t number,
+                          size_t offset, size_t size, void *target, Problem *problem) {
+    sqlite3_blob *blob = NULL;
+    int code = sqlite3_blob_open(database->connection, "main", table, column, number, 0, &blob);
+    const size_t bytes = code == SQLITE_OK ? (size_t)sqlite3_blob_bytes(blob) : 0;
+    const size_t left = bytes > offset ? bytes - offset : 0;
+    if (left > 0)
+        code = sqlite3_blob_read(blob, target, (int)(left < size ? left : size), (int)offset);
+    (void)sqlite3_blob_close(blob);
+    return code == SQLITE_OK ? STATUS_OK
+                             : report(database->connection, "reading the database", problem);
 }
 
 Status database_change(Database *database, const char *sql, const RowColumn *columns,

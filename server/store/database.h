@@ -58,4 +58,9 @@ Status statement_begin(Database *database, const char *sql, const struct RowColu
 Status statement_step(Statement *statement, bool *has_row, Problem *problem);
 void statement_end(Statement *statement); // NULL is fine
 
+// Bytes `offset` ... of the blob in a column of the row that is `number`: `size`, or as many as it
+// has there. The rest of it is not read.
+Status database_read_part(Database *database, const char *table, const char *column, int64_t number,
+                          size_t offset, size_t size, void *target, Problem *problem);
+
 #endif

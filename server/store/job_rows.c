@@ -72,9 +72,9 @@ Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
     return store_write(store, add, row, problem);
 }
 
-Status store_job_post(Store *store, const JobRow *row, const StoreDone *done,
+Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
                       StoreTicket **ticket) {
-    return store_post(store, add, row, 0, done, ticket);
+    return store_post(store, add, row, 0, turn, done, ticket);
 }
 
 Status job_row_save(Database *database, const JobRow *row, Problem *problem) {
@@ -95,7 +95,7 @@ Status store_job_update(Store *store, const JobRow *row, Problem *problem) {
 }
 
 Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done) {
-    return store_post(store, save, row, 0, done, NULL);
+    return store_post(store, save, row, 0, STORE_NOW, done, NULL);
 }
 
 typedef struct Batch {

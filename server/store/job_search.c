@@ -78,7 +78,8 @@ static const char *choose(const JobSearch *search) {
 }
 
 JobSearch job_search_all(size_t most) {
-    return (JobSearch){.most_state = 4, .until_unix_ms = INT64_MAX, .most = most};
+    return (JobSearch){
+        .before_unix_ms = -1, .most_state = 4, .until_unix_ms = INT64_MAX, .most = most};
 }
 
 void job_words(Bytes *bytes, const char *title, const char *const *labels, size_t label_count) {
@@ -105,16 +106,23 @@ static Status fold(const char *text, const char *before, const char *after, char
     return *folded != NULL ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-static Status find_place(Store *store, const char *before, Asked *asked, Problem *problem) {
+static Status find_place(Store *store, const JobSearch *search, Asked *asked, Problem *problem) {
     static const char sql[] = "SELECT created_unix_ms AS before_ms, number AS before_number "
                               "FROM jobs WHERE id = :id";
+    const char *before = search->before;
     bool is_found = true;
     asked->before_ms = asked->before_number = INT64_MAX;
     if (before != NULL)
         TRY(store_first(store, sql, asked_columns, &(Asked){.id = (char *)before}, asked_columns,
                         asked, &is_found, problem));
-    return is_found ? STATUS_OK
-                    : problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", before);
+    if (is_found)
+        return STATUS_OK;
+    if (search->before_unix_ms < 0)
+        return problem_set(problem, STATUS_NOT_FOUND, "there is no job \"%.40s\"", before);
+    // It went between two pages: its place is where it came.
+    asked->before_ms = search->before_unix_ms;
+    asked->before_number = 0;
+    return STATUS_OK;
 }
 
 Status store_job_search(Store *store, const JobSearch *search, JobRows *rows, Problem *problem) {
@@ -126,7 +134,7 @@ Status store_job_search(Store *store, const JobSearch *search, JobRows *rows, Pr
                    .most_state = search->most_state,
                    .most = search->most};
     *rows = (JobRows){0};
-    TRY(find_place(store, search->before, &asked, problem));
+    TRY(find_place(store, search, &asked, problem));
     Status status = fold(search->words, "", "", &asked.words);
     if (status == STATUS_OK)
         status = fold(search->label, "\n", "\n", &asked.label);

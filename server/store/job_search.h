@@ -9,6 +9,7 @@
 // Texts are the caller's; NULL asks for nothing.
 typedef struct JobSearch {
     const char *before;          // an id: only those that come after it in the list
+    int64_t before_unix_ms;      // of its arrival, where it may be gone; -1: it must be there
     int least_state, most_state; // JobState
     const char *words;           // within the title or a label; upper and lower case are one
     const char *label;           // one whole label, or "key" of a label "key=value"; likewise
@@ -21,7 +22,7 @@ typedef struct JobSearch {
 // Everything there is.
 JobSearch job_search_all(size_t most);
 
-// STATUS_NOT_FOUND where there is no job `before`.
+// STATUS_NOT_FOUND where there is no job `before`, and it does not say when it came.
 Status store_job_search(Store *store, const JobSearch *search, JobRows *rows, Problem *problem);
 
 // What a search by words looks into: the title's line, and one for each label.

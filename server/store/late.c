@@ -131,14 +131,14 @@ static bool read_row(const Late *late, const Half *half, uint32_t number, void *
 
 // Nobody changes this half meanwhile.
 static Status write_half(const Late *late, const Half *half, Problem *problem) {
-    char *rows = calloc(BATCH, late->row_size);
+    char *rows = malloc(BATCH * late->row_size);
     const void *at[BATCH];
     Status status = rows == NULL ? STATUS_NO_MEMORY : STATUS_OK;
     for (uint32_t i = 0; i < half->count && status == STATUS_OK;) {
         size_t count = 0;
-        memset(rows, 0, BATCH * late->row_size);
         for (; i < half->count && count < BATCH; i++) {
             char *row = rows + count * late->row_size;
+            memset(row, 0, late->row_size);
             if (read_row(late, half, i, row))
                 at[count++] = row;
         }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "server/store/access.h"
+#include "server/store/material_memory.h"
 #include "server/store/store.h"
 
 // clang-format off
@@ -53,12 +54,18 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
                       Problem *problem) {
     // SQLite counts with a sign; no revision is that high.
     const Key key = {(char *)slug, revision > INT64_MAX ? INT64_MAX : revision};
+    MaterialMemory *memory = store_material_memory(store);
+    const uint64_t generation = store_generation(store);
     bool is_found;
     memset(material, 0, sizeof *material);
+    if (material_memory_find(memory, generation, slug, revision, material))
+        return STATUS_OK;
     TRY(store_first(store, revision == 0 ? head_sql : revision_sql, key_columns, &key,
                     material_columns, material, &is_found, problem));
-    if (is_found)
+    if (is_found) {
+        material_memory_put(memory, generation, revision, material);
         return STATUS_OK;
+    }
     if (revision == 0)
         return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
     return problem_set(problem, STATUS_NOT_FOUND,

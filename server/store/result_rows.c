@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "server/store/job_rows.h"
+#include "server/store/result_filter.h"
 #include "server/store/store.h"
 
 // clang-format off
@@ -53,13 +54,17 @@ static Status finish(Database *database, const void *work, Problem *problem) {
 
 Status store_result_save(Store *store, const ResultRow *result, const JobRow *const *jobs,
                          size_t job_count, Problem *problem) {
+    if (result != NULL)
+        result_filter_add(store_result_filter(store), result->id);
     return store_write(store, finish, &(Finish){result, jobs, job_count}, problem);
 }
 
 Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, const StoreDone *done) {
+                         size_t job_count, StoreTurn turn, const StoreDone *done) {
     const Finish work = {result, jobs, job_count};
-    return store_post(store, finish, &work, sizeof work, done, NULL);
+    if (result != NULL)
+        result_filter_add(store_result_filter(store), result->id);
+    return store_post(store, finish, &work, sizeof work, turn, done, NULL);
 }
 
 typedef struct Key {
@@ -70,9 +75,10 @@ static const RowColumn key_columns[] = {ROW_COLUMN(Key, id, COLUMN_TEXT), ROW_EN
 static Status load(Store *store, const char *sql, const char *id, ResultRow *row,
                    Problem *problem) {
     const Key key = {(char *)id};
-    bool is_found;
+    bool is_found = false;
     memset(row, 0, sizeof *row);
-    TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
+    if (result_filter_may_have(store_result_filter(store), id))
+        TRY(store_first(store, sql, key_columns, &key, result_columns, row, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "there is no result \"%.72s\"", id);
 }
@@ -100,6 +106,27 @@ bool store_result_exists(Store *store, const char *id) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
     return load(store, sql, id, &row, NULL) == STATUS_OK;
+}
+
+typedef struct Sharer {
+    char *id, *client;
+    char sharer[72];
+} Sharer;
+static const RowColumn sharer_columns[] = {ROW_COLUMN(Sharer, id, COLUMN_TEXT),
+                                           ROW_COLUMN(Sharer, client, COLUMN_TEXT),
+                                           ROW_COLUMN(Sharer, sharer, COLUMN_NAME), ROW_END};
+
+Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
+                           Problem *problem) {
+    static const char sql[] =
+        "SELECT client AS sharer FROM jobs WHERE substr(result, 3, 12) = substr(:id, 3, 12) "
+        "AND result = :id AND state = 2 AND client <> :client LIMIT 1";
+    const Sharer key = {(char *)id, (char *)client, ""};
+    Sharer found = {0};
+    bool is_found;
+    TRY(store_first(store, sql, sharer_columns, &key, sharer_columns, &found, &is_found, problem));
+    text_fit(sharer, sizeof found.sharer, is_found ? found.sharer : "");
+    return STATUS_OK;
 }
 
 static Status delete (Database *database, const void *work, Problem *problem) {

@@ -80,7 +80,7 @@ Status store_series_post(Store *store, const char *result, char *body, size_t si
     blob->evictions = store_evictions(store);
     blob->done = *done;
     const StoreDone own = {was_put, blob};
-    const Status status = store_post_low(store, put, blob, &own);
+    const Status status = store_post(store, put, blob, 0, STORE_LOW, &own, NULL);
     if (status != STATUS_OK) {
         free(blob->body.at);
         free(blob);
@@ -114,7 +114,7 @@ Status store_series_load(Store *store, const char *result, char **body, size_t *
         const StoreDone done = {was_touched, used};
         *used = (Blob){.bytes = 0};
         text_fit(used->result, sizeof used->result, result);
-        if (store_post_low(store, touch, used, &done) == STATUS_OK)
+        if (store_post(store, touch, used, 0, STORE_LOW, &done, NULL) == STATUS_OK)
             used = NULL;
     }
     free(used);

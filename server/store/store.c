@@ -16,6 +16,8 @@
 #include "server/store/folder.h"
 #include "server/store/job_rows.h"
 #include "server/store/late.h"
+#include "server/store/material_memory.h"
+#include "server/store/result_filter.h"
 #include "server/store/writer.h"
 
 enum { READERS = 4 };
@@ -25,6 +27,8 @@ struct Store {
     Database *own; // the writer's; NULL where it shares the pool's
     Writer *writer;
     Late *late;
+    MaterialMemory *materials;
+    ResultFilter *results;
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t evictions;  // of series
     pthread_mutex_t lock;
@@ -71,8 +75,16 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
     made->lock_file = -1;
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
-    Status status = directory != NULL ? open_files(made, directory, is_beside, problem)
-                                      : open_memory(made, problem);
+    made->materials = material_memory_new();
+    made->results = result_filter_new();
+    Status status = made->materials == NULL || made->results == NULL
+                        ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the store")
+                    : directory != NULL ? open_files(made, directory, is_beside, problem)
+                                        : open_memory(made, problem);
+    // Beside a daemon there are others who write.
+    if (status == STATUS_OK && !is_beside)
+        status = result_filter_fill(made->results, made->own != NULL ? made->own : made->readers[0],
+                                    problem);
     if (status == STATUS_OK)
         status = writer_start(made->own, made->own == NULL ? made : NULL, &made->writer, problem);
     if (status == STATUS_OK && directory != NULL && !is_beside) {
@@ -107,6 +119,8 @@ void store_close(Store *store) {
     // The last one to close moves the journal into the database.
     database_close(store->own);
     folder_unlock(store->lock_file);
+    material_memory_free(store->materials);
+    result_filter_free(store->results);
     pthread_cond_destroy(&store->some);
     pthread_mutex_destroy(&store->lock);
     free(store);
@@ -120,13 +134,9 @@ Status store_write(Store *store, StoreApply *apply, const void *work, Problem *p
     return writer_do(store->writer, apply, work, problem);
 }
 
-Status store_post(Store *store, StoreApply *apply, const void *work, size_t size,
+Status store_post(Store *store, StoreApply *apply, const void *work, size_t size, StoreTurn turn,
                   const StoreDone *done, StoreTicket **ticket) {
-    return writer_post(store->writer, apply, work, size, false, done, ticket);
-}
-
-Status store_post_low(Store *store, StoreApply *apply, const void *work, const StoreDone *done) {
-    return writer_post(store->writer, apply, work, 0, true, done, NULL);
+    return writer_post(store->writer, apply, work, size, turn, done, ticket);
 }
 
 atomic_uint_fast64_t *store_evictions(Store *store) {
@@ -137,8 +147,20 @@ bool store_withdraw(Store *store, StoreTicket *ticket) {
     return writer_withdraw(store->writer, ticket);
 }
 
+void store_hurry(Store *store, StoreTicket *ticket) {
+    writer_hurry(store->writer, ticket);
+}
+
 Late *store_late(Store *store) {
     return store->late;
+}
+
+MaterialMemory *store_material_memory(Store *store) {
+    return store->materials;
+}
+
+ResultFilter *store_result_filter(Store *store) {
+    return store->results;
 }
 
 uint64_t store_generation(Store *store) {

@@ -24,15 +24,25 @@ Status store_open_beside(const char *directory, Store **store, Problem *problem)
 void store_close(Store *store);
 
 // Writes are called "posted" where nobody waits for them. They are done in the order in which they
-// were posted, some at a time. `call` comes once, from the writer's thread, when the write is
-// durable or has failed (then with the reason), and must be quick; it may post.
+// were posted, some at a time, as far as they are of the same turn. `call` comes once, from the
+// writer's thread, when the write is durable or has failed (then with the reason), and must be
+// quick; it may post.
 typedef struct StoreDone {
     void (*call)(void *context, Status status, const char *detail);
     void *context;
 } StoreDone;
+typedef enum StoreTurn {
+    STORE_NOW,
+    STORE_SOON,  // a few milliseconds later, or with what else is written until then
+    STORE_LATER, // a quarter of a second later; until then it may be withdrawn, or hurried
+    STORE_LOW,   // when nothing else is queued, by itself
+    STORE_TURNS
+} StoreTurn;
 typedef struct StoreTicket StoreTicket; // lives until `call` returns
 // True: it was not begun, will never be, and `call` will not come. Otherwise it is under way.
 bool store_withdraw(Store *store, StoreTicket *ticket);
+// What was to come later comes now.
+void store_hurry(Store *store, StoreTicket *ticket);
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
 // material's head, a review, a record. Whoever writes those calls store_catalogue_changed once it
@@ -89,7 +99,8 @@ bool job_row_copy(const JobRow *row, JobRow *copy);
 // `scene` and `warnings` are required. STATUS_CONFLICT where the id exists.
 Status store_job_add(Store *store, const JobRow *row, Problem *problem);
 // The same, posted; `row` is borrowed until then.
-Status store_job_post(Store *store, const JobRow *row, const StoreDone *done, StoreTicket **ticket);
+Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const StoreDone *done,
+                      StoreTicket **ticket);
 // The same behind the answer, for a finished job that computed nothing: found by its id at once, in
 // the database some 20 ms later. A killed process loses none, a power failure may lose the last
 // ones. False where there is no room for it now: it is to be added the usual way.
@@ -132,13 +143,16 @@ Status store_result_save(Store *store, const ResultRow *result, const JobRow *co
                          size_t job_count, Problem *problem);
 // The same, posted; all of it is borrowed until then.
 Status store_result_post(Store *store, const ResultRow *result, const JobRow *const *jobs,
-                         size_t job_count, const StoreDone *done);
+                         size_t job_count, StoreTurn turn, const StoreDone *done);
 Status store_result_load(Store *store, const char *id, ResultRow *row, Problem *problem);
 // The same without scene, energy, impacts, psd and study, which may be long.
 Status store_result_head(Store *store, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
 Status store_result_scene(Store *store, const char *id, ResultRow *row, Problem *problem);
 bool store_result_exists(Store *store, const char *id);
+// A client other than `client` of whose finished jobs it is the result; "" if there is none.
+Status store_result_sharer(Store *store, const char *id, const char *client, char sharer[72],
+                           Problem *problem);
 Status store_result_delete(Store *store, const char *id, Problem *problem); // STATUS_NOT_FOUND
 // Id, engine and scene of the newest ones, newest first, without scenes longer than that.
 typedef struct ResultRows {
@@ -177,6 +191,7 @@ void sweep_row_clear(SweepRow *row);
 
 // The rows of one chunk, all of them.
 typedef struct SweepChunkRow {
+    int64_t number; // the store's
     int64_t sweep;
     uint64_t chunk, failed;
     bool is_open;  // those that failed are to be tried again
@@ -198,13 +213,17 @@ Status store_sweep_load(Store *store, const char *result, SweepRow *row, Problem
 Status store_sweep_asked(Store *store, const char *job, SweepRow *row, Problem *problem);
 // Adds a chunk, in one transaction. One that is there already and not open stays as it is.
 Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *problem);
-// All that are there, by chunk; `has_rows` false: without reasons and rows.
-Status store_sweep_chunks(Store *store, int64_t sweep, bool has_rows, SweepChunkRows *chunks,
-                          Problem *problem);
+// All that are there, by chunk, without reasons and rows.
+Status store_sweep_chunks(Store *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem);
 // One of them. STATUS_NOT_FOUND.
 Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
                          Problem *problem);
 void sweep_chunk_row_clear(SweepChunkRow *row);
+// Bytes `offset` ... of the rows of each of these chunks, `size` or as many as there are: those of
+// chunk i at target + i size. STATUS_CONFLICT where sweep or chunk is not what it was when it was
+// loaded.
+Status store_sweep_read(Store *store, const SweepRow *sweep, const SweepChunkRows *chunks,
+                        size_t offset, size_t size, unsigned char *target, Problem *problem);
 // Opens every chunk that has failures. STATUS_CONFLICT where none has.
 Status store_sweep_reopen(Store *store, const char *result, Problem *problem);
 // Forgets all sweeps that have neither a result nor an unfinished job.

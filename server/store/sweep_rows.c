@@ -20,6 +20,7 @@ static const RowColumn sweep_columns[] = {
 };
 
 static const RowColumn chunk_columns[] = {
+    ROW_COLUMN(SweepChunkRow, number, COLUMN_INTEGER),
     ROW_COLUMN(SweepChunkRow, sweep, COLUMN_INTEGER),
     ROW_COLUMN(SweepChunkRow, chunk, COLUMN_COUNT),
     ROW_COLUMN(SweepChunkRow, failed, COLUMN_COUNT),
@@ -105,17 +106,13 @@ Status store_sweep_take(Store *store, const SweepChunkRow *chunk, Problem *probl
     return store_write(store, take, chunk, problem);
 }
 
-Status store_sweep_chunks(Store *store, int64_t sweep, bool has_rows, SweepChunkRows *chunks,
-                          Problem *problem) {
-    static const char heads[] = "SELECT sweep, chunk, failed, is_open FROM sweep_chunks "
-                                "WHERE sweep = :sweep ORDER BY chunk";
-    static const char whole[] = "SELECT sweep, chunk, failed, is_open, reasons, rows "
-                                "FROM sweep_chunks WHERE sweep = :sweep ORDER BY chunk";
+Status store_sweep_chunks(Store *store, int64_t sweep, SweepChunkRows *chunks, Problem *problem) {
+    static const char sql[] = "SELECT number, sweep, chunk, failed, is_open FROM sweep_chunks "
+                              "WHERE sweep = :sweep ORDER BY chunk";
     const SweepChunkRow key = {.sweep = sweep};
     void *at;
-    const Status status =
-        store_all(store, has_rows ? whole : heads, chunk_columns, &key, chunk_columns,
-                  sizeof *chunks->at, &at, &chunks->count, problem);
+    const Status status = store_all(store, sql, chunk_columns, &key, chunk_columns,
+                                    sizeof *chunks->at, &at, &chunks->count, problem);
     chunks->at = at;
     if (status != STATUS_OK)
         sweep_chunk_rows_clear(chunks);
@@ -132,6 +129,49 @@ Status store_sweep_chunk(Store *store, int64_t sweep, uint64_t number, SweepChun
     TRY(store_first(store, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "the chunk is not there yet");
+}
+
+static Status check_there(Database *database, const char *sql, const RowColumn *columns,
+                          const void *item, Problem *problem) {
+    Statement *statement;
+    bool is_there = false;
+    TRY(statement_begin(database, sql, columns, item, &statement, problem));
+    const Status status = statement_step(statement, &is_there, problem);
+    statement_end(statement);
+    return status != STATUS_OK || is_there
+               ? status
+               : problem_set(problem, STATUS_CONFLICT,
+                             "the sweep's rows were deleted or made anew while they were read");
+}
+
+static Status read_parts(Database *database, const SweepRow *sweep, const SweepChunkRows *chunks,
+                         size_t offset, size_t size, unsigned char *target, Problem *problem) {
+    static const char sweep_sql[] = "SELECT 1 FROM sweeps WHERE number = :number AND result = "
+                                    ":result AND created_unix_ms = :created_unix_ms";
+    static const char chunk_sql[] =
+        "SELECT 1 FROM sweep_chunks WHERE number = :number AND sweep = :sweep AND chunk = :chunk "
+        "AND failed = :failed AND is_open = :is_open";
+    TRY(check_there(database, sweep_sql, sweep_columns, sweep, problem));
+    for (size_t i = 0; i < chunks->count; i++) {
+        TRY(check_there(database, chunk_sql, chunk_columns, &chunks->at[i], problem));
+        TRY(database_read_part(database, "sweep_chunks", "rows", chunks->at[i].number, offset, size,
+                               target + i * size, problem));
+    }
+    return STATUS_OK;
+}
+
+Status store_sweep_read(Store *store, const SweepRow *sweep, const SweepChunkRows *chunks,
+                        size_t offset, size_t size, unsigned char *target, Problem *problem) {
+    Database *database = store_take(store);
+    // One transaction: what was found to be the same stays so while it is read.
+    Status status = database_execute(database, "BEGIN", problem);
+    if (status == STATUS_OK) {
+        status = read_parts(database, sweep, chunks, offset, size, target, problem);
+        const Status ended = database_execute(database, "COMMIT", NULL);
+        status = status == STATUS_OK ? ended : status;
+    }
+    store_put(store, database);
+    return status;
 }
 
 static Status reopen(Database *database, const void *work, Problem *problem) {

@@ -7,17 +7,30 @@
 // alone leaves no trace. (Savepoints at once would copy every page that a write touches.) Where
 // that is lost too (a full disk, a failed commit), each is tried once more by itself, so that
 // everyone is told their own fate and no other's.
+//
+// The next transaction is all that comes now and what is due by then, and takes along what comes
+// soon. Where there is none of these, it is one of what is low.
 #include "server/store/writer.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "server/base/clock.h"
 
+static const int64_t delay_ms[STORE_TURNS] = {[STORE_SOON] = 5, [STORE_LATER] = 250};
+
+// Tickets in the order of their coming.
+typedef struct Line {
+    StoreTicket *first, **last;
+} Line;
+
 // One write: on the stack of a caller who waits, or on the heap with a copy of its work behind it.
 struct StoreTicket {
-    StoreTicket *next, **link; // `link` points at what points here; NULL: it is queued no more
+    StoreTicket *next, **link; // `link` points at what points here
+    Line *line;                // NULL: it is queued no more
+    int64_t due_ns;            // 0: at once
     StoreApply *apply;
     const void *work;
     StoreDone done; // `call` NULL: its caller waits
@@ -33,9 +46,8 @@ struct Writer {
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t some;
-    StoreTicket *first, **last;
-    StoreTicket *low, **last_low; // wait until `first` is empty
-    bool is_idle;                 // the thread sleeps
+    Line lines[STORE_TURNS];
+    int64_t wakes_ns; // when the thread wakes by itself; INT64_MAX: never, 0: it does not sleep
     bool is_stopping;
     StoreTotals totals;
     Problem problem; // of the write in hand; the thread's own, for it is large
@@ -140,33 +152,74 @@ static void tell(Writer *writer, StoreTicket *write) {
     }
 }
 
-// With the lock held: all that is queued, else one of what is low.
-static StoreTicket *take(Writer *writer) {
-    StoreTicket *write = writer->first;
-    if (write == NULL && (write = writer->low) != NULL) {
-        writer->low = write->next;
-        if (writer->low == NULL)
-            writer->last_low = &writer->low;
-        write->next = NULL;
-        return write;
+static void append(Line *line, StoreTicket *write) {
+    write->line = line;
+    write->link = line->last;
+    write->next = NULL;
+    *line->last = write;
+    line->last = &write->next;
+}
+
+static void leave(StoreTicket *write) {
+    *write->link = write->next;
+    if (write->next != NULL)
+        write->next->link = write->link;
+    else
+        write->line->last = write->link;
+    write->line = NULL;
+    write->next = NULL;
+}
+
+// With the lock held.
+static void call_up(Writer *writer, StoreTurn turn, int64_t until_ns) {
+    const Line *line = &writer->lines[turn];
+    while (line->first != NULL && line->first->due_ns <= until_ns) {
+        StoreTicket *write = line->first;
+        leave(write);
+        append(&writer->lines[STORE_NOW], write);
     }
-    for (StoreTicket *at = write; at != NULL; at = at->next)
-        at->link = NULL;
-    writer->first = NULL;
-    writer->last = &writer->first;
+}
+
+// With the lock held: all that is to be written now, else one of what is low; NULL: nothing.
+static StoreTicket *take(Writer *writer) {
+    Line *line = &writer->lines[STORE_NOW];
+    const int64_t now_ns = writer->is_stopping ? INT64_MAX : clock_monotonic_ns();
+    call_up(writer, STORE_LATER, now_ns);
+    call_up(writer, STORE_SOON, line->first != NULL ? INT64_MAX : now_ns);
+    StoreTicket *write = line->first != NULL ? line->first : writer->lines[STORE_LOW].first;
+    if (line->first == NULL && write != NULL)
+        leave(write);
+    for (StoreTicket *at = line->first; at != NULL; at = at->next)
+        at->line = NULL;
+    *line = (Line){NULL, &line->first};
     return write;
+}
+
+static int64_t due_ns(const Line *line) {
+    return line->first != NULL ? line->first->due_ns : INT64_MAX;
+}
+
+// With the lock held: until there is something new, or what waits is due.
+static void wait(Writer *writer) {
+    const int64_t soon_ns = due_ns(&writer->lines[STORE_SOON]);
+    const int64_t later_ns = due_ns(&writer->lines[STORE_LATER]);
+    writer->wakes_ns = soon_ns < later_ns ? soon_ns : later_ns;
+    const struct timespec until = {(time_t)(writer->wakes_ns / 1000000000),
+                                   (long)(writer->wakes_ns % 1000000000)};
+    if (writer->wakes_ns == INT64_MAX)
+        pthread_cond_wait(&writer->some, &writer->lock);
+    else
+        pthread_cond_timedwait(&writer->some, &writer->lock, &until);
+    writer->wakes_ns = 0;
 }
 
 static void *work(void *context) {
     Writer *writer = context;
+    StoreTicket *write;
     pthread_mutex_lock(&writer->lock);
     for (;;) {
-        while (writer->first == NULL && writer->low == NULL && !writer->is_stopping) {
-            writer->is_idle = true;
-            pthread_cond_wait(&writer->some, &writer->lock);
-        }
-        writer->is_idle = false;
-        StoreTicket *write = take(writer);
+        while ((write = take(writer)) == NULL && !writer->is_stopping)
+            wait(writer);
         if (write == NULL)
             break;
         pthread_mutex_unlock(&writer->lock);
@@ -185,10 +238,14 @@ Status writer_start(Database *database, Store *shared, Writer **writer, Problem 
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the database's writer");
     made->database = database;
     made->shared = shared;
-    made->last = &made->first;
-    made->last_low = &made->low;
+    for (size_t i = 0; i < COUNT(made->lines); i++)
+        made->lines[i].last = &made->lines[i].first;
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&made->lock, NULL);
-    pthread_cond_init(&made->some, NULL);
+    pthread_cond_init(&made->some, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     if (pthread_create(&made->thread, NULL, work, made) != 0) {
         pthread_cond_destroy(&made->some);
         pthread_mutex_destroy(&made->lock);
@@ -218,14 +275,11 @@ const StoreTotals *writer_totals(const Writer *writer) {
 }
 
 // With the lock held.
-static void enqueue(Writer *writer, StoreTicket *write, bool is_low) {
-    StoreTicket ***last = is_low ? &writer->last_low : &writer->last;
-    write->next = NULL;
-    write->link = is_low ? NULL : *last;
-    **last = write;
-    *last = &write->next;
-    if (writer->is_idle) {
-        writer->is_idle = false; // woken once is enough
+static void enqueue(Writer *writer, StoreTicket *write, StoreTurn turn) {
+    write->due_ns = delay_ms[turn] > 0 ? clock_monotonic_ns() + delay_ms[turn] * 1000000 : 0;
+    append(&writer->lines[turn], write);
+    if (write->due_ns < writer->wakes_ns) {
+        writer->wakes_ns = 0; // woken once is enough
         pthread_cond_signal(&writer->some);
     }
 }
@@ -234,7 +288,7 @@ Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *
     StoreTicket write = {.apply = apply, .work = work_};
     pthread_cond_init(&write.settled, NULL);
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, &write, false);
+    enqueue(writer, &write, STORE_NOW);
     while (!write.is_done)
         pthread_cond_wait(&write.settled, &writer->lock);
     pthread_mutex_unlock(&writer->lock);
@@ -244,8 +298,8 @@ Status writer_do(Writer *writer, StoreApply *apply, const void *work_, Problem *
     return write.status;
 }
 
-Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size, bool is_low,
-                   const StoreDone *done, StoreTicket **ticket) {
+Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t size,
+                   StoreTurn turn, const StoreDone *done, StoreTicket **ticket) {
     StoreTicket *write = malloc(sizeof *write + size);
     if (write == NULL)
         return STATUS_NO_MEMORY;
@@ -255,23 +309,27 @@ Status writer_post(Writer *writer, StoreApply *apply, const void *work_, size_t 
     if (ticket != NULL)
         *ticket = write;
     pthread_mutex_lock(&writer->lock);
-    enqueue(writer, write, is_low);
+    enqueue(writer, write, turn);
     pthread_mutex_unlock(&writer->lock);
     return STATUS_OK;
 }
 
 bool writer_withdraw(Writer *writer, StoreTicket *write) {
     pthread_mutex_lock(&writer->lock);
-    const bool is_queued = write->link != NULL;
-    if (is_queued) {
-        *write->link = write->next;
-        if (write->next != NULL)
-            write->next->link = write->link;
-        else
-            writer->last = write->link;
-    }
+    const bool is_queued = write->line != NULL;
+    if (is_queued)
+        leave(write);
     pthread_mutex_unlock(&writer->lock);
     if (is_queued)
         free(write);
     return is_queued;
+}
+
+void writer_hurry(Writer *writer, StoreTicket *write) {
+    pthread_mutex_lock(&writer->lock);
+    if (write->line == &writer->lines[STORE_LATER]) {
+        leave(write);
+        enqueue(writer, write, STORE_NOW);
+    }
+    pthread_mutex_unlock(&writer->lock);
 }

@@ -16,12 +16,12 @@ Status writer_start(Database *database, Store *shared, Writer **writer, Problem 
 // may write any more.
 void writer_stop(Writer *writer);
 
-// As store_write, store_post and store_withdraw. What is low waits until nothing else is queued,
-// and is committed by itself.
+// As store_write, store_post, store_withdraw and store_hurry.
 Status writer_do(Writer *writer, StoreApply *apply, const void *work, Problem *problem);
-Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t size, bool is_low,
+Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t size, StoreTurn turn,
                    const StoreDone *done, StoreTicket **ticket);
 bool writer_withdraw(Writer *writer, StoreTicket *ticket);
+void writer_hurry(Writer *writer, StoreTicket *ticket);
 
 const StoreTotals *writer_totals(const Writer *writer);
 

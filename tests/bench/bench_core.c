@@ -1,45 +1,63 @@
-// The core alone in a loop: bench_core free|random THREADS SECONDS prints runs a second over all
-// threads, and the CPU time of one [us]. Every run is another scene, summary only: the sponge's
-// free vibration of 10 s, or 60 s under a random base of its own seed. For service.py to stand
-// beside.
+// The core alone in a loop: bench_core SCENE THREADS SECONDS prints runs a second over all threads,
+// and the CPU time of one [us]. SCENE is the JSON that a client would send, read once by the
+// program's own reader; every run is another scene by its seed, or by where it starts, and all that
+// a job has done by the core: judged and completed under the daemon's usual limits, its cost
+// foretold, run, summed up. For service.py to stand beside.
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excite/random.h"
 #include "core/math/fourier.h"
+#include "core/solve/solver.h"
 #include "server/base/clock.h"
-#include "tests/bench/cases.h"
-#include "tests/support/paper.h"
+#include "server/base/process.h"
+#include "server/jobs/intake.h"
 
 typedef struct Lane {
     pthread_t thread;
-    bool is_random;
+    Inquiry inquiry;
+    double displacement; // as read [m]
     int64_t end_ns;
     uint64_t number, runs;
     double cpu; // [s]
     Status status;
+    Problem problem;
 } Lane;
 
+static const SimulationLimits limits = {.samples = 1 << 25,
+                                        .impacts = 500000,
+                                        .steps = SIMULATION_CPU_SECONDS / SOLVER_STEP,
+                                        .bytes = SIMULATION_BYTES,
+                                        .points = 1};
+
+static Excitation *excitation_of(Lane *lane) {
+    return (Excitation *)(void *)lane->inquiry.simulation.scene.excitation;
+}
+
+static void alter(Lane *lane) {
+    Excitation *excitation = excitation_of(lane);
+    if (excitation_kind(excitation) == &excitation_random)
+        ((ExcitationRandom *)(void *)excitation)->seed = lane->number;
+    else if (excitation->displacement.count > 0)
+        excitation->displacement.at[0] = lane->displacement + 1e-9 * (double)lane->number;
+    lane->number += 64;
+}
+
 static Status run_one(Lane *lane, Workspace *workspace) {
-    Simulation simulation;
+    Warnings warnings = {NULL, 0};
     Outcome *outcome = NULL;
-    const uint64_t number = lane->number += 64;
-    paper_scene(&simulation, 0.61, 0.025, lane->is_random ? 60 : 10);
-    if (lane->is_random) {
-        paper_free(&simulation, 0);
-        paper_random(&simulation, 2, number);
-    } else {
-        paper_free(&simulation, 0.015 + 1e-9 * (double)number);
-    }
-    paper_no_psd(&simulation);
-    paper_channels(&simulation, NULL, 0);
-    simulation.output.impacts = false;
-    Status status = simulation_complete(&simulation, NULL, NULL, NULL);
+    Cost cost;
+    alter(lane);
+    Status status = inquiry_complete(&lane->inquiry, &limits, &warnings, &lane->problem);
     if (status == STATUS_OK)
-        status = simulation_run(&simulation, NULL, NULL, workspace, &outcome, NULL);
+        status = inquiry_cost(&lane->inquiry, &limits, &cost, &lane->problem);
+    if (status == STATUS_OK)
+        status = simulation_run(&lane->inquiry.simulation, &limits, NULL, workspace, &outcome,
+                                &lane->problem);
     outcome_drop(outcome);
-    simulation_clear(&simulation);
+    warnings_clear(&warnings);
     return status;
 }
 
@@ -56,33 +74,61 @@ static void *work(void *context) {
     return NULL;
 }
 
+static Status read_scene(Store *store, const char *text, Lane *lane) {
+    Warnings warnings = {NULL, 0};
+    const Status status = intake_prepare(store, text, strlen(text), &limits, &lane->inquiry,
+                                         &warnings, &lane->problem);
+    warnings_clear(&warnings);
+    if (status == STATUS_OK && excitation_of(lane)->displacement.count > 0)
+        lane->displacement = excitation_of(lane)->displacement.at[0];
+    return status;
+}
+
 int main(int argc, char **argv) {
+    enum { LANES = 64 };
     const size_t threads = argc == 4 ? strtoul(argv[2], NULL, 10) : 0;
     const double seconds = argc == 4 ? strtod(argv[3], NULL) : 0;
-    if (threads < 1 || threads > 64 || !(seconds > 0)) {
-        fprintf(stderr, "usage: bench_core free|random THREADS SECONDS\n");
+    if (threads < 1 || threads > LANES || !(seconds > 0)) {
+        fprintf(stderr, "usage: bench_core SCENE THREADS SECONDS\n");
         return 2;
     }
+    process_return_memory(); // as the daemon does
     fourier_start();
-    Lane lanes[64] = {0};
-    const int64_t began = clock_monotonic_ns();
-    for (size_t i = 0; i < threads; i++) {
-        lanes[i].is_random = strcmp(argv[1], "random") == 0;
+    static Lane lanes[LANES];
+    Store *store = NULL;
+    Problem *problem = &lanes[0].problem;
+    Status status = store_open(NULL, &store, problem);
+    for (size_t i = 0; i < threads && status == STATUS_OK; i++) {
+        problem = &lanes[i].problem;
         lanes[i].number = 1 + i;
-        lanes[i].end_ns = began + (int64_t)(1e9 * seconds);
-        if (pthread_create(&lanes[i].thread, NULL, work, &lanes[i]) != 0)
-            return 1;
+        status = read_scene(store, argv[1], &lanes[i]);
+    }
+    store_close(store);
+    const int64_t began = clock_monotonic_ns();
+    size_t started = 0;
+    for (; started < threads && status == STATUS_OK; started++) {
+        lanes[started].end_ns = began + (int64_t)(1e9 * seconds);
+        if (pthread_create(&lanes[started].thread, NULL, work, &lanes[started]) != 0)
+            status = problem_set(problem, STATUS_INTERNAL, "a thread cannot be started");
     }
     uint64_t runs = 0;
     double cpu = 0;
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < threads; i++) {
+    for (size_t i = 0; i < started; i++) {
         pthread_join(lanes[i].thread, NULL);
         runs += lanes[i].runs;
         cpu += lanes[i].cpu;
-        status = lanes[i].status != STATUS_OK ? lanes[i].status : status;
+        if (lanes[i].status != STATUS_OK) {
+            status = lanes[i].status;
+            problem = &lanes[i].problem;
+        }
     }
-    printf("%.1f %.2f\n", (double)runs / (1e-9 * (double)(clock_monotonic_ns() - began)),
-           1e6 * cpu / (double)runs);
-    return status == STATUS_OK ? 0 : 1;
+    const double took = 1e-9 * (double)(clock_monotonic_ns() - began);
+    for (size_t i = 0; i < threads; i++)
+        inquiry_clear(&lanes[i].inquiry);
+    if (status != STATUS_OK) {
+        fprintf(stderr, "bench_core: %s\n", problem->detail);
+        return 1;
+    }
+    printf("%.1f %.2f\n", (double)runs / took, 1e6 * cpu / (double)runs);
+    return 0;
 }

@@ -271,7 +271,7 @@ static void measure_rows(bool is_grouped, bool is_rising) {
         *row = (JobRow){.scene = "", .warnings = "[]"};
         name_row(row, is_rising, count);
         const StoreDone done = {note, NULL};
-        const Status status = is_grouped ? store_job_post(store, row, &done, NULL)
+        const Status status = is_grouped ? store_job_post(store, row, STORE_NOW, &done, NULL)
                                          : store_job_add(store, row, &problem);
         if (status != STATUS_OK)
             stop("a row");

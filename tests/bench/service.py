@@ -25,7 +25,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from daemon import Daemon  # noqa: E402
 
 TICK = os.sysconf("SC_CLK_TCK")
-TOKEN = "0123456789abcdef" * 4
+TOKEN = "0123456789abcdef" * 4  # means nothing where no token is asked for; see guard()
 SECONDS, ROUNDS = 3, 5
 
 NGINX = """
@@ -145,10 +145,18 @@ def submit(daemon, scene):
     return reply.json()
 
 
+def guard(daemon):
+    """From now on the daemon asks for a token, which wrk has."""
+    global TOKEN
+    TOKEN = subprocess.run([daemon.program, "token", "create", "--name", "bench", "--scopes", "read,submit", "--data", daemon.data],
+                           check=True, capture_output=True, text=True).stdout.split()[0]
+
+
 def cached(daemon):
     result = submit(daemon, sponge(output={"channels": [], "psd": None}))["result"]
     path = f"/v1/results/{result}"
     body = daemon.request("GET", path).body
+    guard(daemon)
     with Nginx({"r.json": body}) as nginx:
         for connections in (16, 128):
             rivals(f"cached result, {len(body)} B, {connections} connections",
@@ -169,6 +177,7 @@ def post(daemon):
     text = json.dumps(scene)
     submit(daemon, scene)
     size = len(daemon.request("POST", "/v1/jobs", json=scene).body)
+    guard(daemon)
     with tempfile.TemporaryDirectory() as folder, Nginx({"post": b"x" * size}) as nginx:
         lua = script(folder, "post.lua", LUA_POST + f"wrk.body = [==[{text}]==]\n")
         for connections in (16, 64):
@@ -266,10 +275,10 @@ def counted(folder, scene):
     return script(folder, "counted.lua", COUNTED.format(template=json.dumps(scene), first=next(numbers)))
 
 
-def core_rate(build, kind):
-    """Runs a second of the core alone, on all processors."""
-    text = subprocess.run([os.path.join(build, "tests", "bench_core"), kind, str(os.cpu_count()), "2"], check=True,
-                          capture_output=True, text=True).stdout
+def core_rate(build, scene):
+    """Runs a second of the core alone, on all processors, and CPU microseconds a run."""
+    text = subprocess.run([os.path.join(build, "tests", "bench_core"), json.dumps(scene), str(os.cpu_count()), str(SECONDS)],
+                          check=True, capture_output=True, text=True).stdout
     return float(text.split()[0]), float(text.split()[1])
 
 
@@ -299,13 +308,13 @@ def jobs(daemon, build):
             rates.append(new[0])
             beside.append(none[0])
             costs.append(new[1])
-        core = core_rate(build, "free")
+        core = core_rate(build, free)
         print(f"new jobs, free sponge 10 s, summary only, 64 clients: {statistics.median(ratios):.2f} of what is acknowledged "
               f"without computing ({statistics.median(rates):.0f} to {statistics.median(beside):.0f} /s); "
               f"{statistics.median(costs):.0f} us of CPU a job, the core's {core[1]:.0f}", flush=True)
         ratios, costs, rates = [], [], []
         for _ in range(ROUNDS):
-            alone = core_rate(build, "random")
+            alone = core_rate(build, shaken)
             new = rate(shaken)
             ratios.append(new[0] / alone[0])
             costs.append(new[1])

@@ -1,8 +1,12 @@
 #!/usr/bin/env python3
 """Tokens and scopes, Host names, base URL, request ids, headers, settings together, the daemon's end: as clients meet them."""
 
+import contextlib
+import fcntl
+import http.client
 import json
 import os
+import pty
 import re
 import shutil
 import signal
@@ -11,6 +15,7 @@ import ssl
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
 import urllib.request
@@ -89,6 +94,96 @@ def test_a_token_beyond_its_rate_or_quota_waits():
             job = replies[0].json()["links"]["self"]
             assert daemon.request("DELETE", job, headers=bearer(greedy)).status == 200
             assert option == "--rate" or submit(greedy, 5).status == 202
+
+
+SLOW = dict(program.scene("paper_sine_aluminium"), duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
+
+
+def test_a_job_is_cancelled_by_its_owner_or_an_admin_alone():
+    """Another's DELETE and retry: 403 with the owner's name, and the job goes on; its sender stands in the job and the list."""
+    with program.daemon() as daemon:
+        nobodys = daemon.submit({**SLOW, "duration": 1.9e6}, headers={"Prefer": "respond-async"}).json()
+        names = {name: bearer(token(daemon.data, name, scopes)) for name, scopes in
+                 (("ann", "read,submit"), ("bob", "read,submit"), ("chief", "read,admin"))}
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+
+        def submit(who, more):
+            reply = daemon.submit({**SLOW, "duration": 2e6 + more}, headers={**names[who], "Prefer": "respond-async"})
+            assert reply.status == 202 and "client" not in reply.json(), reply
+            return reply.json()["links"]["self"]
+        for i, (who, other) in enumerate((("ann", "bob"), ("bob", "ann"))):
+            job = submit(who, i)
+            for method, path in (("DELETE", job), ("POST", job + "/retry")):
+                refused = daemon.request(method, path, headers=names[other])
+                assert refused.status == 403 and f'the token "{who}"' in refused.json()["detail"], refused
+            shown = daemon.get(job, headers=names[other]).json()
+            assert shown["status"] in ("accepted", "running") and shown["client"] == who, shown
+            listed = daemon.get("/v1/jobs", headers=names[other]).json()["jobs"]
+            assert {one["id"]: one.get("client") for one in listed}[shown["id"]] == who, listed
+            dismissed = daemon.request("DELETE", job, headers=names[who])
+            assert dismissed.status == 200 and dismissed.json()["client"] == who, dismissed
+            again = daemon.request("DELETE", job, headers=names[other])
+            assert again.status == 403, again
+        assert daemon.request("DELETE", submit("ann", 5), headers=names["chief"]).status == 200
+        # What was sent before anybody had a name is anybody's.
+        assert "client" not in daemon.get(f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).json()
+        assert daemon.request("DELETE", f"/v1/jobs/{nobodys['id']}", headers=names["ann"]).status == 200
+        assert daemon.request("DELETE", "/v1/jobs/j-none", headers=names["ann"]).status == 404
+
+
+def test_a_result_that_others_share_is_not_one_clients_to_delete():
+    """403 naming the other client, by whom the result is still read; alone with it, or as admin, it goes."""
+    with program.daemon() as daemon:
+        names = {name: bearer(token(daemon.data, name, scopes)) for name, scopes in
+                 (("ann", "read,submit"), ("bob", "read,submit"), ("chief", "read,admin"))}
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        for scene, deleter in ((SCENE, "chief"), ({**SCENE, "duration": 3}, "ann")):
+            for who in ("ann", "bob") if deleter == "chief" else ("ann", "ann"):
+                # Known to the byte the second time, so that its row comes behind the answer.
+                result = daemon.submit(scene, headers={**names[who], "Prefer": "wait=30"}).json()["result"]
+            path = f"/v1/results/{result}"
+            if deleter == "chief":
+                for who, other in (("ann", "bob"), ("bob", "ann")):
+                    refused = daemon.request("DELETE", path, headers=names[who])
+                    assert refused.status == 403 and f'the token "{other}"' in refused.json()["detail"], refused
+            assert daemon.get(path, headers=names["bob"]).status == 200
+            assert daemon.request("DELETE", path, headers=names[deleter]).status == 204, deleter
+            assert daemon.get(path, headers=names["bob"]).status == 404
+        assert daemon.request("DELETE", "/v1/results/r-none", headers=names["ann"]).status == 404
+
+
+def test_what_is_sent_piece_by_piece_ends_with_its_token():
+    """Events and a long series under way when their token is revoked are cut off; those of another token go on."""
+    with program.daemon() as daemon:
+        ann, bob = token(daemon.data, "ann"), token(daemon.data, "bob")
+        assert until(lambda: daemon.get("/v1/jobs").status == 401)
+        scene = {**SCENE, "duration": 1000, "output": {"psd": None}}
+        done = daemon.submit(scene, headers={**bearer(ann), "Prefer": "wait=30"}).json()
+        series = f"/v1/results/{done['result']}/series.npy"
+        slow = daemon.submit(SLOW, headers={**bearer(ann), "Prefer": "respond-async"}).json()
+        open_now = {}
+        for who, key in (("ann", ann), ("bob", bob)):
+            for path in (series, slow["links"]["self"] + "/events"):
+                connection = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=60)
+                connection.request("GET", path, headers=bearer(key))
+                reply = connection.getresponse()
+                assert reply.status == 200 and len(reply.read(10)) == 10, (who, path)
+                open_now[who, path] = reply
+        assert impactd("token", "revoke", "ann", "--data", daemon.data).returncode == 0
+        assert until(lambda: daemon.get("/v1/jobs", headers=bearer(ann)).status == 401)
+        time.sleep(0.6)
+        for path in (series, slow["links"]["self"] + "/events"):
+            try:
+                rest = open_now["ann", path].read()
+                raise AssertionError(f"{path} was sent to its end, {len(rest)} bytes")
+            except (http.client.IncompleteRead, ConnectionError):
+                pass
+        assert len(open_now["bob", series].read()) > 40e6
+        events = open_now["bob", slow["links"]["self"] + "/events"]
+        assert daemon.request("DELETE", slow["links"]["self"], headers=bearer(bob)).status == 403
+        chief = token(daemon.data, "chief", "admin")
+        assert until(lambda: daemon.request("DELETE", slow["links"]["self"], headers=bearer(chief)).status == 200)
+        assert b"event: finished" in events.read()
 
 
 def test_every_route_asks_for_its_scope():
@@ -236,6 +331,9 @@ def test_behind_a_base_url_every_link_begins_with_it():
         assert 'href="/impactd/v1/jobs"' in html
         assert daemon.get("/impactd/openapi.json").json()["servers"] == [{"url": base}]
         assert daemon.get("/impactdx/v1/jobs").status == 404
+        for path in ("/v1/jobz", "/impactd/v1/jobz"):
+            assert "did you mean /impactd/v1/jobs?" in daemon.get(path).json()["detail"], path
+        assert "GET /impactd/openapi.json" in daemon.get("/impactd/none/at/all").json()["detail"]
         # What a proxy says is not believed.
         forwarded = daemon.get("/", headers={"X-Forwarded-Host": "evil.example.org", "X-Forwarded-Proto": "gopher",
                                              "X-Forwarded-Prefix": "/evil", "Forwarded": "host=evil.example.org"})
@@ -294,6 +392,45 @@ def test_the_journal_has_a_line_per_request_and_no_secrets():
         assert "request=" not in daemon.stderr()
 
 
+def test_a_journal_that_nobody_reads_holds_up_nobody():
+    """Standard error is a full pipe: requests are answered, SIGTERM ends the daemon; once it is read, what was lost is told."""
+    taken, full = os.pipe()
+    os.set_blocking(full, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(full, b"0" * 4096)
+    os.set_blocking(full, True)
+    with tempfile.TemporaryDirectory() as data:
+        process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", data, "--journal", "all"],
+                                   stdout=subprocess.PIPE, stderr=full, text=True)
+        os.close(full)
+        try:
+            port = int(re.search(r":(\d+)$", process.stdout.readline())[1])
+
+            def ask():
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+                connection.request("GET", "/version")
+                code = connection.getresponse().status
+                connection.close()
+                return code
+
+            assert [ask() for _ in range(20)] == 20 * [200]
+            os.set_blocking(taken, False)
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    os.read(taken, 4096)
+            os.set_blocking(taken, True)
+            assert ask() == 200
+            assert os.read(taken, 4096).startswith(b"impactd: 20 lines were lost")
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+            os.close(taken)
+
+
 def test_settings_that_contradict_each_other_do_not_start():
     """Each with both names and what would be right, all at once, and exit code 2; --print-config shows all settings."""
     with tempfile.TemporaryDirectory(prefix="impactd-") as data:
@@ -306,6 +443,8 @@ def test_settings_that_contradict_each_other_do_not_start():
                 (("--workers", "9", "--queue", "8"), ("--queue", "--workers", "9")),
                 (("--base-url", "sim.example.org"), ("--base-url", "http://")),
                 (("--base-url", "http://a/v1"), ("/v1",)),
+                (("--base-url", "http://a:99999/b"), ("--base-url", "65535", "a:99999")),
+                (("--base-url", "http://a:0"), ("--base-url", "65535")),
                 (("--tls-cert", plain), ("--tls-cert", "--tls-key")),
                 (("--tls-key", plain), ("--tls-key", "--tls-cert")),
                 (("--tls-cert", "/none", "--tls-key", "/none"), ("--tls-cert", "--tls-key", "/none")),
@@ -353,6 +492,83 @@ def test_tls_serves_and_refuses_bad_files():
         finally:
             process.terminate()
             process.wait(20)
+            process.stdout.close()
+
+
+def test_a_renewed_certificate_is_used_without_an_end():
+    """SIGHUP: new connections see the new certificate, old ones go on; faulty files change nothing and are told."""
+    if shutil.which("openssl") is None:
+        raise program.Skipped("openssl is not installed")
+    with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
+        cert, key = certificate(folder)
+        other_cert, other_key = certificate(folder, 3)
+        journal = os.path.join(folder, "journal")
+        with open(journal, "w", encoding="utf-8") as errors:
+            process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", cert,
+                                        "--tls-key", key], stdout=subprocess.PIPE, stderr=errors, text=True)
+        try:
+            port = int(re.search(r"listens on https://\S+:(\d+)", process.stdout.readline())[1])
+
+            def said():
+                with open(journal, encoding="utf-8") as file:
+                    return file.read()
+
+            def seen():
+                return ssl.get_server_certificate(("127.0.0.1", port), timeout=20)
+
+            def wanted(path):
+                with open(path, encoding="utf-8") as file:
+                    return file.read()
+            first = wanted(cert)
+            assert seen().split() == first.split()
+            old = http.client.HTTPSConnection("127.0.0.1", port, context=ssl._create_unverified_context(), timeout=20)
+            old.request("GET", "/version")
+            assert old.getresponse().read()
+            # A key of another: told, and nothing changes.
+            shutil.copy(other_key, key)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: "the certificate stays as it was" in said() and "not that of the certificate" in said()), said()
+            assert seen().split() == first.split()
+            shutil.copy(other_cert, cert)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: f"the certificate in {cert} is used from now on" in said()), said()
+            assert seen().split() == wanted(other_cert).split() != first.split()
+            with urllib.request.urlopen(f"https://localhost:{port}/version", context=ssl.create_default_context(cafile=other_cert), timeout=20) as reply:
+                assert reply.status == 200
+            old.request("GET", "/version")
+            assert old.getresponse().read(), "the connection from before has ended"
+            os.remove(cert)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: said().count("stays as it was") == 2 and f"cannot be read: {cert}" in said()), said()
+            assert seen().split() == wanted(other_cert).split()
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0
+            process.stdout.close()
+
+
+def test_a_hangup_ends_what_has_lost_its_terminal_alone():
+    """SIGHUP without TLS is told and nothing else; where the terminal it was started in is gone it ends well."""
+    with Daemon(program.build) as daemon:
+        daemon.process.send_signal(signal.SIGHUP)
+        assert until(lambda: "nothing to read anew" in daemon.stderr()), daemon.stderr()
+        assert daemon.get("/health/ready").status == 200
+    with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
+        terminal, inside = pty.openpty()
+        process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder], stdin=inside,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True,
+                                   preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+        os.close(inside)
+        try:
+            assert "listens on" in process.stdout.readline()
+            process.send_signal(signal.SIGHUP)
+            time.sleep(0.2)
+            assert process.poll() is None, "it has its terminal still"
+            os.close(terminal)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+            process.wait()
             process.stdout.close()
 
 

@@ -82,12 +82,29 @@ def test_a_miss_is_explained_by_the_nearest_known_scene():
         assert len(daemon.get("/v1/jobs").json()["jobs"]) == 2, "explaining made a job"
 
 
+def test_each_layer_tells_its_own_bytes():
+    """A result without channels takes documents and next to no series; one with channels its samples beside."""
+    scene = program.scene("paper_free_sponge")
+    with program.daemon() as daemon:
+        program.finished(daemon, {**scene, "output": {"channels": [], "psd": None}})
+        bare = daemon.get("/v1/cache").json()
+        assert 0 < bare["documents"]["bytes"] < 1 << 14 > bare["series"]["bytes"], bare
+        program.finished(daemon, {**scene, "output": {"channels": ["displacement"], "psd": None}})
+        both = daemon.get("/v1/cache").json()
+        grown = {layer: both[layer]["bytes"] - bare[layer]["bytes"] for layer in ("documents", "series")}
+        assert grown["series"] > 8 * 10001 and 0 < grown["documents"] < 1 << 14, (bare, both)
+        ready = daemon.get("/health/ready").json()
+        assert ready["cached_bytes"] == both["documents"]["bytes"] + both["series"]["bytes"], (ready, both)
+
+
 def test_what_another_engine_made_names_the_way_to_have_it_again():
-    """Summary, impacts and psd stay; the series answers 410 with a link, and POST there makes it by this engine."""
+    """Summary, impacts, psd and energy stay in every format, to the byte; the series answers 410 with a link, and POST there makes it by this engine."""
     old = "r-" + 64 * "0"
     with tempfile.TemporaryDirectory() as folder:
         with program.daemon(data=folder) as daemon:
             made = program.finished(daemon, program.scene("paper_free_sponge"))
+            kept = [f"{part}.{form}" for part in ("psd", "impacts", "energy") for form in ("json", "csv", "npy", "npz", "mat")]
+            before = {what: daemon.get(f"/v1/results/{made['result']}/{what}") for what in kept}
         with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
             database.execute("UPDATE results SET engine = 'impactd-0', id = ? WHERE id = ?", (old, made["result"]))
         database.close()
@@ -96,9 +113,11 @@ def test_what_another_engine_made_names_the_way_to_have_it_again():
             assert daemon.get(f"/v1/results/{old}/impacts.json").json()["count"] == made["summary"]["impacts"]
             reply = daemon.get(f"/v1/results/{old}/series.csv")
             assert reply.status == 410 and "impactd-0" in reply.json()["detail"], reply
-            for what, accept in (("series", "*/*"), ("psd.npy", "*/*"), ("psd", "application/x-npy"),
-                                 ("impacts.npz", "*/*"), ("impacts", "application/x-npy"), ("bundle.zip", "*/*"),
-                                 ("impacts/1/force.csv", "*/*"), ("impacts/1/force", "*/*")):
+            for what in kept:
+                there = daemon.get(f"/v1/results/{old}/{what}")
+                assert there.status == 200 and there.body == before[what].body, (what, there)
+            assert daemon.get(f"/v1/results/{old}/psd", headers={"Accept": "application/x-npy"}).body == before["psd.npy"].body
+            for what, accept in (("series", "*/*"), ("bundle.zip", "*/*"), ("impacts/1/force.csv", "*/*"), ("impacts/1/force", "*/*")):
                 refused = daemon.get(f"/v1/results/{old}/{what}", headers={"Accept": accept})
                 assert refused.status == 410 and refused.headers["link"] == reply.headers["link"], (what, refused)
             link = reply.headers["link"]

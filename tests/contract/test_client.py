@@ -188,6 +188,58 @@ def test_watch_draws_a_bar_on_a_terminal():
     assert percents == sorted(percents) and percents[-1] <= 100, shown
 
 
+def test_watch_shows_what_the_events_tell():
+    """Progress comes from the stream of events; what is odd in it is passed over; a server without it is asked again."""
+    def job(status, progress):
+        return say(body=json.dumps({"id": "j-1", "status": status, "progress": progress, "result": None}).encode())
+
+    def tell(*lines, kind="text/event-stream"):
+        return say(body="".join(line + "\n" for line in lines).encode(), kind=kind)
+    stream = tell("retry: 2000", "", "event: progress", 'data: {"status": "running", "progress": 20}', "",
+                  "event: progress", "data: {", "", "event: progress", "data: [1]", "", "event: progress", "data: " + "x" * 5000, "",
+                  ": still here", "", "event: other", 'data: {"status": "running", "progress": 99}', "",
+                  "event: progress", 'data: {"status": "run\\u001bning", "progress": 45.5}', "",
+                  "event: finished", 'data: {"id": "j-1", "status": "successful"}', "")
+    with fake(job("accepted", 0), stream, job("successful", 100)) as (url, seen):
+        code, out, errors = client(url, "watch", "j-1")
+        assert code == 0 and out.splitlines() == ["j-1 accepted 0 %", "j-1 running 20 %", "j-1 run?ning 46 %", "j-1 successful 100 %"], (out, errors)
+        assert [path.partition("?")[0] for _, path, _ in seen] == ["/v1/jobs/j-1", "/v1/jobs/j-1/events", "/v1/jobs/j-1"], seen
+    for none in (say(404, body=b"{}"), tell("{}", kind="application/json"), say(204, body=b"")):
+        with fake(job("accepted", 0), none, job("running", 30), job("running", 60), job("successful", 100)) as (url, seen):
+            code, out, errors = client(url, "watch", "j-1")
+            assert code == 0 and out.splitlines()[1:3] == ["j-1 running 30 %", "j-1 running 60 %"], (out, errors)
+            assert sum(path.endswith("/events") for _, path, _ in seen) == 1, seen
+    with program.daemon() as daemon:
+        scene = json.loads(endless())
+        slow = client(daemon.url, "submit", "-", text=json.dumps(scene))[1].strip()
+        code, out, errors = client(daemon.url, "watch", slow, "--wait", "3.2")
+        assert code == 8 and slow in out, (code, out, errors)
+        assert client(daemon.url, "cancel", slow)[0] == 0
+
+
+def test_tls_and_plain_http_taken_for_each_other_are_told():
+    """A plain URL of a TLS server hints at https://, and the other way round."""
+    with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
+        code, _, errors = client(daemon.url.replace("http:", "https:"), "submit", SPONGE)
+        assert code == 7 and f"plain HTTP, name it as {daemon.url}" in errors, (code, errors)
+        key, certificate = (os.path.join(folder, name) for name in ("key.pem", "cert.pem"))
+        try:
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", certificate, "-days", "2",
+                            "-subj", "/CN=localhost"], check=True, capture_output=True)
+        except (OSError, subprocess.CalledProcessError) as error:
+            raise program.Skipped(f"openssl makes no certificate here: {error}") from None
+        os.chmod(key, 0o600)
+        with subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", certificate,
+                               "--tls-key", key], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+            try:
+                url = re.search(r"listens on (https://\S+)", process.stdout.readline())[1]
+                for arguments in (("submit", SPONGE), ("watch", "j-1"), ("cancel", "j-1")):
+                    code, _, errors = client(url.replace("https:", "http:"), *arguments)
+                    assert code == 7 and f"speaks TLS, name it as {url}" in errors, (code, errors)
+            finally:
+                process.terminate()
+
+
 def test_a_daemon_started_anew_is_found_again():
     """watch survives a restart of the daemon and sees the job's end."""
     with tempfile.TemporaryDirectory() as data, program.daemon(data=data) as daemon:

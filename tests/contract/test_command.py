@@ -77,6 +77,13 @@ def test_settings_come_from_flag_environment_file_and_default():
             assert line in out.splitlines(), (line, out)
         assert any(line.startswith("listen = 127.0.0.1:8080") and line.endswith("# default")
                    for line in out.splitlines()), out
+        # What is printed is a file of settings: read back, it means the same and starts the daemon.
+        printed = os.path.join(folder, "printed.conf")
+        with open(printed, "w", encoding="utf-8") as file:
+            file.write(out)
+        with program.daemon("--config", printed) as daemon:
+            assert daemon.request("POST", "/v1/jobs", body=b"[" * 7001,
+                                  headers={"Content-Type": "application/json"}).status == 413
         with open(path, "a", encoding="utf-8") as file:
             file.write("wrokers = 4\nnonsense\n")
         code, out, errors = program.run("serve", "--print-config", environment=environment)
@@ -266,10 +273,31 @@ def test_progress_bar_on_a_terminal():
         assert on_a_terminal(file.read(), 20) == ""
 
 
+def test_no_file_takes_a_closed_streams_place():
+    """A daemon without standard streams: what it would print there stands in none of its files."""
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.Popen(["sh", "-c", 'exec "$0" serve --listen 127.0.0.1:0 --data "$1" <&- >&- 2>&-',
+                                    program.impactd(), folder])
+        try:
+            lock, end = os.path.join(folder, "impactd.lock"), time.monotonic() + 20
+            while not os.path.exists(os.path.join(folder, "impactd.late")) and time.monotonic() < end:
+                time.sleep(0.05)
+            files = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
+            assert files == 3 * ["/dev/null"], files
+            with open(lock, encoding="ascii") as file:
+                assert file.read() == f"{process.pid}\n"
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0
+
+
 def test_version():
-    """`version` and --version print the engine's name and version."""
+    """`version` and --version print the versions that the daemon tells."""
     code, out, errors = program.run("version")
-    assert (code, errors) == (0, "") and out == program.run("--version")[1] and len(out.split()) >= 1, out
+    assert (code, errors) == (0, "") and out == program.run("--version")[1], (code, out, errors)
+    with program.daemon() as daemon:
+        told = daemon.get("/version").json()
+    assert out == f"impactd {told['version']} (engine {told['engine']})\n", (out, told)
 
 
 if __name__ == "__main__":

@@ -296,6 +296,59 @@ def test_a_measured_motion_is_set_beside_a_result():
         assert own["channel"] == "displacement" and own["motion"]["relative"] == 0
 
 
+def test_what_does_not_fit_a_comparison_is_told():
+    """Channels and spectra beyond those that are compared: as many as there are, in a warning."""
+    storeys = 25
+    frame = {"kind": "frame", "masses": [1] * storeys, "stiffnesses": [1e4] * storeys, "dampings": [1] * storeys}
+    channels = [f"{name}_{i}" for name in ("displacement", "velocity", "mean_acceleration") for i in range(1, storeys + 1)]
+    with program.daemon() as daemon:
+        jobs = [program.finished(daemon, {"structure": frame, "duration": 1, "sample_rate": 200, "excitation": {
+            "kind": "sine", "frequency": f, "amplitude": 1}, "output": {"channels": channels, "psd": {"channels": channels, "segment": 64}}})
+            for f in (1, 2)]
+        told = daemon.get(f"/v1/compare?a={jobs[0]['id']}&b={jobs[1]['id']}").json()
+        assert len(told["channels"]) == 64 and len(told["psd"]) == 64
+        details = [warning["detail"] for warning in told["warnings"]]
+        assert any(detail.startswith("11 more channels of both") for detail in details), details
+        assert any(detail.startswith("11 more spectra of both") for detail in details), details
+
+
+def test_a_measurement_comes_as_a_table_too():
+    """text/csv and text/plain as `impactd import` reads them, with the rest in the query, answer what the same JSON does."""
+    with program.daemon() as daemon:
+        result = program.finished(daemon, scene())["result"]
+        table = daemon.get(f"/v1/results/{result}/series.csv?channels=acceleration&from=0.4&to=2").body
+        samples = [float(line.split(",")[1]) for line in table.decode().splitlines()[1:]]
+
+        def post(query, body, kind="text/csv"):
+            return daemon.request("POST", f"/v1/compare?a={result}{query}", body=body, headers={"Content-Type": kind})
+        asked = {"a": result, "measured": measured(samples, start=0.4), "shift": 0.01}
+        wanted = daemon.request("POST", "/v1/compare", json=asked)
+        told = post("&shift=0.01", table)
+        assert told.status == 200 and told.body == wanted.body, told
+        assert post("&shift=0.01", table.replace(b",", b" "), "text/plain").body == wanted.body
+        # One column in g, its interval told beside it.
+        column = "\n".join(repr(sample / 9.80665) for sample in samples)
+        told = post("&interval=0.001&unit=g&shift=0.4&channel=acceleration", column, "text/plain; charset=utf-8").json()
+        assert told["motion"]["samples"] == 1601 and told["motion"]["relative"] < 1e-12, told["motion"]
+        found = daemon.request("POST", "/v1/compare", json={**asked, "align": "auto"})
+        assert post("&align=auto", table).body == found.body
+        for query, body, status, words in (
+                ("", b"time [s],acceleration [m/s^2]\n0,1\n0.1,x\n", 400, "line 3"),
+                ("&align=best", table, 422, "given, auto"), ("&unit=mm", table, 422, "cm/s^2"), ("&shift=x", table, 400, "shift"),
+                ("&interval=1", table, 400, "interval"), ("&channel=displacement", table, 422, "m/s^2"),
+                ("&quantity=force", table, 400, "quantity"), ("", b"", 400, "no body"), ("", column, 400, "interval"),
+                ("", b"time [s],acceleration [m/s^2]\n0,1\n0.1,2\n0.2,3\n", 422, "at least 16 samples, are 3")):
+            reply = post(query, body)
+            assert reply.status == status and words in json.dumps(reply.json()), (query, reply)
+        # A decimal comma is no separator.
+        assert post("", table, "text/plain").status == 400
+        refused = post("", table, "application/x-npy")
+        assert refused.status == 415 and "text/csv" in refused.json()["detail"] and "application/json" in refused.json()["detail"], refused
+        both = daemon.request("POST", "/v1/compare?shift=1", json=asked)
+        assert both.status == 400 and '"shift" is a member' in both.json()["detail"], both
+        assert daemon.request("POST", "/v1/compare", body=table, headers={"Content-Type": "text/csv"}).status == 422
+
+
 def test_faults_of_a_measurement_are_told_at_their_places():
     """422 with the pointer, 400 for what is not JSON, 404 for no result, 415 for another type, 413 for too much."""
     with program.daemon() as daemon:

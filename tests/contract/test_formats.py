@@ -175,6 +175,26 @@ def test_ledgers_are_columns_of_numbers():
         assert same(np.load(io.BytesIO(get(daemon, f"{base}/energy.npy").body)), list(energy.values()))
 
 
+def test_a_result_links_to_what_it_has():
+    """Every link of a result answers; without psd and ledger none leads there, and asking says why."""
+    with program.daemon() as daemon:
+        for name, output, without in (("paper_free_sponge", None, ()), ("contact_hunt_crossley_textbook", {"psd": None}, ("psd",)),
+                                      ("paper_free_sponge", {"psd": None, "impacts": False}, ("psd", "impacts", "force"))):
+            scene = program.scene(name)
+            scene = scene if output is None else {**scene, "output": output}
+            base = finished(daemon, scene)
+            links = get(daemon, base).json()["links"]
+            for link, path in links.items():
+                assert link.partition(".")[0] not in without, (name, link)
+                get(daemon, path.replace("{number}", "1"))
+            for part in ("series", "psd", "impacts", "energy"):
+                for form in FORMATS:
+                    named = part if form == "json" else f"{part}.{form}"
+                    assert (named in links) == (part not in without), (name, named)
+                    assert named in links or daemon.get(f"{base}/{part}.{form}").status == 404, named
+            assert ("force" in links) == ("force" not in without), name
+
+
 def test_windows_keep_their_peaks():
     """Decimated windows say so, cover the window, and have exactly its extremes; one bucket for each sample at most."""
     with program.daemon() as daemon:

@@ -89,6 +89,8 @@ def test_ambiguous_heads_are_refused_and_the_connection_closed():
         (400, b"OPTIONS * HTTP/1.1\r\n" + HOST),
         (400, b"GET http://localhost/version HTTP/1.1\r\n" + HOST),
         (400, b"GET version HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version?a=b c HTTP/1.1\r\n" + HOST),
+        (400, b"GET /version HTTP/1.0 HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/%2e%2e/version HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/.%2E/version HTTP/1.1\r\n" + HOST),
         (400, b"GET /v1/../version HTTP/1.1\r\n" + HOST),
@@ -231,6 +233,33 @@ def test_a_dripping_head_is_cut_off():
             seconds = time.monotonic() - began
         client.close()
         assert seconds is not None and 8 < seconds < 20, seconds
+
+
+def test_a_chunk_without_end_keeps_no_thread_busy():
+    """A chunk's head longer than a connection's memory: while its client is waited for, and when it has gone, the event
+    loop that has it sleeps in between."""
+    def effort(daemon):
+        """CPU [s] of the busiest thread, and how often it went to sleep, by thread."""
+        threads = {}
+        for task in os.listdir(f"/proc/{daemon.process.pid}/task"):
+            with open(f"/proc/{daemon.process.pid}/task/{task}/stat", encoding="ascii") as file:
+                spent = sum(int(part) for part in file.read().rsplit(")", 1)[1].split()[11:13]) / os.sysconf("SC_CLK_TCK")
+            with open(f"/proc/{daemon.process.pid}/task/{task}/status", encoding="ascii") as file:
+                threads[task] = spent, int(re.search(r"^voluntary_ctxt_switches:\s+(\d+)", file.read(), re.M)[1])
+        return threads
+
+    with program.daemon() as daemon:
+        client = connect(daemon)
+        client.sendall(POST + b"Transfer-Encoding: chunked\r\n\r\n2;" + 20000 * b"a")
+        time.sleep(1)
+        for state in ("there", "gone"):
+            before = effort(daemon)
+            time.sleep(2)
+            for task, (spent, sleeps) in effort(daemon).items():
+                spent, sleeps = spent - before[task][0], sleeps - before[task][1]
+                assert spent < 0.1 or sleeps > 50, (state, spent, sleeps)
+            client.close()
+        assert daemon.get("/version").status == 200
 
 
 def test_large_bodies_keep_no_scene_out():

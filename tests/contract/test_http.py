@@ -99,6 +99,7 @@ def test_waiting_follows_prefer():
         began = time.monotonic()
         reply = daemon.get(f"/v1/jobs/{job['id']}?wait=0.3")
         assert reply.status == 200 and 0.25 < time.monotonic() - began < 2, reply
+        assert daemon.get(f"/v1/jobs/{job['id']}?wait=-1").status == 400
         running = reply.json()
         assert running["status"] == "running" and 0 <= running["progress"] < 100, running
 
@@ -292,9 +293,40 @@ def test_results_never_change():
             assert head.status == 200 and head.body == b"", head
             assert head.headers["content-length"] == str(len(reply.body)), head.headers
         assert len(tags) == 9, "every representation has a tag of its own"
+        reply = daemon.get(base + "/manifest")  # it tells the material's status, which may change
+        tag = reply.headers["etag"]
+        assert tag.startswith('"') and tag not in tags and reply.headers["cache-control"] == "no-cache", reply.headers
+        known = daemon.get(base + "/manifest", headers={"If-None-Match": tag})
+        assert known.status == 304 and known.body == b"" and known.headers["etag"] == tag, known
+        assert daemon.get(base + "/manifest", headers={"If-None-Match": '"x"'}).body == reply.body
         reply = daemon.get("/v1/materials/sponge")
         known = daemon.get("/v1/materials/sponge", headers={"If-None-Match": reply.headers["etag"]})
         assert known.status == 304 and "immutable" not in reply.headers["cache-control"], known
+
+
+def test_refusals_are_not_kept():
+    """What is refused of something immutable may be there tomorrow: no cache keeps the refusal."""
+    with program.daemon() as daemon:
+        base = f"/v1/results/{program.finished(daemon, sponge())['result']}"
+        for path in ("/series.json?points=0", "/series.npy?from=11", "/series.csv?channels=foo", "/psd.xml",
+                     "/impacts/99/force.csv", "/nothing"):
+            reply = daemon.get(base + path)
+            assert reply.status in (400, 404) and reply.headers["cache-control"] == "no-store", (path, reply.headers)
+            assert "etag" not in reply.headers, reply.headers
+        reply = daemon.get(base + "/series.npy", headers={"Range": "bytes=99999999-"})
+        assert reply.status == 416 and reply.headers["cache-control"] == "no-store", reply.headers
+
+
+def test_links_lead_somewhere():
+    """A result links to what its scene asked for and to nothing else."""
+    with program.daemon() as daemon:
+        for output, left_out in (({"psd": None}, "psd"), ({"impacts": False}, "impacts"), ({"channels": []}, "none")):
+            result = program.finished(daemon, {**sponge(), "output": output})["result"]
+            links = daemon.get(f"/v1/results/{result}").json()["links"]
+            assert not [name for name in links if name.startswith(left_out)], links
+            assert ("force" in links) == (left_out != "impacts"), links
+            for name, link in links.items():
+                assert daemon.get(link.replace("{number}", "1")).status == 200, (name, link)
 
 
 def test_parts_of_binary_formats():

@@ -110,6 +110,7 @@ def test_bash_completes_commands_options_and_values():
         assert complete(script, "sub") == ["submit"]
         assert complete(script, "tradeoff", "--metric", "imp") == ["impacts"]
         assert complete(script, "get", "r-1", "imp") == ["impacts"]
+        assert complete(script, "token", "re") == ["revoke"] and complete(script, "token", "list", "") == []
         assert complete(script, "run", "--output", "") == [] and complete(script, "run", "") == []
         assert set(complete(script, "help", "")) == set(known)
         bound = subprocess.run(["bash", "-c", f'source "{script}"; complete -p impactd'], capture_output=True, text=True, check=True)

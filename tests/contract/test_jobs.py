@@ -179,6 +179,7 @@ def test_events_tell_a_job_to_its_end():
         job = daemon.submit(slow(1, duration), headers=ASYNC).json()["id"]
         connection, reply = stream(daemon, job)
         assert reply.status == 200 and reply.headers["Content-Type"] == "text/event-stream"
+        assert reply.headers["X-Accel-Buffering"] == "no", "a proxy may hold the events back"
         text = reply.read()
         connection.close()
         assert text.startswith(b"retry: "), text[:80]
@@ -238,6 +239,15 @@ def test_two_hundred_streams_at_once():
         assert len(os.listdir(f"/proc/{daemon.process.pid}/fd")) <= files + 2
 
 
+def test_a_job_dismissed_while_it_waits_has_only_waited():
+    """Its time in the queue is all its time."""
+    with program.daemon("--workers", "1") as daemon:
+        jobs = [daemon.submit(slow(i, duration_of(30)), headers=ASYNC).json()["id"] for i in range(3)]
+        job = daemon.request("DELETE", f"/v1/jobs/{jobs[-1]}").json()
+        assert job["status"] == "dismissed" and job["started"] is None, job
+        assert job["timing"]["queued"] == job["timing"]["total"] > 0 == job["timing"]["run"], job
+
+
 def test_a_long_poll_ends_with_the_job():
     """?wait= answers when the job is finished, or when the time is up."""
     duration = duration_of(1.5)
@@ -245,7 +255,8 @@ def test_a_long_poll_ends_with_the_job():
         job = daemon.submit(slow(1, duration), headers=ASYNC).json()["id"]
         early = daemon.get(f"/v1/jobs/{job}?wait=0.05").json()
         assert early["status"] in ("accepted", "running"), early
-        assert daemon.get(f"/v1/jobs/{job}?wait=30").json()["status"] == "successful"
+        # More than is given is no fault, as in Prefer.
+        assert daemon.get(f"/v1/jobs/{job}?wait=3600").json()["status"] == "successful"
 
 
 def test_a_short_job_overtakes_fifty_long_ones():
@@ -323,6 +334,27 @@ def test_a_result_is_deleted_and_its_jobs_say_so():
         dry = daemon.request("POST", "/v1/jobs?dry_run=1", json=slow(1, duration)).json()["result"]
         assert daemon.request("DELETE", f"/v1/results/{dry}").status == 409
         daemon.request("DELETE", f"/v1/jobs/{running}")
+
+
+def test_a_page_whose_place_is_gone_goes_on():
+    """Retention between two pages: the next page has what is still there behind that place, no 404."""
+    folder = tempfile.mkdtemp(prefix="impactd-jobs-")
+    try:
+        with program.daemon(data=folder) as daemon:
+            for i in range(8):
+                daemon.submit(quick(i))
+            link = daemon.get("/v1/jobs?limit=6").headers["link"]
+            place = link[1:link.index(">")]
+            assert len(ids(daemon.get(place))) == 2
+        with program.daemon("--keep-jobs", "3", data=folder) as daemon:
+            end = time.monotonic() + 60
+            while len(ids(daemon.get("/v1/jobs"))) > 3 and time.monotonic() < end:
+                time.sleep(0.2)
+            reply = daemon.get(place)
+            assert reply.status == 200 and ids(reply) == [] and "link" not in reply.headers, reply
+            assert daemon.get("/v1/jobs?before=j-7f3a").status == 404
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def test_what_is_not_to_be_kept_goes():

@@ -108,7 +108,7 @@ def test_real_answers_have_the_promised_shapes():
     called, statuses = set(), set()
     with program.daemon() as daemon:
         job = program.finished(daemon, program.scene("paper_free_sponge"))
-        study = program.finished(daemon, {**program.scene("paper_free_sponge"), "study": {"solvers": ["exact", "rk4"]}})
+        study = program.finished(daemon, {**program.scene("paper_free_sponge"), "study": {"kind": "tradeoff", "solvers": ["exact", "rk4"]}})
         tradeoff = {"id": study["result"]}
         many = program.finished(daemon, program.scene("ensemble_random_sponge"))
         ensemble = {"id": many["result"]}

@@ -10,6 +10,7 @@ import sys
 import time
 
 import numpy
+import scipy.io
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
@@ -264,6 +265,18 @@ def test_the_table_reads_the_same_in_every_format():
         for name in document["columns"]:
             read = arrays[name.lstrip("/")].tolist()
             assert [one.decode() if isinstance(one, bytes) else one for one in read] == column(document, name), name
+        # Numbers alone: the place of a text among its axis's values, and of a status.
+        told = [column(document, name) for name in document["columns"]]
+        numbers = [[("sponge@1", "aluminium@1").index(one) if str(one).endswith("@1") else 0 if one == "made" else one
+                    for one in values] for values in told]
+        reply = daemon.get(f"/v1/results/{job['result']}/table.npy")
+        array = numpy.load(io.BytesIO(reply.body))
+        assert array.dtype == float and array.T.tolist() == numbers, array
+        variables = scipy.io.loadmat(io.BytesIO(daemon.get(f"/v1/results/{job['result']}/table.mat").body))
+        for name, values in zip(document["columns"], numbers):
+            assert variables[name.lstrip("/").replace("/", "_")].ravel().tolist() == values, name
+        part = daemon.get(f"/v1/results/{job['result']}/table.npy", headers={"Range": "bytes=100-299"})
+        assert part.status == 206 and part.body == reply.body[100:300] and reply.headers["accept-ranges"] == "bytes"
         assert daemon.get(f"/v1/results/{job['result']}/table.xml").status == 404
         by_job = daemon.get(f"/v1/jobs/{job['id']}/table.csv")
         assert by_job.body == text.body
@@ -271,6 +284,35 @@ def test_the_table_reads_the_same_in_every_format():
         assert tagged.status == 304
         links = daemon.get(f"/v1/results/{job['result']}").json()["links"]
         assert links["table"].endswith("/table.json") and links["table.csv"].endswith("/table.csv")
+
+
+def test_a_long_table_is_streamed_and_reads_the_same_in_every_format():
+    """Rows that do not fit into one piece: none is left out or comes twice, and any range of the archive is its part."""
+    with Daemon(program.build) as daemon:
+        scene = sweep({"pointer": "/dampers/0/clearance", "from": 0.01, "to": 0.02, "count": 20000},
+                      values("/dampers/0/buffer", "sponge", "aluminium"),
+                      metrics=USUAL + ["energy_residual", "error_estimate", "trust_horizon", "steps"],
+                      changes={"duration": 0.02, "accuracy": {"solver": "rk4", "step": 1e-3}})
+        job = made(daemon, scene, 300)
+        replies = {form: daemon.get(f"/v1/results/{job['result']}/table.{form}") for form in ("json", "csv", "npz", "svg")}
+        assert all(reply.status == 200 for reply in replies.values())
+        assert "content-length" not in replies["json"].headers and len(replies["csv"].body) > 4 << 20
+        assert "content-length" in replies["npz"].headers and len(replies["svg"].body) < 1 << 20
+        document = replies["json"].json()
+        assert document["done"] == 40000 and column(document, "index") == list(range(40000))
+        rows = list(csv.reader(io.StringIO(replies["csv"].body.decode())))[1:]
+        arrays = numpy.load(io.BytesIO(replies["npz"].body))
+        assert len(rows) == 40000
+        for k, name in enumerate(document["columns"]):
+            told, read = column(document, name), arrays[name.lstrip("/")]
+            if isinstance(told[0], str):
+                assert told == [row[k] for row in rows] == [one.decode() for one in read.tolist()], name
+            else:
+                there = numpy.array([numpy.nan if one is None else one for one in told], dtype=float)
+                assert numpy.array_equal(there, read, equal_nan=True), name
+                assert numpy.array_equal(there, [float(row[k]) for row in rows], equal_nan=True), name
+        part = daemon.get(f"/v1/results/{job['result']}/table.npz", headers={"Range": "bytes=3000001-4100002"})
+        assert part.status == 206 and part.body == replies["npz"].body[3000001:4100003]
 
 
 def long_sweep(count=3000):

@@ -245,18 +245,24 @@ def test_progress_and_cancel():
         assert time.monotonic() - began < 5 or program.is_sanitized()
 
 
+ABSENT = object()
+
+
 def test_faults_of_a_study_are_told_with_the_scenes():
     """422 with the pointer; what is too long in all is refused before anything runs."""
     with program.daemon("--max-cpu-seconds", "0.03") as daemon:
         for members, pointer, expected in [
                 ({"kind": "trade"}, "/study/kind", "must be one of tradeoff"),
                 ({"kind": 5}, "/study/kind", "must be a string"),
+                ({"kind": ABSENT}, "/study/kind", "is required, one of tradeoff, ensemble, compare, sensitivity, sweep"),
                 ({"metric": "peak"}, "/study/metric", "must be one of displacement"),
                 ({"solvers": ["exact", "rk5"]}, "/study/solvers/1", "must be one of exact"),
                 ({"eror": 1}, "/study/eror", "unknown key"),
                 ({"trial": 0}, "/study/trial", "must be at least 1"),
                 ({"repeats": 1000}, "/study", "s of CPU in all, at most 0.3 s are allowed")]:
-            reply = daemon.submit(study(**members))
+            scene = study(**members)
+            scene["study"] = {name: value for name, value in scene["study"].items() if value is not ABSENT}
+            reply = daemon.submit(scene)
             faults = reply.json()["errors"]
             assert reply.status == 422 and [f["pointer"] for f in faults] == [pointer], (members, faults)
             assert expected in faults[0]["detail"], faults
@@ -281,6 +287,8 @@ def test_wrong_types_in_a_study():
                     pointers = [fault["pointer"] for fault in reply.json()["errors"]]
                     assert all(p == "/study" or p.startswith("/study/" + name) for p in pointers), (name, wrong, pointers)
         assert refused > 50, refused
+        nothing = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": {}})
+        assert nothing.status == 422 and [f["pointer"] for f in nothing.json()["errors"]] == ["/study/kind"], nothing
         for wrong in (None, True, 1, "tradeoff", [], [{}]):
             reply = daemon.request("POST", "/v1/jobs?dry_run=1", json={**study(), "study": wrong})
             assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == "/study", (wrong, reply)

@@ -32,7 +32,7 @@ static const Kind *shape_at(size_t index) {
     static const Kind *const all[] = {&shape_round, &shape_square};
     return index < COUNT(all) ? all[index] : NULL;
 }
-static const KindTable shapes = {"shape", shape_at};
+static const KindTable shapes = {"shape", shape_at, false};
 
 static const char *const rules[] = {"zero_penetration", "zero_force", NULL};
 static const char *const channels[] = {"displacement", "velocity", "acceleration", NULL};

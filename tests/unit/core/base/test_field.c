@@ -53,7 +53,7 @@ static const Kind *shape_at(size_t index) {
     static const Kind *const all[] = {&shape_round, &shape_square};
     return index < COUNT(all) ? all[index] : NULL;
 }
-static const KindTable shapes = {"shape", shape_at};
+static const KindTable shapes = {"shape", shape_at, false};
 
 typedef struct Parts {
     Part *at;

@@ -135,6 +135,22 @@ static void the_digits_of_a_message_read_back(void **state) {
     assert_string_equal(text_real(text, 1e300), "1e+300");
 }
 
+static void a_list_has_commas_between_its_items_and_is_cut_where_it_ends(void **state) {
+    (void)state;
+    char list[20] = "";
+    text_list(list, sizeof list, "json");
+    assert_string_equal(list, "json");
+    text_list(list, sizeof list, "csv");
+    assert_string_equal(list, "json, csv");
+    text_list(list, sizeof list, "acceleration");
+    assert_string_equal(list, "json, csv, accel...");
+    text_list(list, sizeof list, "more");
+    assert_string_equal(list, "json, csv, accel...");
+    char small[8] = "json";
+    text_list(small, sizeof small, "csv");
+    assert_string_equal(small, "json, c");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_status_has_a_slug_and_a_title),
@@ -147,6 +163,7 @@ int main(void) {
         cmocka_unit_test(texts_are_cut_at_a_character),
         cmocka_unit_test(quoted_texts_stay_json_when_cut),
         cmocka_unit_test(the_digits_of_a_message_read_back),
+        cmocka_unit_test(a_list_has_commas_between_its_items_and_is_cut_where_it_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

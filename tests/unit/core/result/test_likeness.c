@@ -99,6 +99,30 @@ static void a_shift_is_found_to_a_part_of_a_sample(void **state) {
     free(x);
 }
 
+static void a_copy_behind_silence_is_found_at_its_sample(void **state) {
+    (void)state;
+    enum { SILENCE = 37, COUNT_X = 2001 };
+    double *x = calloc(COUNT_X, sizeof *x), *y = calloc(COUNT_X + SILENCE, sizeof *y), shift;
+    assert_true(x != NULL && y != NULL);
+    for (size_t i = 0; i < COUNT_X; i++) // begins with its largest value
+        y[i + SILENCE] = x[i] = exp(-0.002 * (double)i) * cos(0.025 * (double)i);
+    const Signal a = {x, COUNT_X, 1000, 0}, b = {y, COUNT_X + SILENCE, 1000, 0};
+    assert_int_equal(likeness_shift(&a, &b, 1, &shift, NULL), STATUS_OK);
+    assert_near(shift, -0.037, 1e-12);
+    free(x);
+    free(y);
+}
+
+static void nothing_is_more_alike_than_alike(void **state) {
+    (void)state;
+    for (size_t count = 2; count < 2000; count++) {
+        double *x = sampled(100, count, 0);
+        const Signal signal = {x, count, 100, 0};
+        assert_true(likeness_measure(&signal, &signal, 0.01).correlation <= 1);
+        free(x);
+    }
+}
+
 static void a_shift_stays_within_what_is_allowed(void **state) {
     (void)state;
     double *x = sampled(200, 2001, 0), *y = sampled(200, 1001, 1), shift;
@@ -120,6 +144,8 @@ int main(void) {
         cmocka_unit_test(numbers_are_those_of_the_definitions),
         cmocka_unit_test(what_does_not_overlap_has_nothing_in_common),
         cmocka_unit_test(a_shift_is_found_to_a_part_of_a_sample),
+        cmocka_unit_test(a_copy_behind_silence_is_found_at_its_sample),
+        cmocka_unit_test(nothing_is_more_alike_than_alike),
         cmocka_unit_test(a_shift_stays_within_what_is_allowed),
     };
     fourier_start();

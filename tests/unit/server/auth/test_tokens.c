@@ -28,7 +28,10 @@ static Status add(Store *store, const char *name, const char *scopes, int64_t ex
 
 static Status check(Tokens *tokens, const char *authorization, const char *scope,
                     char client[TOKEN_NAME_SIZE]) {
-    return tokens_check(tokens, authorization, scope, client, NULL);
+    Holder holder;
+    const Status status = tokens_check(tokens, authorization, scope, &holder, NULL);
+    memcpy(client, holder.name, sizeof holder.name);
+    return status;
 }
 
 static void pause_ms(long ms) {
@@ -89,8 +92,13 @@ static void a_token_opens_what_its_scopes_say(void **state) {
     assert_string_equal(client, "chief");
 
     Problem problem;
+    Holder holder;
     problem_clear(&problem);
-    assert_int_equal(tokens_check(tokens, reader, "admin", client, &problem), STATUS_FORBIDDEN);
+    assert_int_equal(tokens_check(tokens, chief, "read", &holder, NULL), STATUS_OK);
+    assert_true(holder.is_admin);
+    assert_int_equal(tokens_check(tokens, worker, "submit", &holder, NULL), STATUS_OK);
+    assert_false(holder.is_admin);
+    assert_int_equal(tokens_check(tokens, reader, "admin", &holder, &problem), STATUS_FORBIDDEN);
     assert_non_null(strstr(problem.detail, "\"admin\""));
     tokens_close(tokens);
     store_close(store);
@@ -214,7 +222,8 @@ static void an_expired_token_says_so(void **state) {
     assert_int_equal(tokens_open(store, false, &tokens, NULL), STATUS_OK);
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(tokens_check(tokens, old, "read", client, &problem), STATUS_UNAUTHORIZED);
+    assert_int_equal(tokens_check(tokens, old, "read", &(Holder){.name = ""}, &problem),
+                     STATUS_UNAUTHORIZED);
     assert_non_null(strstr(problem.detail, "expired"));
     assert_int_equal(check(tokens, fresh, "read", client), STATUS_OK);
     assert_int_equal(tokens_usable(tokens), 1);

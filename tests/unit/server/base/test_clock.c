@@ -19,6 +19,12 @@ static void dates_are_rfc_3339_in_utc(void **state) {
         {951782400123, "2000-02-29T00:00:00.123Z"},
         {1795251600000, "2026-11-21T09:00:00.000Z"},
         {-1, "1969-12-31T23:59:59.999Z"},
+        {4107542399999, "2100-02-28T23:59:59.999Z"},
+        {4107542400000, "2100-03-01T00:00:00.000Z"},
+        {13574649599999, "2400-02-29T23:59:59.999Z"},
+        {-62162035200001, ""},
+        {-62162035200000, "0000-03-01T00:00:00.000Z"},
+        {-62135596800000, "0001-01-01T00:00:00.000Z"},
         {253402300799999, "9999-12-31T23:59:59.999Z"},
         {253402300800000, ""},
         {INT64_MAX, ""},
@@ -39,7 +45,8 @@ static void clocks_go_forward_in_their_units(void **state) {
     while (clock_monotonic_ns() - started < 20000000)
         sum = sum + 1;
     assert_true(clock_thread_cpu_ns() > cpu);
-    assert_true(clock_unix_ms() - day >= 15 && clock_unix_ms() - day < 10000);
+    // The date may be set meanwhile, even back.
+    assert_true(clock_unix_ms() - day < 10000);
     assert_true(day > 1700000000000);
 }
 

@@ -44,6 +44,11 @@ static void numbers_are_written_as_people_would(void **state) {
         {10001, "10001"},
         {865, "865"},
         {1.35, "1.35"},
+        {-59.999, "-59.999"},
+        {12345678.9, "12345678.9"},
+        {-123456789.01234567, "-123456789.01234567"},
+        {-1234567890123456.5, "-1234567890123456.5"},
+        {300, "300"},
         {0.1 + 0.2, "0.30000000000000004"},
         {1e-5, "0.00001"},
         {1.25e-5, "0.0000125"},
@@ -62,6 +67,19 @@ static void numbers_are_written_as_people_would(void **state) {
     };
     for (size_t i = 0; i < COUNT(cases); i++)
         assert_string_equal(written(cases[i].value), cases[i].text);
+}
+
+static void a_list_is_its_numbers_with_commas_between(void **state) {
+    (void)state;
+    static const double values[] = {0.25, (double)NAN, -0.0, 1e-9, -(double)INFINITY, 60};
+    char text[COUNT(values) * (SHORTEST_SIZE + 1)];
+    size_t length = shortest_list(text, values, COUNT(values));
+    text[length] = '\0';
+    assert_string_equal(text, "0.25,null,-0.0,1e-9,null,60");
+    length = shortest_list(text, values, 1);
+    text[length] = '\0';
+    assert_string_equal(text, "0.25");
+    assert_int_equal(shortest_list(text, values, 0), 0);
 }
 
 // JSON's number: -?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?
@@ -144,6 +162,7 @@ static void powers_and_their_neighbours_read_back(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_written_as_people_would),
+        cmocka_unit_test(a_list_is_its_numbers_with_commas_between),
         cmocka_unit_test(any_bits_read_back_to_the_same_bits),
         cmocka_unit_test(powers_and_their_neighbours_read_back),
     };

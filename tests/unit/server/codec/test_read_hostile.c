@@ -275,12 +275,34 @@ static void check_time(const Bytes *text, Status expected, double seconds) {
 static void many_keys_take_little_time(void **state) {
     (void)state;
     Bytes text = {0};
-    bytes_text(&text, "{\"title\": \"\"");
-    for (int i = 0; i < 100000; i++)
-        bytes_format(&text, ", \"key_number_%d\": \"%d\"", i, i);
-    bytes_text(&text, "}");
+    // As many as one object may have, in many objects.
+    bytes_text(&text, "{\"dampers\": [");
+    for (int object = 0; object < 32; object++) {
+        bytes_text(&text, object > 0 ? ", {\"mass\": 1" : "{\"mass\": 1");
+        for (int i = 1; i < 4096; i++)
+            bytes_format(&text, ", \"key_number_%d\": \"%d\"", i, i);
+        bytes_text(&text, "}");
+    }
+    bytes_text(&text, "]}");
     check_time(&text, STATUS_INVALID, 1);
-    assert_int_equal(problem.count, 100000 + 3); // and structure, duration, sample_rate are missing
+    // Structure, duration, sample_rate and 32 clearances are missing.
+    assert_int_equal(problem.count, 32 * 4095 + 3 + 32);
+    bytes_clear(&text);
+}
+
+static void more_keys_than_any_object_has_are_refused_before_they_are_parsed(void **state) {
+    (void)state;
+    Bytes text = {0};
+    bytes_text(&text, "{\"structure\": {\"mass\": 1");
+    for (int i = 1; i < 4096; i++)
+        bytes_format(&text, ", \"%d\": 1", i);
+    bytes_text(&text, "}}");
+    assert_int_equal(survive(text.at, text.count), STATUS_INVALID);
+    text.count -= 2;
+    bytes_text(&text, ", \"4096\": 1}}");
+    assert_int_equal(survive(text.at, text.count), STATUS_UNREADABLE);
+    assert_string_equal(problem.faults[0].pointer, "/structure/4095");
+    assert_non_null(strstr(problem.faults[0].detail, "more than 4096 members in one object"));
     bytes_clear(&text);
 }
 
@@ -331,6 +353,7 @@ int main(void) {
         cmocka_unit_test(deep_duplicates_are_told_by_pointer),
         cmocka_unit_test(long_texts_are_cut_in_the_answer),
         cmocka_unit_test(many_keys_take_little_time),
+        cmocka_unit_test(more_keys_than_any_object_has_are_refused_before_they_are_parsed),
         cmocka_unit_test(many_containers_are_refused),
         cmocka_unit_test(many_wrong_elements_take_little_time),
         cmocka_unit_test(four_million_numbers_are_read),

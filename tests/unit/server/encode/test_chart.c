@@ -61,7 +61,7 @@ static void every_measured_point_has_a_mark_and_the_others_are_told(void **state
     assert_int_equal(count_of(text, "Not drawn: "), 2);
     assert_non_null(strstr(text, "Not drawn: rk4, step 1e-05 s, because: 1e9 steps &gt; 1e7."));
     assert_non_null(strstr(text, "because a &lt; b &amp; c"));
-    assert_int_equal(count_of(text, "class=\"ring\""), 2); // its own and the legend's
+    assert_int_equal(count_of(text, "class=\"strong ring\""), 2); // its own and the legend's
     assert_non_null(strstr(text, ">wanted: 0.001"));
     assert_non_null(strstr(text, "prefers-color-scheme: dark"));
     free(text);

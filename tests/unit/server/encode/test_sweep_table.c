@@ -54,6 +54,11 @@ static void rows_that_are_there_are_in_the_table_with_their_status(void **state)
     bytes_clear(&bytes);
 }
 
+static void draw(const Sweep *sweep, Bytes *bytes) {
+    const SweepSource source = sweep_source(sweep);
+    assert_true(chart_sweep(sweep, &source, bytes));
+}
+
 static size_t count_of(const char *text, const char *what) {
     size_t count = 0;
     while ((text = strstr(text, what)) != NULL) {
@@ -68,7 +73,7 @@ a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing(void
     (void)state;
     Sweep sweep = sweep_make();
     Bytes bytes = {0};
-    chart_sweep(&sweep, &bytes);
+    draw(&sweep, &bytes);
     assert_int_equal(count_of(bytes.at, "<rect class=\"bad\""), 2);
     // Two cells a map, and 24 of its legend.
     assert_int_equal(count_of(bytes.at, "<rect fill="), 2 * (2 + 24));
@@ -77,12 +82,12 @@ a_chart_has_a_map_or_a_line_for_each_metric_and_no_cell_for_what_is_missing(void
     sweep.mode = SWEEP_LIST;
     sweep.points = 2;
     sweep.table.points.count = sweep.table.statuses.count = 1;
-    chart_sweep(&sweep, &bytes);
-    assert_int_equal(count_of(bytes.at, "<path class=\"line\""), 2);
+    draw(&sweep, &bytes);
+    assert_int_equal(count_of(bytes.at, "<path class=\"line s0\""), 2);
     assert_null(strstr(bytes.at, "nan"));
     bytes_clear(&bytes);
     sweep.table = (SweepTable){.failed = 0};
-    chart_sweep(&sweep, &bytes);
+    draw(&sweep, &bytes);
     assert_non_null(strstr(bytes.at, "not known"));
     assert_string_equal(bytes.at + bytes.count - 7, "</svg>\n");
     bytes_clear(&bytes);

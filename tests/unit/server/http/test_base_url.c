@@ -16,6 +16,7 @@ static void urls_are_taken_apart(void **state) {
     } good[] = {
         {"http://a", "http://a", "a", ""},
         {"https://a.example.org/", "https://a.example.org", "a.example.org", ""},
+        {"https://a:65535", "https://a:65535", "a", ""},
         {"https://a:8443/sim", "https://a:8443/sim", "a", "/sim"},
         {"https://[::1]:80/sim/x_1~/", "https://[::1]:80/sim/x_1~", "[::1]", "/sim/x_1~"},
         {"https://a/v1x", "https://a/v1x", "a", "/v1x"},
@@ -42,6 +43,10 @@ static void what_is_no_base_url_is_refused_with_what_would_be(void **state) {
         "http://a/b#c",
         "http://a:b/",
         "http://a:/x",
+        "http://a:0/x",
+        "http://a:65536",
+        "http://a:99999/x",
+        "http://a:123456",
         "http://a b",
         "http://a/b c",
         "http://a/\"x\"",

@@ -400,7 +400,10 @@ static void a_database_of_another_program_is_refused_and_left_alone(void **state
     assert_non_null(strstr(problem.detail, "another program"));
     snprintf(command, sizeof command, "head -c 5000 /dev/urandom > %s/impactd.db", folder);
     assert_int_equal(system(command), 0);
-    assert_int_equal(store_open(folder, &store, NULL), STATUS_IO);
+    problem_clear(&problem);
+    assert_int_equal(store_open(folder, &store, &problem), STATUS_IO);
+    assert_non_null(strstr(problem.detail, "impactd.db is damaged"));
+    assert_non_null(strstr(problem.detail, "to begin anew"));
 }
 
 static void revisions_of_materials_never_change(void **state) {

@@ -77,7 +77,7 @@ static void a_chunk_comes_once_and_is_made_again_only_where_it_is_open(void **st
     assert_int_equal(store_sweep_reopen(store, "r-3", NULL), STATUS_CONFLICT);
     take(row.number, 0, 0, false, "zero");
     SweepChunkRows rows;
-    assert_int_equal(store_sweep_chunks(store, row.number, false, &rows, NULL), STATUS_OK);
+    assert_int_equal(store_sweep_chunks(store, row.number, &rows, NULL), STATUS_OK);
     assert_int_equal(rows.count, 2);
     assert_true(rows.at[0].chunk == 0 && rows.at[1].chunk == 2);
     assert_null(rows.at[0].rows.at);
@@ -85,6 +85,32 @@ static void a_chunk_comes_once_and_is_made_again_only_where_it_is_open(void **st
     sweep_row_clear(&row);
     assert_int_equal(store_sweep_load(store, "r-3", &row, NULL), STATUS_OK);
     assert_int_equal(row.retries, 1);
+    sweep_row_clear(&row);
+}
+
+static void parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was(void **state) {
+    (void)state;
+    SweepRow row = begun("r-6", 4);
+    take(row.number, 0, 0, false, "abcdefgh");
+    take(row.number, 2, 1, false, "ABCDE");
+    SweepChunkRows chunks;
+    unsigned char part[6];
+    assert_int_equal(store_sweep_chunks(store, row.number, &chunks, NULL), STATUS_OK);
+    memset(part, '-', sizeof part);
+    assert_int_equal(store_sweep_read(store, &row, &chunks, 3, 3, part, NULL), STATUS_OK);
+    assert_memory_equal(part, "defDE-", sizeof part); // the second one ends there
+    assert_int_equal(store_sweep_read(store, &row, &chunks, 9, 3, part, NULL), STATUS_OK);
+    assert_memory_equal(part, "defDE-", sizeof part);
+    take(row.number, 1, 0, false, "another");
+    assert_int_equal(store_sweep_read(store, &row, &chunks, 0, 3, part, NULL), STATUS_OK);
+    assert_int_equal(store_sweep_reopen(store, "r-6", NULL), STATUS_OK);
+    assert_int_equal(store_sweep_read(store, &row, &chunks, 0, 3, part, NULL), STATUS_CONFLICT);
+    sweep_chunk_rows_clear(&chunks);
+    assert_int_equal(store_sweep_chunks(store, row.number, &chunks, NULL), STATUS_OK);
+    assert_int_equal(chunks.count, 3);
+    assert_int_equal(store_sweep_tidy(store, NULL), STATUS_OK);
+    assert_int_equal(store_sweep_read(store, &row, &chunks, 0, 2, part, NULL), STATUS_CONFLICT);
+    sweep_chunk_rows_clear(&chunks);
     sweep_row_clear(&row);
 }
 
@@ -116,6 +142,8 @@ int main(void) {
                                         close_store),
         cmocka_unit_test_setup_teardown(a_chunk_comes_once_and_is_made_again_only_where_it_is_open,
                                         open_store, close_store),
+        cmocka_unit_test_setup_teardown(
+            parts_of_chunks_are_read_until_one_of_them_is_not_what_it_was, open_store, close_store),
         cmocka_unit_test_setup_teardown(what_nobody_waits_for_is_tidied_away_with_its_chunks,
                                         open_store, close_store),
     };
