@@ -56,9 +56,9 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
     bytes_text(bytes, ",\n\"series\": ");
     TRY(series_write(&outcome->response, encoder_find("json"), bytes, problem));
     bytes_text(bytes, ",\n\"impacts\": ");
-    document_impacts(bytes, &outcome->response);
+    (void)document_impacts(bytes, &outcome->response, NULL);
     bytes_text(bytes, ",\n\"psd\": ");
-    document_psd(bytes, &outcome->spectrum);
+    (void)document_psd(bytes, &outcome->spectrum, NULL);
     bytes_text(bytes, "}\n");
     return STATUS_OK;
 }

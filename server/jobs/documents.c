@@ -48,49 +48,67 @@ void document_energy(Bytes *bytes, const Energy *energy) {
     bytes_text(bytes, "}");
 }
 
-void document_impacts(Bytes *bytes, const Response *response) {
+enum { WATCH_IMPACTS = 1 << 12, WATCH_VALUES = 1 << 16 }; // written between two looks at the watch
+
+bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch) {
     const Impacts *impacts = &response->impacts;
     if (response->is_unlisted) {
         bytes_text(bytes, "null");
-        return;
+        return true;
     }
-    bytes_format(bytes, "{\"count\": %llu, \"resting\": %llu, \"impacts\": ",
+    bytes_format(bytes, "{\"count\": %llu, \"resting\": %llu, \"impacts\": [",
                  (unsigned long long)response->impact_count,
                  (unsigned long long)response->resting_count);
-    write_list(bytes, impact_fields, impacts->at, impacts->count, sizeof *impacts->at,
-               WRITE_REPORT);
-    bytes_text(bytes, "}");
+    for (size_t i = 0; i < impacts->count; i++) {
+        if (i % WATCH_IMPACTS == 0 && !watch_advance(watch, 1))
+            return false;
+        bytes_text(bytes, i > 0 ? ", " : "");
+        write_item(bytes, impact_fields, &impacts->at[i], WRITE_REPORT);
+    }
+    bytes_text(bytes, "]}");
+    return true;
 }
 
-static void put_values(Bytes *bytes, const char *unit, const double *values, size_t count) {
+static bool put_values(Bytes *bytes, const char *unit, const double *values, size_t count,
+                       const Watch *watch) {
     bytes_text(bytes, "{\"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_text(bytes, ", \"values\": [");
-    bytes_reals(bytes, values, count);
+    for (size_t i = 0; i < count; i += WATCH_VALUES) {
+        if (!watch_advance(watch, 1))
+            return false;
+        bytes_text(bytes, i > 0 ? "," : "");
+        bytes_reals(bytes, values + i, count - i < WATCH_VALUES ? count - i : WATCH_VALUES);
+    }
     bytes_text(bytes, "]}");
+    return true;
 }
 
-void document_psd(Bytes *bytes, const Spectrum *spectrum) {
+bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Watch *watch) {
     const SpectrumSettings *settings = &spectrum->settings;
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0) {
         bytes_text(bytes, "null");
-        return;
+        return true;
     }
     bytes_format(bytes,
                  "{\"method\": \"welch\", \"segment\": %zu, \"overlap\": %zu, \"window\": \"%s\", ",
                  settings->segment, settings->overlap, spectrum_window_names[settings->window]);
     bytes_format(bytes, "\"detrend\": \"%s\", \"segments\": %zu, \"frequency\": ",
                  spectrum_detrend_names[settings->detrend], spectrum->segments);
-    put_values(bytes, "Hz", spectrum->frequency, densities->rows);
+    if (!put_values(bytes, "Hz", spectrum->frequency, densities->rows, watch))
+        return false;
     bytes_text(bytes, ", \"channels\": {");
     for (size_t i = 0; i < densities->count; i++) {
         bytes_text(bytes, i > 0 ? ", " : "");
         bytes_json_string(bytes, densities->at[i].name);
         bytes_text(bytes, ": ");
-        put_values(bytes, densities->at[i].unit, densities->at[i].values, densities->rows);
+        if (!put_values(bytes, densities->at[i].unit, densities->at[i].values, densities->rows,
+                        watch))
+            return false;
     }
     bytes_text(bytes, "}}");
+    return true;
 }
 
 void document_scene(Bytes *bytes, const Inquiry *inquiry) {

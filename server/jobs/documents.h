@@ -4,6 +4,7 @@
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 
+#include "core/base/watch.h"
 #include "core/study/inquiry.h"
 #include "server/base/bytes.h"
 
@@ -14,10 +15,11 @@ void document_warnings(Bytes *bytes, const Warnings *warnings);
 // Two such arrays as one; NULL is an empty one.
 void document_join(Bytes *bytes, const char *first, const char *second);
 void document_energy(Bytes *bytes, const Energy *energy);
+// These two may be long: where the watch says so they are left unfinished, and it is false.
 // Where the scene asked for none: null.
-void document_impacts(Bytes *bytes, const Response *response);
+bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch);
 // Without any density: null.
-void document_psd(Bytes *bytes, const Spectrum *spectrum);
+bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Watch *watch);
 // The scene as it can be submitted again, with its study, without its notes.
 void document_scene(Bytes *bytes, const Inquiry *inquiry);
 // A study's answer, as it is kept: what is unknown is left out, so that it can be read again.

@@ -273,15 +273,9 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
         study_finish(worker, run, problem);
 }
 
-static bool is_wanted(void *context, double fraction) {
-    const Computation *computation = context;
-    (void)fraction;
-    return !atomic_load(&computation->is_stopped);
-}
-
 // What remains to be told, and the study's document.
 static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
-    const Watch watch = {run->computation, is_wanted};
+    const Watch watch = {run->computation, computation_is_wanted};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .watch = &watch,
                               .workspace = &worker->workspace};
@@ -304,10 +298,7 @@ void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
     }
     run->findings.ended_ns = clock_monotonic_ns();
     if (atomic_load(&computation->is_stopped)) {
-        const bool is_kept = run->gather->is_kept;
         computation_abandon(intake, computation); // and the run
-        if (is_kept)
-            (void)store_sweep_tidy(intake->store, NULL);
     } else {
         Findings findings = run->findings;
         run->findings = (Findings){0};

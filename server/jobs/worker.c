@@ -10,6 +10,7 @@
 #include "server/base/clock.h"
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
+#include "server/jobs/gather.h"
 #include "server/jobs/study.h"
 
 // A computation's run, or the study after it, as a part of the whole.
@@ -24,6 +25,12 @@ static bool advance(void *context, double fraction) {
     atomic_store(&part->computation->progress,
                  (unsigned)((part->from + share * part->share) * 10000));
     return !atomic_load(&part->computation->is_stopped);
+}
+
+bool computation_is_wanted(void *context, double fraction) {
+    const Computation *computation = context;
+    (void)fraction;
+    return !atomic_load(&computation->is_stopped);
 }
 
 void findings_clear(Findings *findings) {
@@ -44,7 +51,8 @@ static char *take(Bytes *bytes, Status *status) {
     return text;
 }
 
-static Status describe(const Computation *computation, Findings *findings) {
+static Status describe(Computation *computation, Findings *findings) {
+    const Watch watch = {computation, computation_is_wanted};
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
     Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0};
@@ -55,9 +63,9 @@ static Status describe(const Computation *computation, Findings *findings) {
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);
-    document_impacts(&impacts, &outcome->response);
-    if (outcome->spectrum.densities.count > 0)
-        document_psd(&psd, &outcome->spectrum);
+    if (!document_impacts(&impacts, &outcome->response, &watch) ||
+        (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
+        status = STATUS_CANCELLED;
     text_fit(row->id, sizeof row->id, computation->result);
     row->engine = strdup(engine_version);
     row->scene = strdup(computation->scene);
@@ -152,6 +160,7 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
 
 // Nobody waits for it any more, or the daemon ends and its jobs stay unfinished in the store.
 void computation_abandon(Intake *intake, Computation *computation) {
+    const bool has_rows = computation->study != NULL && computation->study->gather->is_kept;
     pthread_mutex_lock(&intake->lock);
     index_remove(intake->in_flight, &computation->indexed);
     while (computation->jobs != NULL) {
@@ -165,7 +174,9 @@ void computation_abandon(Intake *intake, Computation *computation) {
     }
     wakers_call(&computation->askers);
     pthread_mutex_unlock(&intake->lock);
-    computation_free(computation);
+    computation_free(computation); // and its study
+    if (has_rows)
+        (void)store_sweep_tidy(intake->store, NULL);
 }
 
 void computation_finish(Intake *intake, Computation *computation, Findings *findings) {
