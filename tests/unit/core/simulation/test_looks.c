@@ -30,11 +30,11 @@ static double stopped_at(double displacement, const char *channel, int most) {
     scene_start(&simulation, displacement, 0);
     simulation.scene.duration = 4194;
     simulation.scene.sample_rate = 1000;
-    Texts *channels = &simulation.output.channels;
-    for (size_t i = 0; i < channels->count; i++)
-        free(channels->at[i]);
-    free(channels->at);
-    *channels = texts_of(1, &channel);
+    Texts *wanted = &simulation.output.channels;
+    for (size_t i = 0; i < wanted->count; i++)
+        free(wanted->at[i]);
+    free(wanted->at);
+    *wanted = texts_of(1, &channel);
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     Outcome *outcome = NULL;
     Looks looks = {.most = most};
