@@ -532,6 +532,20 @@ def test_bodies_over_the_limit():
             connection.close()
 
 
+def test_a_refusal_is_seen_by_who_sends_much():
+    """What is refused by its head alone is answered once the body is through, and the connection stays open."""
+    with program.daemon() as daemon:
+        body = b" " * 10_000_000
+        connection = http.client.HTTPConnection("127.0.0.1", daemon.port)
+        for method, target, expected in (("POST", "/v1/none", 404), ("PUT", "/v1/jobs", 405), ("POST", "/v1/jobs?q=%zz", 400)) * 3:
+            connection.request(method, target, body=body, headers=JSON_TYPE)
+            reply = connection.getresponse()
+            assert reply.status == expected and json.loads(reply.read())["status"] == expected, (method, target, reply.status)
+        connection.request("GET", "/version")
+        assert connection.getresponse().status == 200
+        connection.close()
+
+
 def test_all_json_files_as_bodies():
     """The 318 files of the JSON parsing suite: refused as they should be, never a crash."""
     with program.daemon("--max-body", "200000") as daemon:
