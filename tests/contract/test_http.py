@@ -482,6 +482,11 @@ def test_bad_bodies():
         for kind in ("text/plain", "application/x-www-form-urlencoded", "application/jsonx", ""):
             reply = daemon.request("POST", "/v1/jobs", body=text, headers={"Content-Type": kind})
             assert "--json" in problem(reply, 415)["detail"], reply
+        for encoding, sent, status in (("gzip", gzip.compress(text.encode()), 415), ("br", text, 415), ("identity, gzip", text, 415),
+                                       ("Identity", text, 200), ("", text, 200)):
+            reply = daemon.request("POST", "/v1/jobs", body=sent, headers={**JSON_TYPE, "Content-Encoding": encoding})
+            assert reply.status == status, (encoding, reply)
+            assert status == 200 or f"without Content-Encoding, is encoded as {encoding}" in problem(reply, 415)["detail"], reply
         assert daemon.submit(sponge()).json()["status"] == "successful"
 
 
