@@ -69,6 +69,9 @@ Status read_json(const char *text, size_t size, const Field *fields, void *item,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
     if (size == 0)
         text = ""; // may be NULL
+    const size_t mark = scan_mark(text, size);
+    text += mark;
+    size -= mark;
     size_t position;
     const char *sentence;
     if (!scan_allows(text, size, &position, &sentence))

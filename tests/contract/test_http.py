@@ -475,8 +475,9 @@ def test_bad_bodies():
         text = json.dumps(sponge())
         for body in ("", " ", "{", "nul", text + "x", text[:-1], text.replace("10", "NaN"), text.replace("10", "Infinity"),
                      text.replace("{", '{"duration": 1, "duration": 2, ', 1), "[" * 33 + "]" * 33, "[" * 100000,
-                     b"\xff\xfe", b"\xef\xbb\xbf" + text.encode(), b'{"a\x00": 1}', b'{"title": "\xed\xa0\x80"}'):
+                     b"\xff\xfe", b"\xef\xbb\xbf", 2 * b"\xef\xbb\xbf" + text.encode(), b'{"a\x00": 1}', b'{"title": "\xed\xa0\x80"}'):
             problem(daemon.request("POST", "/v1/jobs", body=body, headers=JSON_TYPE), 400)
+        assert daemon.request("POST", "/v1/jobs", body=b"\xef\xbb\xbf" + text.encode(), headers=JSON_TYPE).status == 200
         assert daemon.request("POST", "/v1/jobs", body=text,
                               headers={"Content-Type": "Application/JSON; charset=utf-8"}).status == 200
         for kind in ("text/plain", "application/x-www-form-urlencoded", "application/jsonx", ""):

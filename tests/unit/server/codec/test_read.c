@@ -288,6 +288,18 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
                      STATUS_UNREADABLE);
 }
 
+static void a_byte_order_mark_at_the_beginning_is_passed_over(void **state) {
+    (void)state;
+    check_fault("\xEF\xBB\xBF{\"mass\": \"x\"}", "/mass", "\"x\"",
+                "must be a number [kg], is a string");
+    check_unreadable("\xEF\xBB\xBF{\n  \"mass\": 1,}", "",
+                     "line 2, column 13: string or '}' expected");
+    check_unreadable("\xEF\xBB\xBF{\"mass\": 1,}", "", "line 1, column 12: string or '}' expected");
+    check_unreadable("\xEF\xBB\xBF", "", "line 1, column 1: ");
+    check_unreadable("\xEF\xBB\xBF\xEF\xBB\xBF{}", "", "line 1, column ");
+    check_unreadable(" \xEF\xBB\xBF{}", "", "line 1, column ");
+}
+
 static void the_problem_may_be_null(void **state) {
     (void)state;
     const char *text = "{\"mass\": \"x\", \"y\": 1}";
@@ -311,6 +323,7 @@ int main(void) {
         TEST(too_long_is_a_fault),
         TEST(all_faults_are_told_at_once),
         TEST(what_is_not_json_has_line_column_and_pointer),
+        TEST(a_byte_order_mark_at_the_beginning_is_passed_over),
         TEST(the_problem_may_be_null),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
