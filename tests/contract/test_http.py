@@ -458,7 +458,7 @@ def test_bad_bodies():
         ({**random, "excitation": {**random["excitation"], "band": [1, 501]}}, None),
         (damped(buffer="wood", mass=-1), ["/dampers/0/buffer", "/dampers/0/mass"]),
         ({**sine, "excitation": {"kind": "sine"}}, None),
-        ([], None), ("text", None), (17, None), (None, None),
+        ([], [""]), ([sponge()], [""]), ("text", [""]), (17, [""]), (None, [""]),
         ({}, ["/structure", "/duration", "/sample_rate"]),
     ]
     with program.daemon() as daemon:
