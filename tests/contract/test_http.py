@@ -327,6 +327,11 @@ def test_links_lead_somewhere():
             assert ("force" in links) == (left_out != "impacts"), links
             for name, link in links.items():
                 assert daemon.get(link.replace("{number}", "1")).status == 200, (name, link)
+        for change in ({"contact": {"model": "impulse"}}, {"dampers": []},
+                       {"dampers": [{**sponge()["dampers"][0], "buffer": {"restitution": 0.6}}]}):
+            result = program.finished(daemon, sponge(**change))["result"]
+            links = daemon.get(f"/v1/results/{result}").json()["links"]
+            assert "impacts" in links and "force" not in links, (change, links)
 
 
 def test_parts_of_binary_formats():
