@@ -212,6 +212,10 @@ static Status file_read(const Reader *reader, const char *path) {
         const Field *row = row_find(reader->fields, name, strlen(name));
         if (row == NULL)
             (void)unknown_put(reader, typed, name, false);
+        else if (strcmp(name, "config") == 0)
+            (void)problem_add(reader->problem, STATUS_USAGE, typed,
+                              "config names a file of settings and cannot stand in one; give it as "
+                              "a flag or in the environment");
         else
             (void)option_set(reader, row, typed, trimmed(equals + 1), OPTION_FILE);
     }
