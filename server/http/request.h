@@ -105,7 +105,7 @@ typedef struct Reply {
     char location[192]; // "" for none; of our own pages without the base path, dispatch puts it
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[1024];          // likewise
+    char link[2048];          // likewise
     const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];
     char allow[64];
