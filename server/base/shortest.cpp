@@ -28,8 +28,11 @@ struct Tens {
 };
 constexpr Tens tens;
 
-// Of a number that is not 0: bits times log10(2) is right or one too many.
+// Of a number that is not 0. Nearly all have fifteen to seventeen; else bits times log10(2) is
+// right or one too many.
 int digit_count(std::uint64_t value) {
+    if (value >= tens.at[14])
+        return 15 + (value >= tens.at[15]) + (value >= tens.at[16]);
     const int guess = (64 - __builtin_clzll(value)) * 1233 >> 12;
     return guess + (value >= tens.at[guess] ? 1 : 0);
 }

@@ -197,6 +197,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         status = store_sweep_tidy(store, problem);
     if (status == STATUS_OK)
         status = take_up_all(intake, problem);
+    pthread_mutex_lock(&intake->lock); // those that run already look at the others
     while (status == STATUS_OK && intake->worker_count < settings->workers + 1) {
         Worker *worker = &intake->workers[intake->worker_count];
         worker->intake = intake;
@@ -207,6 +208,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         else
             intake->worker_count++;
     }
+    pthread_mutex_unlock(&intake->lock);
     if (status != STATUS_OK) {
         intake_close(intake);
         return status;

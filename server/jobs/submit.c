@@ -145,10 +145,9 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     pthread_mutex_lock(&intake->lock);
     Computation *other = find_shared(intake, job->row.result);
-    // Where others wait it mostly has run before anyone must be told that it was accepted, and is
-    // then written once. But a sweep's rows need their job beside them.
-    const bool may_wait = job->row.study == NULL && queue_count(intake->queue) > 0;
-    const StoreTurn turn = may_wait ? STORE_LATER : STORE_NOW;
+    // It mostly has run before anyone must be told that it was accepted, and is then written once.
+    // But a sweep's rows need their job beside them.
+    const StoreTurn turn = job->row.study == NULL ? STORE_LATER : STORE_NOW;
     // It may have become known meanwhile.
     if (other == NULL && !is_retry &&
         (job->head = cache_head(intake->cache, job->row.result)) != NULL) {

@@ -185,7 +185,9 @@ static StoreTicket *take(Writer *writer) {
     Line *line = &writer->lines[STORE_NOW];
     const int64_t now_ns = writer->is_stopping ? INT64_MAX : clock_monotonic_ns();
     call_up(writer, STORE_LATER, now_ns);
-    call_up(writer, STORE_SOON, line->first != NULL ? INT64_MAX : now_ns);
+    call_up(writer, STORE_SOON, now_ns);
+    if (line->first != NULL)
+        call_up(writer, STORE_SOON, INT64_MAX);
     StoreTicket *write = line->first != NULL ? line->first : writer->lines[STORE_LOW].first;
     if (line->first == NULL && write != NULL)
         leave(write);

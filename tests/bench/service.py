@@ -255,24 +255,28 @@ def drip(daemon, count=500):
     print(f"{count} dripping clients: a good client's p99 is {statistics.median(ratios):.2f} times its quiet p99", flush=True)
 
 
+# Ready texts: what the client computes is missing to the server.
 COUNTED = """
-local template = [==[{template}]==]
+local before, behind = "{head}" .. [==[{before}]==], [==[{behind}]==]
 local number = {first}
-wrk.method = "POST"
-wrk.headers["Content-Type"] = "application/json"
 request = function()
     number = number + 1
-    return wrk.format(nil, nil, nil, (string.gsub(template, "424242", tostring(number))))
+    return before .. number .. behind
 end
 """
 
 
-numbers = itertools.count(int(time.time()) % 100000 * 1000, 10000000)
+numbers = itertools.count(1000000000 + int(time.time()) % 100000 * 1000, 10000000)
 
 
 def counted(folder, scene):
     """A script that sends the scene with another number in the place of 424242 each time."""
-    return script(folder, "counted.lua", COUNTED.format(template=json.dumps(scene), first=next(numbers)))
+    first = next(numbers)
+    before, behind = json.dumps(scene).split("424242")
+    size = len(before) + len(str(first)) + len(behind)
+    head = (f"POST /v1/jobs HTTP/1.1\\r\\nHost: localhost\\r\\nAuthorization: Bearer {TOKEN}\\r\\n"
+            f"Content-Type: application/json\\r\\nContent-Length: {size}\\r\\n\\r\\n")
+    return script(folder, "counted.lua", COUNTED.format(head=head, before=before, behind=behind, first=first))
 
 
 def core_rate(build, scene):

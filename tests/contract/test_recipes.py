@@ -97,6 +97,8 @@ def test_lines():
     with program.daemon("--max-cpu-seconds", "1000") as daemon, tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "motion.AT2"), "w", encoding="utf-8") as file:
             file.write("A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n")
+        with open(os.path.join(folder, "measured.csv"), "w", encoding="utf-8") as file:
+            file.write("time [s],acceleration [m/s^2]\n" + "".join(f"{0.001 * i:.3f},{0.1 * (i % 7)}\n" for i in range(40)))
         endless = program.scene("paper_sine_aluminium")
         endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
         one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
