@@ -136,7 +136,7 @@ def test_the_journal_has_a_line_per_request_and_no_secrets():
 
 def test_a_journal_that_nobody_reads_holds_up_nobody():
     """Standard error is a full pipe: requests are answered, SIGTERM ends the daemon; once it is read, what was lost is told."""
-    with program.full_pipe() as (taken, full), program.daemon("--journal", "all", errors=full) as daemon:
+    with program.full_pipe() as (taken, full), Daemon(program.build, "--journal", "all", errors=full) as daemon:
         for _ in range(20):
             assert daemon.get("/version").status == 200
         os.set_blocking(taken, False)
