@@ -109,6 +109,7 @@ void problem_clear(Problem *problem) {
     problem->status = STATUS_OK;
     problem->detail[0] = '\0';
     problem->count = 0;
+    problem->whose = NULL;
 }
 
 Status problem_set(Problem *problem, Status status, const char *format, ...) {

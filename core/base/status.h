@@ -58,9 +58,10 @@ typedef struct Fault {
 
 // All zero is "no problem". Only the first `count` faults (at most PROBLEM_FAULTS) are set.
 typedef struct Problem {
-    Status status;    // the first one's
-    char detail[512]; // the first one's sentence, after its place
-    size_t count;     // faults met, also those beyond PROBLEM_FAULTS
+    Status status;     // the first one's
+    char detail[512];  // the first one's sentence, after its place
+    size_t count;      // faults met, also those beyond PROBLEM_FAULTS
+    const char *whose; // has the faults, a static text; NULL: the scene
     Fault faults[PROBLEM_FAULTS];
 } Problem;
 

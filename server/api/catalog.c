@@ -152,8 +152,9 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
     intake_tally(app->intake, &tally);
     if (tally.queued + tally.running >= tally.queue_most)
-        return problem_set(problem, STATUS_BUSY, "the queue is full: %zu jobs unfinished",
-                           tally.queue_most);
+        return problem_set(problem, STATUS_BUSY,
+                           "the queue is full: of unfinished jobs it has %zu, and may have %zu",
+                           tally.queued + tally.running, tally.queue_most);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes,
                  "{\"status\": \"ready\", \"queued\": %zu, \"running\": %zu, \"workers\": %zu, "

@@ -28,9 +28,13 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
             used + sizeof column->name + 2 < sizeof there)
             text_list(there, sizeof there, column->name);
     }
-    return problem_add(problem, STATUS_INVALID, "/channel",
-                       "must be a sampled channel in %s; the result has: %s",
-                       quantity_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
+    Fault fault = {.pointer = "/channel"};
+    if (asked->channel != NULL)
+        text_quote(fault.value, sizeof fault.value, asked->channel);
+    snprintf(fault.detail, sizeof fault.detail,
+             "must be a sampled channel in %s; the result has: %s",
+             quantity_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
+    return problem_put(problem, STATUS_INVALID, &fault);
 }
 
 static Status choose_channel(const MeasuredRequest *asked, const Response *response,
@@ -119,6 +123,7 @@ Status compare_measured(App *app, const Request *request, Reply *reply, Problem 
     bool is_waiting = false;
     Status status = STATUS_OK;
     MeasuredRequest *asked = sides.asked;
+    problem->whose = "comparison";
     if (asked == NULL)
         status = measured_read(request, &asked, problem);
     sides.asked = asked;

@@ -13,7 +13,7 @@
 #include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
 
-enum { LIST_INITIAL = 20, LIST_MOST = 100, TEXT_MOST = 100 };
+enum { LIST_INITIAL = 20, LIST_MOST = 100, TEXT_MOST = 200 };
 
 // Unfinished jobs whose state is asked for are looked at one by one, this many at a time.
 enum { LOOKED_AT = 256 };

@@ -12,6 +12,7 @@
 #include "server/base/digest.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
+#include "server/codec/report.h"
 #include "server/codec/write.h"
 #include "server/encode/answer.h"
 #include "server/http/doorman.h"
@@ -89,6 +90,26 @@ static void write_ways(Bytes *bytes, const char *id, const char *part, const cha
                      link_base(), id, part, (int)size, formats);
 }
 
+// Under impulses an impact takes no time, and where there is none there is nothing to look at.
+static bool has_force(const ResultRow *row) {
+    static const Field model_fields[] = {
+        FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "as planned"), FIELD_END};
+    PlanReport plan;
+    Summary summary;
+    if (row->plan == NULL || row->summary == NULL ||
+        results_document(row, DOCUMENT_IMPACTS) == NULL)
+        return false;
+    const bool is_read =
+        report_read(row->plan, strlen(row->plan), model_fields, &plan, NULL) == STATUS_OK;
+    const bool is_impulse =
+        is_read && plan.contact_model != NULL && strcmp(plan.contact_model, "impulse") == 0;
+    fields_clear(model_fields, &plan);
+    return is_read && !is_impulse &&
+           report_read(row->summary, strlen(row->summary), summary_fields, &summary, NULL) ==
+               STATUS_OK &&
+           summary.impacts > 0;
+}
+
 static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *answer) {
     const char *id = row->id;
     bytes_format(bytes,
@@ -97,12 +118,12 @@ static void write_links(Bytes *bytes, const ResultRow *row, const StudyAnswer *a
     write_ways(bytes, id, "series", "csv npy npz mat");
     if (results_document(row, DOCUMENT_PSD) != NULL)
         write_ways(bytes, id, "psd", "csv npy npz mat");
-    if (results_document(row, DOCUMENT_IMPACTS) != NULL) {
+    if (results_document(row, DOCUMENT_IMPACTS) != NULL)
         write_ways(bytes, id, "impacts", "csv npy npz mat");
-        // A template (RFC 6570): the impact's place in the ledger, from 1.
+    // A template (RFC 6570): the impact's place in the ledger, from 1.
+    if (has_force(row))
         bytes_format(bytes, ", \"force\": \"%s/v1/results/%s/impacts/{number}/force.json\"",
                      link_base(), id);
-    }
     write_ways(bytes, id, "energy", "csv npy npz mat");
     bytes_format(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", link_base(), id);
     if (answer->study != NULL) {

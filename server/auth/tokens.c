@@ -68,6 +68,16 @@ static bool scopes_read(const char *text, unsigned *scopes) {
     return *scopes != 0;
 }
 
+// Each once, in the order of their names.
+static void scopes_write(unsigned scopes, char *target, size_t size) {
+    target[0] = '\0';
+    for (size_t i = 0; scope_names[i] != NULL; i++)
+        if ((scopes & 1u << i) != 0) {
+            const size_t used = strlen(target);
+            snprintf(target + used, size - used, "%s%s", used > 0 ? "," : "", scope_names[i]);
+        }
+}
+
 static unsigned scope_bit(const char *scope) {
     unsigned i = 0;
     while (scope_names[i] != NULL && strcmp(scope_names[i], scope) != 0)
@@ -341,8 +351,8 @@ Status tokens_check(Tokens *tokens, const char *authorization, const char *scope
 Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
                   char token[TOKEN_SIZE], Problem *problem) {
     unsigned char secret[DIGEST_BYTES], digest[DIGEST_BYTES];
-    unsigned ignored;
-    if (strlen(scopes) >= sizeof row->scopes || !scopes_read(scopes, &ignored))
+    unsigned asked;
+    if (!scopes_read(scopes, &asked))
         return problem_set(problem, STATUS_USAGE,
                            "the scopes must be one or more of read, submit, materials and admin, "
                            "with commas between, are \"%.60s\"",
@@ -354,7 +364,7 @@ Status token_make(const char *scopes, int64_t expires_unix_ms, TokenRow *row,
     snprintf(token, TOKEN_SIZE, "impactd_%s", digits);
     digest_sum(token, strlen(token), digest);
     digest_spell(digest, row->digest);
-    snprintf(row->scopes, sizeof row->scopes, "%s", scopes);
+    scopes_write(asked, row->scopes, sizeof row->scopes);
     row->created_unix_ms = clock_unix_ms();
     row->expires_unix_ms = expires_unix_ms;
     row->used_unix_ms = row->revoked_unix_ms = 0;

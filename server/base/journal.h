@@ -1,6 +1,6 @@
 // One line on standard error for what an operator should know. Texts of others come in escaped, so
-// that nobody writes a line of their own. Not counters (tally.h). Used by http/dispatch.c and
-// command/serve.c.
+// that nobody writes a line of their own. Not counters (tally.h). Used by http/doorman.c, jobs/
+// and command/serve.c.
 #ifndef SERVER_BASE_JOURNAL_H
 #define SERVER_BASE_JOURNAL_H
 

@@ -69,22 +69,24 @@ Status read_json(const char *text, size_t size, const Field *fields, void *item,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
     if (size == 0)
         text = ""; // may be NULL
+    const size_t mark = scan_mark(text, size);
+    text += mark;
+    size -= mark;
     size_t position;
     const char *sentence;
     if (!scan_allows(text, size, &position, &sentence))
         return unreadable(problem, text, size, position, sentence);
     json_error_t error;
-    json_t *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &error);
+    json_t *root = json_loadb(text, size, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &error);
     if (root == NULL)
         return refuse_parse(problem, text, size, &error);
     Reader reader = {.problem = problem};
     if (json_is_object(root))
         walk_object(&reader, root, fields, item, "");
     else
-        unreadable(problem, text, size, 0, "the document must be an object, is an array");
-    const bool is_object = json_is_object(root);
+        refuse_type(&reader, "", root, NULL, "an object");
     json_decref(root);
     if (reader.is_out_of_memory)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory to read the document");
-    return !is_object ? STATUS_UNREADABLE : reader.is_faulty ? STATUS_INVALID : STATUS_OK;
+    return reader.is_faulty ? STATUS_INVALID : STATUS_OK;
 }

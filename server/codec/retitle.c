@@ -32,9 +32,14 @@ Status retitle(Bytes *text, const char *title, const Texts *labels, Problem *pro
                                labels->at[i]);
     if (title == NULL && labels->count == 0)
         return STATUS_OK;
-    if (text->count == 0 || !scan_allows(text->at, text->count, &position, &sentence))
+    if (text->count == 0)
         return STATUS_OK;
-    json_t *root = json_loadb(text->at, text->count, JSON_REJECT_DUPLICATES, NULL);
+    const size_t mark = scan_mark(text->at, text->count);
+    const char *json = text->at + mark;
+    const size_t size = text->count - mark;
+    if (!scan_allows(json, size, &position, &sentence))
+        return STATUS_OK;
+    json_t *root = json_loadb(json, size, JSON_REJECT_DUPLICATES, NULL);
     const json_t *given = json_object_get(root, "labels");
     if (!json_is_object(root) ||
         (given != NULL && !json_is_object(given) && !json_is_array(given))) {

@@ -91,6 +91,13 @@ static void step(Scan *scan, size_t stop) {
     scan->at++;
 }
 
+// RFC 8259, section 8.1: it may be ignored. Some editors and shells write one.
+size_t scan_mark(const char *text, size_t size) {
+    static const char mark[] = "\xEF\xBB\xBF";
+    const size_t mark_size = sizeof mark - 1;
+    return size >= mark_size && memcmp(text, mark, mark_size) == 0 ? mark_size : 0;
+}
+
 bool scan_allows(const char *text, size_t size, size_t *position, const char **sentence) {
     const char *nul = memchr(text, '\0', size);
     if (nul != NULL) {

@@ -1,6 +1,6 @@
 // One pass over JSON text without reading it: how deep it nests, and which member a byte belongs
 // to. Not a parser: it takes any bytes, and is right up to the first byte that is not JSON. Memory
-// is bounded by READ_DEPTH. Used by read.c alone.
+// is bounded by READ_DEPTH. Used by read.c and retitle.c.
 #ifndef SERVER_CODEC_SCAN_H
 #define SERVER_CODEC_SCAN_H
 
@@ -19,6 +19,10 @@ typedef struct ScanPlace {
     size_t line, column; // from 1; characters, not bytes
     char pointer[256];   // of the value or the key at that byte, cut to fit
 } ScanPlace;
+
+// The size of a byte order mark at the beginning; 0 where there is none. What follows is given to
+// the two below.
+size_t scan_mark(const char *text, size_t size);
 
 // The place of text[position].
 void scan_place(const char *text, size_t size, size_t position, ScanPlace *place);

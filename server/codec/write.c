@@ -206,7 +206,8 @@ void write_problem(Bytes *bytes, const Problem *problem, int status_code, const 
     bytes_format(bytes, "\"/problems/%s\"", status_slug(problem->status));
     put_name(bytes, "title", &count);
     if (problem->status == STATUS_INVALID && problem->count > 0)
-        bytes_format(bytes, "\"The scene has %zu fault%s\"", problem->count,
+        bytes_format(bytes, "\"The %s has %zu fault%s\"",
+                     problem->whose != NULL ? problem->whose : "scene", problem->count,
                      problem->count == 1 ? "" : "s");
     else
         bytes_json_string(bytes, status_title(problem->status));

@@ -1,6 +1,7 @@
 #include "server/http/body.h"
 
 #include <stdlib.h>
+#include <strings.h>
 
 #include "server/codec/write.h"
 #include "server/http/header.h"
@@ -21,6 +22,12 @@ Status body_require_json(const Request *request, Problem *problem) {
 }
 
 Status body_require(const Request *request, Problem *problem) {
+    const char *encoding = request->content_encoding;
+    if (encoding != NULL && encoding[0] != '\0' && strcasecmp(encoding, "identity") != 0)
+        return problem_set(problem, STATUS_UNSUPPORTED_TYPE,
+                           "the body must be sent as it is, without Content-Encoding, is encoded "
+                           "as %.60s",
+                           encoding);
     if (request->is_too_large)
         return problem_set(problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes",
                            request->body_most);

@@ -6,8 +6,8 @@
 
 #include "server/http/request.h"
 
-// STATUS_UNSUPPORTED_TYPE unless the request's body is JSON by its type, STATUS_TOO_LARGE if it was
-// over the limit, STATUS_UNREADABLE if there is none.
+// STATUS_UNSUPPORTED_TYPE unless the request's body is JSON by its type and not packed,
+// STATUS_TOO_LARGE if it was over the limit, STATUS_UNREADABLE if there is none.
 Status body_require_json(const Request *request, Problem *problem);
 // The same of any type.
 Status body_require(const Request *request, Problem *problem);

@@ -2,10 +2,11 @@
 //
 // What can be answered without waiting is answered on the event loop. Anything else goes to the
 // pool, its connection suspended meanwhile; a handler that asks to wait sleeps in its seat and goes
-// on where it began. A reply queued before the body is read closes the connection, which is what
-// refusals want. What the library answers by itself (a head over its memory, a line that is no
-// HTTP, a Content-Length past 2^64) is no problem document, and a NUL in a header's value is cut
-// before we see it.
+// on where it began. A reply queued before the body is read closes the connection, and the client,
+// still sending, may never see it: a refusal waits for the body, which is thrown away, unless its
+// end is in doubt, it is too long, or the client waits for leave to send it. What the library
+// answers by itself (a head over its memory, a line that is no HTTP, a Content-Length past 2^64) is
+// no problem document, and a NUL in a header's value is cut before we see it.
 #include "server/http/exchange.h"
 
 #include <stdio.h>
@@ -24,20 +25,17 @@ enum {
     HEAD_MS =
         10000, // from the connection to its first request line, from any to the end of its head
     BODY_MS = 60000,
-    DRAINED = 4, // times the body's limit is read and thrown away, so that the client sees the 413
-    BODIES_HELD = 16,       // times the body's limit may be in memory over all connections
+    DRAINED = 4,      // times the body's limit is read and thrown away, so that a refusal is seen
+    BODIES_HELD = 16, // times the body's limit may be in memory over all connections
     BODY_SMALL = 16 * 1024, // is taken in any case: who holds large ones keeps no scene out
 };
 
-static enum MHD_Result send_problem(Exchange *exchange, int code, const Problem *problem,
-                                    bool closes) {
-    Reply reply;
-    reply_default(&reply);
-    body_problem(&reply, problem, code, NULL, exchange->request.id);
+static void make_problem(Exchange *exchange, int code, const Problem *problem, Reply *reply) {
+    reply_default(reply);
+    body_problem(reply, problem, code, NULL, exchange->request.id);
     const ListenerSettings *settings = &exchange->desk->settings;
     if (settings->note != NULL)
-        settings->note(settings->context, &exchange->request, &reply);
-    return sending_queue(exchange, &reply, closes);
+        settings->note(settings->context, &exchange->request, reply);
 }
 
 static enum MHD_Result take_header(void *context, enum MHD_ValueKind kind, const char *name,
@@ -55,6 +53,22 @@ static void write_id(char id[REQUEST_ID_SIZE], uint64_t number) {
     for (size_t i = 13; i >= 2; i--, number >>= 4)
         id[i] = "0123456789abcdef"[number & 15];
     id[14] = '\0';
+}
+
+static void await_body(Exchange *exchange, bool has_body) {
+    exchange->is_reading = has_body;
+    exchange->loop->reading += has_body;
+    seat_limit(exchange->seat, has_body ? BODY_MS : 0);
+}
+
+// Takes the refusal; sent now or, with `drains`, once the body has been thrown away.
+static enum MHD_Result refuse(Exchange *exchange, Reply *refusal, bool drains) {
+    if (!drains)
+        return sending_queue(exchange, refusal, true);
+    exchange->reply = *refusal;
+    exchange->is_answered = true;
+    await_body(exchange, true);
+    return MHD_YES;
 }
 
 // The head is complete: judge it, and refuse at once what cannot be read to its end.
@@ -80,6 +94,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     Problem problem;
     problem_clear(&problem);
     int code = gate_judge(&exchange->gate, method, exchange->target, version, &problem);
+    const bool is_framed = code == 0; // it is certain where the body ends
     if (code == 0 && request_open(request, exchange->target, &problem) != STATUS_OK)
         code = write_problem_code(problem.status);
     const unsigned long long body_size = exchange->gate.length;
@@ -94,24 +109,26 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
         code = 413;
         problem_set(&problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes", most);
     }
-    if (code != 0)
-        return send_problem(exchange, code, &problem, true);
+    const bool has_body = body_size > 0 || exchange->gate.is_chunked;
+    const bool drains =
+        is_framed && has_body && request->expect == NULL && body_size <= DRAINED * most;
+    Reply refusal;
+    if (code != 0) {
+        make_problem(exchange, code, &problem, &refusal);
+        return refuse(exchange, &refusal, drains);
+    }
     if (strcmp(method, "HEAD") == 0) {
         request->method = "GET";
         request->range = NULL;
     }
     const ListenerSettings *settings = &desk->settings;
-    const bool has_body = body_size > 0 || exchange->gate.is_chunked;
-    Reply refusal;
     if (has_body && settings->admits != NULL) {
         reply_default(&refusal);
         if (!settings->admits(settings->context, request, &refusal))
-            return sending_queue(exchange, &refusal, true);
+            return refuse(exchange, &refusal, drains);
     }
     exchange->body.most = most;
-    exchange->is_reading = has_body;
-    exchange->loop->reading += has_body;
-    seat_limit(exchange->seat, has_body ? BODY_MS : 0);
+    await_body(exchange, has_body);
     return MHD_YES;
 }
 
@@ -135,7 +152,7 @@ static enum MHD_Result take_body(Exchange *exchange, const char *data, size_t si
     exchange->received += size;
     if (exchange->received > DRAINED * most)
         return MHD_NO;
-    if (exchange->request.is_too_large || exchange->is_busy ||
+    if (exchange->is_answered || exchange->request.is_too_large || exchange->is_busy ||
         strcmp(exchange->request.method, "GET") == 0)
         return MHD_YES;
     exchange->request.is_too_large = exchange->received > most;
@@ -224,7 +241,9 @@ static enum MHD_Result answer(Exchange *exchange) {
         Problem problem;
         problem_clear(&problem);
         problem_set(&problem, STATUS_BUSY, "too many large bodies at once");
-        return send_problem(exchange, 0, &problem, false);
+        Reply refusal;
+        make_problem(exchange, 0, &problem, &refusal);
+        return sending_queue(exchange, &refusal, false);
     }
     if (exchange->is_asleep) {
         note_wake(exchange);

@@ -64,7 +64,7 @@ typedef struct Exchange {
     bool is_begun, is_reading, is_counted, is_busy;
     bool is_asleep;   // the handler asked to wait
     bool is_in_pool;  // it is answered there, its connection suspended
-    bool is_answered; // there, with `reply`
+    bool is_answered; // there, or before its body was read, with `reply`
 } Exchange;
 
 // For hall_open.

@@ -109,6 +109,7 @@ static const struct {
             KEPT("Expect", expect),
             KEPT("Authorization", authorization),
             KEPT("Accept-Encoding", accept_encoding),
+            KEPT("Content-Encoding", content_encoding),
             KEPT("If-Match", if_match),
             KEPT("Idempotency-Key", idempotency_key),
             KEPT("Last-Event-ID", last_event_id)};

@@ -38,8 +38,8 @@ typedef struct Request {
     const char *host;  // as the client names us, else our address
     const char *content_type, *accept, *prefer, *if_none_match, *if_range,
         *range; // NULL if absent
-    const char *expect, *authorization, *accept_encoding, *if_match, *idempotency_key,
-        *last_event_id;
+    const char *expect, *authorization, *accept_encoding, *content_encoding, *if_match,
+        *idempotency_key, *last_event_id;
     char prefers[128];         // all Prefer headers in one: `prefer` points here
     const char *client;        // the name of the token it came with; NULL: none was asked for
     Holder holder;             // `client` points here
@@ -105,7 +105,7 @@ typedef struct Reply {
     char location[192]; // "" for none; of our own pages without the base path, dispatch puts it
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
-    char link[1024];          // likewise
+    char link[2048];          // likewise
     const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];
     char allow[64];

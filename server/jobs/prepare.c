@@ -296,7 +296,8 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
         return STATUS_NO_MEMORY;
     Status status = read_json(text, size, inquiry_fields, inquiry, problem);
-    if (status == STATUS_OK || status == STATUS_INVALID) {
+    const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
+    if (is_object && (status == STATUS_OK || status == STATUS_INVALID)) {
         const Status resolved = resolve_all(store, &inquiry->simulation, warnings, problem);
         if (resolved != STATUS_OK && resolved != STATUS_INVALID)
             status = resolved;

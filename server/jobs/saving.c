@@ -13,6 +13,7 @@
 
 #include "server/base/bytes.h"
 #include "server/base/clock.h"
+#include "server/base/journal.h"
 #include "server/codec/write.h"
 #include "server/jobs/study.h"
 
@@ -242,9 +243,13 @@ static bool wait_for_room(Saving *saving) {
 static void saved(void *context, Status status, const char *detail) {
     Saving *saving = context;
     Intake *intake = saving->intake;
-    if (status != STATUS_OK && !saving->is_told)
-        fprintf(stderr, "impactd: the result %s could not be saved: %s\n",
-                saving->computation->result, detail);
+    if (status != STATUS_OK && !saving->is_told) {
+        Bytes line = {.most = 1024};
+        bytes_format(&line, "the result %s could not be saved: %s", saving->computation->result,
+                     detail);
+        journal_write(&line);
+        bytes_clear(&line);
+    }
     saving->is_told = status != STATUS_OK;
     pthread_mutex_lock(&intake->lock);
     bool goes_on;

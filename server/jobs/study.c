@@ -14,6 +14,7 @@
 #include <stdlib.h>
 
 #include "server/base/clock.h"
+#include "server/base/journal.h"
 #include "server/jobs/gather.h"
 
 // Each that is under way holds its scene's outcome and what it folds.
@@ -232,9 +233,12 @@ void studies_resume(Intake *intake) {
 
 // With the lock held.
 static void pause(StudyRun *run, const Problem *problem) {
-    if (!run->is_told)
-        fprintf(stderr, "impactd: the sweep %s pauses: %s\n", run->computation->result,
-                problem->detail);
+    if (!run->is_told) {
+        Bytes line = {.most = 1024};
+        bytes_format(&line, "the sweep %s pauses: %s", run->computation->result, problem->detail);
+        journal_write(&line);
+        bytes_clear(&line);
+    }
     run->is_told = run->is_paused = true;
     queue_remove(run->intake->queue, &run->computation->queued);
 }

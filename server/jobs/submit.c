@@ -113,7 +113,7 @@ static Status find_room(const Intake *intake, const Job *job, Problem *problem) 
         return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
     if (intake->live >= intake->settings.queue_most)
         return problem_set(problem, STATUS_BUSY,
-                           "the queue is full: %zu jobs are unfinished, %zu are allowed",
+                           "the queue is full: of unfinished jobs it has %zu, and may have %zu",
                            intake->live, intake->settings.queue_most);
     if (intake->scene_bytes + strlen(job->row.scene) > intake->settings.queue_bytes)
         return problem_set(problem, STATUS_BUSY,

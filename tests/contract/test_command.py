@@ -104,8 +104,9 @@ def test_run_prints_the_finished_job():
     assert job["summary"]["impacts"] == 22 and abs(job["summary"]["peak_contact_force"] - 5.7175273) < 1e-7
     with open(SPONGE, encoding="utf-8") as file:
         text = file.read()
-    code, out, errors = program.run("run", "-", text=text)
-    assert code == 0 and json.loads(out)["result"] == job["result"], errors
+    for given in (text, "\ufeff" + text):
+        code, out, errors = program.run("run", "-", text=given)
+        assert code == 0 and json.loads(out)["result"] == job["result"], errors
 
 
 def test_run_writes_each_format_alike():

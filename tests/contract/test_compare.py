@@ -364,6 +364,9 @@ def test_faults_of_a_measurement_are_told_at_their_places():
                                 ({"most_shift": 0}, "/most_shift")):
             reply = daemon.request("POST", "/v1/compare", json={**good, **change})
             assert reply.status == 422 and reply.json()["errors"][0]["pointer"] == pointer, (change, reply)
+            assert reply.json()["title"].startswith("The comparison has "), reply
+            if "channel" in change:
+                assert reply.json()["errors"][0]["value"] == change["channel"], reply
         far = daemon.request("POST", "/v1/compare", json={**good, "shift": 1e6})
         assert far.status == 422 and "only 0 samples" in far.json()["detail"], far
         assert daemon.request("POST", "/v1/compare", json={**good, "shift": 1e10}).json()["errors"][0]["pointer"] == "/shift"

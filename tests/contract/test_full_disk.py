@@ -125,6 +125,19 @@ def test_a_full_disk_at_the_start_is_told():
         assert code not in (0, -6, -11) and "room" in errors or "full" in errors, (code, errors)
 
 
+def test_a_journal_that_nobody_reads_holds_up_no_worker():
+    """What cannot be saved is told where there is room for it; all else goes on without a reader."""
+    with program.full_pipe() as (_, full), program.daemon("--workers", "1", errors=full) as daemon:
+        job = daemon.submit(long_scene(0, 10), headers=ASYNC).json()["id"]
+        file = os.path.join(daemon.data, "impactd.db")
+        os.rename(file, file + ".away")
+        assert until(lambda: daemon.get(f"/v1/jobs/{job}").json()["progress"] >= 90), "it does not run"
+        time.sleep(1)  # it cannot be saved
+        os.rename(file + ".away", file)
+        assert daemon.submit(scene(1)).json()["status"] == "successful"
+        assert daemon.finished(job, 90)["status"] == "successful"
+
+
 def test_a_database_that_was_moved_away_takes_no_jobs():
     """Nothing is promised that only an unlinked file would hold; put back, it is written to again."""
     with program.daemon() as daemon:

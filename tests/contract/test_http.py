@@ -327,6 +327,11 @@ def test_links_lead_somewhere():
             assert ("force" in links) == (left_out != "impacts"), links
             for name, link in links.items():
                 assert daemon.get(link.replace("{number}", "1")).status == 200, (name, link)
+        for change in ({"contact": {"model": "impulse"}}, {"dampers": []},
+                       {"dampers": [{**sponge()["dampers"][0], "buffer": {"restitution": 0.6}}]}):
+            result = program.finished(daemon, sponge(**change))["result"]
+            links = daemon.get(f"/v1/results/{result}").json()["links"]
+            assert "impacts" in links and "force" not in links, (change, links)
 
 
 def test_parts_of_binary_formats():
@@ -458,7 +463,7 @@ def test_bad_bodies():
         ({**random, "excitation": {**random["excitation"], "band": [1, 501]}}, None),
         (damped(buffer="wood", mass=-1), ["/dampers/0/buffer", "/dampers/0/mass"]),
         ({**sine, "excitation": {"kind": "sine"}}, None),
-        ([], None), ("text", None), (17, None), (None, None),
+        ([], [""]), ([sponge()], [""]), ("text", [""]), (17, [""]), (None, [""]),
         ({}, ["/structure", "/duration", "/sample_rate"]),
     ]
     with program.daemon() as daemon:
@@ -475,13 +480,19 @@ def test_bad_bodies():
         text = json.dumps(sponge())
         for body in ("", " ", "{", "nul", text + "x", text[:-1], text.replace("10", "NaN"), text.replace("10", "Infinity"),
                      text.replace("{", '{"duration": 1, "duration": 2, ', 1), "[" * 33 + "]" * 33, "[" * 100000,
-                     b"\xff\xfe", b"\xef\xbb\xbf" + text.encode(), b'{"a\x00": 1}', b'{"title": "\xed\xa0\x80"}'):
+                     b"\xff\xfe", b"\xef\xbb\xbf", 2 * b"\xef\xbb\xbf" + text.encode(), b'{"a\x00": 1}', b'{"title": "\xed\xa0\x80"}'):
             problem(daemon.request("POST", "/v1/jobs", body=body, headers=JSON_TYPE), 400)
+        assert daemon.request("POST", "/v1/jobs", body=b"\xef\xbb\xbf" + text.encode(), headers=JSON_TYPE).status == 200
         assert daemon.request("POST", "/v1/jobs", body=text,
                               headers={"Content-Type": "Application/JSON; charset=utf-8"}).status == 200
         for kind in ("text/plain", "application/x-www-form-urlencoded", "application/jsonx", ""):
             reply = daemon.request("POST", "/v1/jobs", body=text, headers={"Content-Type": kind})
             assert "--json" in problem(reply, 415)["detail"], reply
+        for encoding, sent, status in (("gzip", gzip.compress(text.encode()), 415), ("br", text, 415), ("identity, gzip", text, 415),
+                                       ("Identity", text, 200), ("", text, 200)):
+            reply = daemon.request("POST", "/v1/jobs", body=sent, headers={**JSON_TYPE, "Content-Encoding": encoding})
+            assert reply.status == status, (encoding, reply)
+            assert status == 200 or f"without Content-Encoding, is encoded as {encoding}" in problem(reply, 415)["detail"], reply
         assert daemon.submit(sponge()).json()["status"] == "successful"
 
 
@@ -530,6 +541,20 @@ def test_bodies_over_the_limit():
             connection.request("POST", "/v1/jobs", body=chunks, headers=JSON_TYPE, encode_chunked=True)
             assert connection.getresponse().status == 413
             connection.close()
+
+
+def test_a_refusal_is_seen_by_who_sends_much():
+    """What is refused by its head alone is answered once the body is through, and the connection stays open."""
+    with program.daemon() as daemon:
+        body = b" " * 10_000_000
+        connection = http.client.HTTPConnection("127.0.0.1", daemon.port)
+        for method, target, expected in (("POST", "/v1/none", 404), ("PUT", "/v1/jobs", 405), ("POST", "/v1/jobs?q=%zz", 400)) * 3:
+            connection.request(method, target, body=body, headers=JSON_TYPE)
+            reply = connection.getresponse()
+            assert reply.status == expected and json.loads(reply.read())["status"] == expected, (method, target, reply.status)
+        connection.request("GET", "/version")
+        assert connection.getresponse().status == 200
+        connection.close()
 
 
 def test_all_json_files_as_bodies():

@@ -16,7 +16,7 @@ FLOORS = {
     "core": [["base", "math"], ["contact", "excite", "result"], ["scene"], ["plan"], ["solve"],
              ["simulation"], ["study"]],
     "server": [["base", "store"], ["codec", "auth", "jobs"], ["encode", "http"], ["api"],
-               ["options", "client", "command", "main", "install"]],
+               ["options", "options_show", "client", "command", "main", "install"]],
 }
 
 # The C library as the two halves may use it, and the processor's vectors. Not here: files, clocks, threads and

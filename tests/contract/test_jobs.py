@@ -151,10 +151,14 @@ def test_jobs_are_listed_and_searched():
                 or query.startswith("since=" + named["created"]) and named["id"] in found, (query, found, expected)
         assert pages(daemon, "/v1/jobs?limit=2&kind=none&q=") == newest_first[1:]
         assert pages(daemon, "/v1/jobs?limit=1&q=run%3Da7") == [listed, named["id"]]
-        for bad in ("status=x", "kind=x", "since=yesterday", "until=2026-13-01", "q=" + "x" * 101, "limit=0",
+        for bad in ("status=x", "kind=x", "since=yesterday", "until=2026-13-01", "q=" + "x" * 201, "limit=0",
                     "since=2026-02-30", "since=2026-11-21T25:00:00Z"):
             assert daemon.get("/v1/jobs?" + bad).status == 400, bad
         assert daemon.get("/v1/jobs?before=j-0").status == 404
+        title = "é" * 100  # as long as a title may be
+        long = [daemon.submit(quick(60 + i, title=title, labels={"run": "x" * 90})).json()["id"] for i in range(2)]
+        assert pages(daemon, "/v1/jobs?limit=1&kind=none&status=successful&since=2026-01-01T00:00:00Z&until=2999-01-01T00:00:00Z&label=run="
+                     + "x" * 90 + "&q=" + "%C3%A9" * 100) == long[::-1]
         refused = daemon.submit(quick(60, labels=["x" * 9000]))
         assert refused.status == 422 and refused.json()["errors"][0]["pointer"] == "/labels", refused
 
@@ -297,6 +301,7 @@ def test_a_full_queue_says_when_to_come_back():
             jobs = [daemon.submit(slow(i, duration), headers=ASYNC).json()["id"] for i in range(3)]
             full = daemon.submit(quick(1))
             assert full.status == 503 and full.json()["type"] == "/problems/busy", full
+            assert full.json()["detail"] == "the queue is full: of unfinished jobs it has 3, and may have 3", full
             found.append(int(full.headers["retry-after"]))
             assert daemon.request("DELETE", f"/v1/jobs/{jobs[2]}").status == 200
             assert daemon.submit(quick(1)).status == 200

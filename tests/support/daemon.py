@@ -49,12 +49,14 @@ def record(method, path, headers, body, reply):
 
 
 class Daemon:
-    def __init__(self, build, *arguments, data=None, environment=None):
+    def __init__(self, build, *arguments, data=None, environment=None, errors=None):
+        """`errors` is a descriptor that takes its standard error; without, stderr() reads it."""
         self.program = os.path.join(os.path.abspath(build), "impactd")
         self.arguments = list(arguments)
         self.owns_data = data is None
         self.data = data or tempfile.mkdtemp(prefix="impactd-")
         self.environment = {**os.environ, **(environment or {})}
+        self.errors_to = errors
         self.process = None
         self.port = None
 
@@ -72,7 +74,7 @@ class Daemon:
         self.errors = tempfile.TemporaryFile(mode="w+")
         self.process = subprocess.Popen(
             [self.program, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.arguments],
-            stdout=subprocess.PIPE, stderr=self.errors, text=True, env=self.environment)
+            stdout=subprocess.PIPE, stderr=self.errors if self.errors_to is None else self.errors_to, text=True, env=self.environment)
         end = time.monotonic() + seconds
         self.greeting = ""
         while time.monotonic() < end:

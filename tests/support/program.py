@@ -58,6 +58,22 @@ def examples():
 
 
 @contextlib.contextmanager
+def full_pipe():
+    """The ends of a pipe that takes no byte more: (to read, to write)."""
+    taken, full = os.pipe()
+    try:
+        os.set_blocking(full, False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(full, b"0" * 4096)
+        os.set_blocking(full, True)
+        yield taken, full
+    finally:
+        os.close(taken)
+        os.close(full)
+
+
+@contextlib.contextmanager
 def daemon(*arguments, **options):
     """A running daemon; afterwards it must end well, within its time, and no sanitizer may have spoken."""
     with Daemon(build, *arguments, **options) as running:

@@ -127,6 +127,22 @@ static void a_file_that_is_no_text_of_settings_is_refused(void **state) {
     assert_int_equal(problem.count, 1);
 }
 
+static void a_file_names_no_other_file(void **state) {
+    (void)state;
+    char path[] = "/tmp/impactd-options-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    const char text[] = "rate = 3\nconfig = /etc/other\n";
+    assert_int_equal(write(file, text, strlen(text)), (int)strlen(text));
+    close(file);
+    const Status status = READ("TEST_", "--config", path);
+    unlink(path);
+    assert_int_equal(status, STATUS_USAGE);
+    assert_int_equal(problem.count, 1);
+    assert_non_null(strstr(problem.faults[0].pointer, ":2"));
+    assert_string_equal(settings.config, path);
+}
+
 static void the_environment_is_not_read_without_a_prefix(void **state) {
     (void)state;
     setenv("TEST_QUEUE_MOST", "none", 1);
@@ -218,6 +234,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(a_flag_beats_the_environment_that_the_file_that_the_default,
                                         start, stop),
         cmocka_unit_test_setup_teardown(a_file_that_is_no_text_of_settings_is_refused, start, stop),
+        cmocka_unit_test_setup_teardown(a_file_names_no_other_file, start, stop),
         cmocka_unit_test_setup_teardown(the_environment_is_not_read_without_a_prefix, start, stop),
         cmocka_unit_test_setup_teardown(every_fault_is_told_under_the_name_that_was_typed, start,
                                         stop),

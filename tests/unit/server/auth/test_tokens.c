@@ -241,6 +241,9 @@ static void scopes_are_a_list_of_known_names(void **state) {
         if (token_make(bad[i], 0, &row, token, NULL) != STATUS_USAGE)
             fail_msg("\"%s\" is taken", bad[i]);
     assert_int_equal(token_make("read,submit,materials,admin", 0, &row, token, NULL), STATUS_OK);
+    assert_string_equal(row.scopes, "read,submit,materials,admin");
+    assert_int_equal(token_make("submit,read,read,submit", 0, &row, other, NULL), STATUS_OK);
+    assert_string_equal(row.scopes, "read,submit");
     assert_int_equal(token_make("read", 0, &row, other, NULL), STATUS_OK);
     assert_string_not_equal(token, other);
 }

@@ -261,11 +261,22 @@ static void all_faults_are_told_at_once(void **state) {
     assert_int_equal(problem.count, 7);
 }
 
+static void a_document_that_is_no_object_is_a_fault_as_a_whole(void **state) {
+    (void)state;
+    check_fault("[]", "", "", "must be an object, is an array");
+    check_fault("[{\"mass\": 1}]", "", "", "must be an object, is an array");
+    check_fault(" null\n", "", "null", "must be an object, is null");
+    check_fault("17", "", "17", "must be an object, is a number");
+    check_fault("\"text\"", "", "\"text\"", "must be an object, is a string");
+    check_fault("false", "", "false", "must be an object, is false");
+}
+
 static void what_is_not_json_has_line_column_and_pointer(void **state) {
     (void)state;
     check_unreadable("", "", "line 1, column 1: ");
-    check_unreadable("5", "", "line 1, column");
-    check_unreadable("[]", "", "line 1, column 1: the document must be an object");
+    check_unreadable(" ", "", "line 1, column");
+    check_unreadable("[] 1", "", "line 1, column 4: the document is complete");
+    check_unreadable("nul", "", "line 1, column 3: invalid token near 'nul'");
     check_unreadable("{\"mass\": 1", "/mass",
                      "line 1, column 10: the document ends before it is complete");
     check_unreadable("{\"left\": {\n  \"stiffness\": NaN}}", "/left/stiffness",
@@ -286,6 +297,18 @@ static void what_is_not_json_has_line_column_and_pointer(void **state) {
     const char nul[] = "{\"mass\":\0 1}";
     assert_int_equal(read_json(nul, sizeof nul - 1, whole_fields, &whole, &problem),
                      STATUS_UNREADABLE);
+}
+
+static void a_byte_order_mark_at_the_beginning_is_passed_over(void **state) {
+    (void)state;
+    check_fault("\xEF\xBB\xBF{\"mass\": \"x\"}", "/mass", "\"x\"",
+                "must be a number [kg], is a string");
+    check_unreadable("\xEF\xBB\xBF{\n  \"mass\": 1,}", "",
+                     "line 2, column 13: string or '}' expected");
+    check_unreadable("\xEF\xBB\xBF{\"mass\": 1,}", "", "line 1, column 12: string or '}' expected");
+    check_unreadable("\xEF\xBB\xBF", "", "line 1, column 1: ");
+    check_unreadable("\xEF\xBB\xBF\xEF\xBB\xBF{}", "", "line 1, column ");
+    check_unreadable(" \xEF\xBB\xBF{}", "", "line 1, column ");
 }
 
 static void the_problem_may_be_null(void **state) {
@@ -310,7 +333,9 @@ int main(void) {
         TEST(members_of_a_misspelt_kind_are_not_said_to_be_missing),
         TEST(too_long_is_a_fault),
         TEST(all_faults_are_told_at_once),
+        TEST(a_document_that_is_no_object_is_a_fault_as_a_whole),
         TEST(what_is_not_json_has_line_column_and_pointer),
+        TEST(a_byte_order_mark_at_the_beginning_is_passed_over),
         TEST(the_problem_may_be_null),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

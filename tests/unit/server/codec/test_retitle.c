@@ -30,6 +30,7 @@ static void titles_and_labels_come_on_top_of_the_scene_s(void **state) {
     char *labels[] = {"a=b=c", "d="};
     expect("{\"title\": \"x\", \"n\": 0.1}", "new \"one\"", 0, NULL,
            "{\"title\":\"new \\\"one\\\"\",\"n\":0.10000000000000001}");
+    expect("\xEF\xBB\xBF{}", "new", 0, NULL, "{\"title\":\"new\"}");
     expect("{}", NULL, 2, labels, "{\"labels\":{\"a\":\"b=c\",\"d\":\"\"}}");
     expect("{\"labels\": {\"a\": \"old\", \"z\": \"1\"}}", NULL, 1, labels,
            "{\"labels\":{\"a\":\"b=c\",\"z\":\"1\"}}");
