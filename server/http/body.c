@@ -62,4 +62,5 @@ void body_problem(Reply *reply, const Problem *problem, int code, const char *in
     reply->cache_control[0] = '\0'; // of what it would have been
     reply->accepts_ranges = false;
     reply->location[0] = '\0';
+    reply->preference_applied[0] = '\0';
 }

@@ -1,18 +1,13 @@
 #!/usr/bin/env python3
-"""The API over loopback: statuses, headers, waiting, ranges, all bad input, with the daemon unharmed."""
+"""The API over loopback: statuses, headers, waiting, pages, formats, ranges."""
 
 import concurrent.futures
 import csv
 import gzip
-import http.client
 import io
-import json
 import os
 import re
 import shutil
-import signal
-import socket
-import statistics
 import struct
 import subprocess
 import sys
@@ -22,34 +17,9 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from asking import endless, problem, sponge  # noqa: E402
 
 SANITIZED = True
-JSON_TYPE = {"Content-Type": "application/json"}
-JSON_FILES = os.path.join(program.SOURCE, "tests", "contract", "json")
-
-
-def sponge(**changes):
-    return {**program.scene("paper_free_sponge"), **changes}
-
-
-def endless(duration=2e6):
-    """A scene that takes many seconds: few samples, millions of impacts."""
-    scene = program.scene("paper_sine_aluminium")
-    scene.update(duration=duration, sample_rate=10, output={"channels": [], "psd": None})
-    return scene
-
-
-def problem(reply, status, *pointers):
-    """The problem document of a reply, which must have that status and just these faults."""
-    assert reply.status == status, reply
-    assert reply.headers["content-type"] == "application/problem+json", reply
-    document = reply.json()
-    assert document["status"] == status and document["title"] and document["detail"], document
-    assert re.fullmatch(r"/problems/[a-z-]+", document["type"]), document
-    if pointers:
-        assert sorted(fault["pointer"] for fault in document["errors"]) == sorted(pointers), document
-        assert all(fault["detail"] for fault in document["errors"]), document
-    return document
 
 
 def test_a_scene_is_answered_with_its_finished_job():
@@ -153,23 +123,6 @@ def test_dry_run_runs_nothing():
         assert "dry_run" not in daemon.request("POST", "/v1/jobs?dry_run=0", json=sponge()).json()
         problem(daemon.request("POST", "/v1/jobs?dry_run=maybe", json=sponge()), 400)
         problem(daemon.request("POST", "/v1/jobs?dry_run=1", json=sponge(duration=0)), 422, "/duration")
-
-
-def test_what_takes_too_long_is_refused_at_the_door():
-    """--max-cpu-seconds (60) and --max-run-bytes bound what a scene may be foretold to take: 422 with the cost."""
-    with program.daemon() as daemon:
-        slow = sponge(duration=1000, accuracy={"solver": "rk4", "step": 1e-7})
-        for path in ("/v1/jobs", "/v1/jobs?dry_run=1"):
-            reply = daemon.request("POST", path, json=slow)
-            problem(reply, 422, "/accuracy")
-            assert "at most 60 s are allowed" in reply.json()["errors"][0]["detail"], reply
-    with program.daemon("--max-cpu-seconds", "0.001", "--max-run-bytes", "2000000") as daemon:
-        problem(daemon.submit(sponge(duration=1e4)), 422, "/output/psd")
-        problem(daemon.submit(sponge(duration=1e4, output={"psd": None})), 422, "/duration")
-        cost = daemon.request("POST", "/v1/jobs?dry_run=1", json=sponge()).json()["cost"]
-        assert cost["cpu_seconds"] < 0.001 and 4e5 < cost["bytes"] < 1e6, cost
-    with program.daemon("--max-run-bytes", "2000000") as daemon:
-        problem(daemon.submit(sponge(duration=100)), 422, "/output/channels")
 
 
 def test_series_by_channel_window_and_format():
@@ -437,253 +390,6 @@ def test_every_answer_carries_the_safety_headers():
             assert "default-src 'none'" in headers["content-security-policy"], headers
             ids.add(headers["x-request-id"])
         assert len(ids) == 4, ids
-
-
-def test_bad_bodies():
-    """Every kind of bad scene is a 4xx problem that names its places, all faults at once."""
-    sine = program.scene("paper_sine_sponge")
-    random = program.scene("paper_random_sponge")
-    damper = sponge()["dampers"][0]
-
-    def damped(**changes):
-        return sponge(dampers=[{**damper, **changes}])
-
-    cases = [
-        (sponge(structure={"stiffness": 865}), ["/structure/mass"]),
-        (sponge(structure={"mass": 1, "stiffness": -1, "damping": 0}), ["/structure/stiffness"]),
-        (sponge(structur=1), ["/structur"]),
-        (damped(buffer={"restitution": 0, "contact_time": 0.01}), ["/dampers/0/buffer/restitution"]),
-        (damped(buffer={"restitution": 1.1, "contact_time": 0.01}), ["/dampers/0/buffer/restitution"]),
-        (damped(buffer={"restitution": 0.5, "contact_time": 0}), ["/dampers/0/buffer/contact_time"]),
-        (damped(clearance=-0.001), ["/dampers/0/clearance"]),
-        (damped(position=0.008), ["/dampers/0/position"]),
-        (sponge(duration=0), ["/duration"]),
-        (sponge(duration=1e9), ["/duration"]),
-        (sponge(sample_rate=1e300, duration=1e300), None),
-        ({**random, "excitation": {**random["excitation"], "band": [1, 501]}}, None),
-        (damped(buffer="wood", mass=-1), ["/dampers/0/buffer", "/dampers/0/mass"]),
-        ({**sine, "excitation": {"kind": "sine"}}, None),
-        ([], [""]), ([sponge()], [""]), ("text", [""]), (17, [""]), (None, [""]),
-        ({}, ["/structure", "/duration", "/sample_rate"]),
-    ]
-    with program.daemon() as daemon:
-        for scene, pointers in cases:
-            reply = daemon.request("POST", "/v1/jobs", body=json.dumps(scene), headers=JSON_TYPE)
-            assert reply.status in (400, 422), (scene, reply)
-            problem(reply, reply.status, *(pointers or ()))
-        allowed = damped(buffer={"restitution": 0})
-        allowed["contact"] = {"model": "impulse"}
-        assert daemon.submit(allowed).json()["status"] == "successful"
-        meant = problem(daemon.submit(sponge(duratoin=1)), 422)["errors"]
-        assert meant[0]["did_you_mean"] == "duration", meant
-
-        text = json.dumps(sponge())
-        for body in ("", " ", "{", "nul", text + "x", text[:-1], text.replace("10", "NaN"), text.replace("10", "Infinity"),
-                     text.replace("{", '{"duration": 1, "duration": 2, ', 1), "[" * 33 + "]" * 33, "[" * 100000,
-                     b"\xff\xfe", b"\xef\xbb\xbf", 2 * b"\xef\xbb\xbf" + text.encode(), b'{"a\x00": 1}', b'{"title": "\xed\xa0\x80"}'):
-            problem(daemon.request("POST", "/v1/jobs", body=body, headers=JSON_TYPE), 400)
-        assert daemon.request("POST", "/v1/jobs", body=b"\xef\xbb\xbf" + text.encode(), headers=JSON_TYPE).status == 200
-        assert daemon.request("POST", "/v1/jobs", body=text,
-                              headers={"Content-Type": "Application/JSON; charset=utf-8"}).status == 200
-        for kind in ("text/plain", "application/x-www-form-urlencoded", "application/jsonx", ""):
-            reply = daemon.request("POST", "/v1/jobs", body=text, headers={"Content-Type": kind})
-            assert "--json" in problem(reply, 415)["detail"], reply
-        for encoding, sent, status in (("gzip", gzip.compress(text.encode()), 415), ("br", text, 415), ("identity, gzip", text, 415),
-                                       ("Identity", text, 200), ("", text, 200)):
-            reply = daemon.request("POST", "/v1/jobs", body=sent, headers={**JSON_TYPE, "Content-Encoding": encoding})
-            assert reply.status == status, (encoding, reply)
-            assert status == 200 or f"without Content-Encoding, is encoded as {encoding}" in problem(reply, 415)["detail"], reply
-        assert daemon.submit(sponge()).json()["status"] == "successful"
-
-
-def test_wrong_types_at_every_field():
-    """Each member of the fullest example in turn gets a value of every other type: never a crash, 4xx or a job."""
-    whole = program.scene("all_keys")
-
-    def places(value, path=()):
-        yield path
-        items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-        for key, inner in items:
-            yield from places(inner, path + (key,))
-
-    with program.daemon() as daemon:
-        refused = 0
-        for path in places(whole):
-            for wrong in (None, True, -1, 1e308, 0.5, "x", [], {}, [[]], {"x": 1}):
-                scene = json.loads(json.dumps({"scene": whole}))
-                inner = scene
-                for key in ("scene",) + path[:-1]:
-                    inner = inner[key] if path else inner
-                inner[path[-1] if path else "scene"] = wrong
-                reply = daemon.request("POST", "/v1/jobs?dry_run=1", body=json.dumps(scene["scene"]),
-                                       headers=JSON_TYPE)
-                assert reply.status in (200, 400, 422), (path, wrong, reply)
-                if reply.status != 200:
-                    document = problem(reply, reply.status)
-                    refused += 1
-                    if reply.status == 422:
-                        assert document["errors"], (path, wrong, reply)
-        assert refused > 200, refused
-
-
-def test_bodies_over_the_limit():
-    """A body of just the limit is read, one byte more is a 413 that is seen, also chunked and without Content-Length."""
-    limit = 65536
-    with program.daemon("--max-body", str(limit)) as daemon:
-        text = json.dumps(sponge()).encode()
-        assert daemon.request("POST", "/v1/jobs", body=text.ljust(limit), headers=JSON_TYPE).status == 200
-        for size in (limit + 1, 2 * limit, 4 * limit, 4 * limit + 1):
-            document = problem(daemon.request("POST", "/v1/jobs", body=text.ljust(size), headers=JSON_TYPE), 413)
-            assert str(limit) in document["detail"], document
-        for size in (limit + 1, 4 * limit - 100):
-            chunks = (text.ljust(size)[i:i + 8000] for i in range(0, size, 8000))
-            connection = http.client.HTTPConnection("127.0.0.1", daemon.port)
-            connection.request("POST", "/v1/jobs", body=chunks, headers=JSON_TYPE, encode_chunked=True)
-            assert connection.getresponse().status == 413
-            connection.close()
-
-
-def test_a_refusal_is_seen_by_who_sends_much():
-    """What is refused by its head alone is answered once the body is through, and the connection stays open."""
-    with program.daemon() as daemon:
-        body = b" " * 10_000_000
-        connection = http.client.HTTPConnection("127.0.0.1", daemon.port)
-        for method, target, expected in (("POST", "/v1/none", 404), ("PUT", "/v1/jobs", 405), ("POST", "/v1/jobs?q=%zz", 400)) * 3:
-            connection.request(method, target, body=body, headers=JSON_TYPE)
-            reply = connection.getresponse()
-            assert reply.status == expected and json.loads(reply.read())["status"] == expected, (method, target, reply.status)
-        connection.request("GET", "/version")
-        assert connection.getresponse().status == 200
-        connection.close()
-
-
-def test_all_json_files_as_bodies():
-    """The 318 files of the JSON parsing suite: refused as they should be, never a crash."""
-    with program.daemon("--max-body", "200000") as daemon:
-        names = sorted(name for name in os.listdir(JSON_FILES) if name.endswith(".json"))
-        assert len(names) == 318, len(names)
-        for name in names:
-            with open(os.path.join(JSON_FILES, name), "rb") as file:
-                reply = daemon.request("POST", "/v1/jobs", body=file.read(), headers=JSON_TYPE)
-            expected = {"n": (400, 413), "y": (400, 422), "i": (400, 413, 422)}[name[0]]
-            assert reply.status in expected, (name, reply)
-            problem(reply, reply.status)
-        assert daemon.submit(sponge()).status == 200
-
-
-def test_a_full_queue_is_503():
-    """Beyond --queue unfinished jobs: 503 with Retry-After, not ready, and all is well afterwards."""
-    with program.daemon("--workers", "1", "--queue", "3") as daemon:
-        jobs = [daemon.submit(endless(2e6 + i), headers={"Prefer": "respond-async"}) for i in range(3)]
-        assert [reply.status for reply in jobs] == [202] * 3, jobs
-        reply = daemon.submit(endless(3e6), headers={"Prefer": "respond-async"})
-        problem(reply, 503)
-        assert int(reply.headers["retry-after"]) >= 1, reply.headers
-        problem(daemon.get("/health/ready"), 503)
-        for one in jobs:
-            assert daemon.request("DELETE", one.headers["location"]).status == 200
-        assert daemon.submit(sponge()).json()["status"] == "successful"
-        assert daemon.get("/health/ready").status == 200
-
-
-def test_many_at_once():
-    """200 clients who wait while others ask: every answer comes, none is mixed up, none stalls."""
-    with program.daemon("--workers", "2") as daemon:
-        def one(i):
-            began = time.monotonic()
-            job = daemon.submit(sponge(duration=1 + 0.01 * i), wait=30).json()
-            document = daemon.get(f"/v1/results/{job['result']}").json()
-            assert document["scene"]["duration"] == 1 + 0.01 * i, (i, document["scene"])
-            return time.monotonic() - began
-        with concurrent.futures.ThreadPoolExecutor(64) as pool:
-            times = sorted(pool.map(one, range(200)))
-        assert times[-1] < 20, times[-5:]
-
-
-class Crowd:
-    """As many connections at once, each with one request under way and its answers in their order."""
-
-    def __init__(self, port, count):
-        self.sockets = [socket.create_connection(("127.0.0.1", port), timeout=60) for _ in range(count)]
-        self.files = [one.makefile("rb") for one in self.sockets]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        for one in (*self.files, *self.sockets):
-            one.close()
-
-    def ask(self, i, target):
-        self.sockets[i].sendall(f"GET {target} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-
-    def answer(self, i):
-        code = int(self.files[i].readline().split()[1])
-        headers = http.client.parse_headers(self.files[i])
-        return code, json.loads(self.files[i].read(int(headers["Content-Length"])))
-
-
-def test_no_number_of_ready_connections_stalls():
-    """127 to 512 connections ready at once: no number of them takes much longer than its neighbours."""
-    with program.daemon("--workers", "1") as daemon:
-        job = program.finished(daemon, sponge())["id"]
-        usual = None
-        # Over two event loops some of them make as many for each.
-        for count in (120, 127, 128, 129, 254, 255, 256, 257, 258, 512):
-            times = []
-            with Crowd(daemon.port, count) as crowd:
-                for turn in range(15):
-                    # Sent while the daemon is stopped: it finds all of them ready.
-                    daemon.process.send_signal(signal.SIGSTOP)
-                    for i in range(count):
-                        crowd.ask(i, f"/v1/jobs/{job}" if (i + turn) % 2 else "/version")
-                    began = time.monotonic()
-                    daemon.process.send_signal(signal.SIGCONT)
-                    for i in range(count):
-                        code, document = crowd.answer(i)
-                        assert code == 200 and ("id" in document) == bool((i + turn) % 2), (count, i, document)
-                    times.append((time.monotonic() - began) / count)
-            took = statistics.median(times)
-            usual = usual or took
-            # A stall made it hundreds of times slower.
-            assert took < 20 * usual, (count, took, usual)
-
-
-def test_sleepers_wake_while_others_ask():
-    """As many who wait for a job's end as ask other things: when it ends each is answered, and nobody is forgotten."""
-    with program.daemon("--workers", "1") as daemon:
-        for count in (127, 128, 129, 255, 256, 257):
-            with Crowd(daemon.port, count) as crowd, Crowd(daemon.port, count) as sleepers:
-                job = daemon.submit(endless(3e6 + count), headers={"Prefer": "respond-async"}).json()["id"]
-                for i in range(count):
-                    sleepers.ask(i, f"/v1/jobs/{job}?wait=30")
-                    crowd.ask(i, "/version")
-                assert daemon.request("DELETE", f"/v1/jobs/{job}").status == 200
-                for i in range(count):
-                    assert "engine" in crowd.answer(i)[1]
-                    crowd.ask(i, f"/v1/jobs/{job}")
-                for i in range(count):
-                    assert crowd.answer(i)[1]["status"] == "dismissed"
-                    code, document = sleepers.answer(i)
-                    # Who had waited in vain would have been told of a job that runs.
-                    assert code == 200 and document["status"] == "dismissed", (count, i, document)
-
-
-def test_stopping_answers_those_who_wait():
-    """SIGTERM while clients wait: each gets its unfinished job, and the daemon ends well and soon."""
-    daemon = program.Daemon(program.build, "--workers", "1")
-    try:
-        daemon.start()
-        with concurrent.futures.ThreadPoolExecutor(8) as pool:
-            waiters = [pool.submit(daemon.submit, endless(2e6 + i), 30) for i in range(8)]
-            time.sleep(1)
-            code, seconds = daemon.stop(30)
-            replies = [waiter.result() for waiter in waiters]
-        assert code == 0 and (seconds < 5 or program.is_sanitized()), (code, seconds)
-        assert all(reply.status == 202 for reply in replies), replies
-    finally:
-        daemon.kill()
-        shutil.rmtree(daemon.data, ignore_errors=True)
 
 
 if __name__ == "__main__":
