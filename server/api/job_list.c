@@ -206,7 +206,7 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     TRY(read_search(request, &search, &state, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
-    store_job_settle(app->store); // whoever was answered finds the job here
+    store_settle(app->store); // whoever was answered finds the job here
     bytes_text(&bytes, "{\"jobs\": [");
     const Status status = list(app, search, state, &bytes, last, problem);
     if (status != STATUS_OK) {

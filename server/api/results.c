@@ -313,7 +313,7 @@ static Status require_own(App *app, const Request *request, Problem *problem) {
     char owner[72], what[128];
     if (request->client == NULL || request->holder.is_admin)
         return STATUS_OK;
-    store_job_settle(app->store);
+    store_settle(app->store);
     TRY(store_result_sharer(app->store, request->parameters[0], request->client, owner, problem));
     snprintf(what, sizeof what, "a job with the result %.80s", request->parameters[0]);
     return doorman_owns(request, owner[0] != '\0' ? owner : NULL, what, problem);

@@ -119,11 +119,6 @@ bool store_job_late(Store *store, const JobRow *row) {
     return store_late(store) != NULL && late_add(store_late(store), row);
 }
 
-void store_job_settle(Store *store) {
-    if (store_late(store) != NULL)
-        late_flush(store_late(store));
-}
-
 bool job_row_copy(const JobRow *row, JobRow *copy) {
     *copy = *row;
     return pack_own(job_columns, copy);

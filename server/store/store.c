@@ -151,6 +151,12 @@ void store_hurry(Store *store, StoreTicket *ticket) {
     writer_hurry(store->writer, ticket);
 }
 
+void store_settle(Store *store) {
+    if (store->late != NULL)
+        late_flush(store->late);
+    writer_settle(store->writer);
+}
+
 Late *store_late(Store *store) {
     return store->late;
 }

@@ -43,6 +43,9 @@ typedef struct StoreTicket StoreTicket; // lives until `call` returns
 bool store_withdraw(Store *store, StoreTicket *ticket);
 // What was to come later comes now.
 void store_hurry(Store *store, StoreTicket *ticket);
+// Returns when all jobs that there are, accepted, finished or answered by what is known, are in the
+// database, or could not be written: before they are listed.
+void store_settle(Store *store);
 
 // Rises whenever a name in a scene may come to mean something else, or be warned of otherwise: a
 // material's head, a review, a record. Whoever writes those calls store_catalogue_changed once it
@@ -105,8 +108,6 @@ Status store_job_post(Store *store, const JobRow *row, StoreTurn turn, const Sto
 // the database some 20 ms later. A killed process loses none, a power failure may lose the last
 // ones. False where there is no room for it now: it is to be added the usual way.
 bool store_job_late(Store *store, const JobRow *row);
-// Returns when those are in the database, or could not be written: before they are listed.
-void store_job_settle(Store *store);
 // State, is_cached, times, problem, result. STATUS_NOT_FOUND, unless it is_unsaved.
 Status store_job_update(Store *store, const JobRow *row, Problem *problem);
 Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *done);

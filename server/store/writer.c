@@ -48,7 +48,7 @@ struct Writer {
     pthread_cond_t some;
     Line lines[STORE_TURNS];
     int64_t wakes_ns; // when the thread wakes by itself; INT64_MAX: never, 0: it does not sleep
-    bool is_stopping;
+    bool is_stopping, is_writing;
     StoreTotals totals;
     Problem problem; // of the write in hand; the thread's own, for it is large
 };
@@ -224,9 +224,11 @@ static void *work(void *context) {
             wait(writer);
         if (write == NULL)
             break;
+        writer->is_writing = true;
         pthread_mutex_unlock(&writer->lock);
         commit_all(writer, write);
         pthread_mutex_lock(&writer->lock);
+        writer->is_writing = false;
         tell(writer, write);
     }
     pthread_mutex_unlock(&writer->lock);
@@ -334,4 +336,20 @@ void writer_hurry(Writer *writer, StoreTicket *write) {
         enqueue(writer, write, STORE_NOW);
     }
     pthread_mutex_unlock(&writer->lock);
+}
+
+static Status write_nothing(Database *database, const void *work_, Problem *problem) {
+    (void)database, (void)work_, (void)problem;
+    return STATUS_OK;
+}
+
+void writer_settle(Writer *writer) {
+    pthread_mutex_lock(&writer->lock);
+    call_up(writer, STORE_LATER, INT64_MAX);
+    call_up(writer, STORE_SOON, INT64_MAX);
+    const bool is_settled = writer->lines[STORE_NOW].first == NULL && !writer->is_writing;
+    pthread_mutex_unlock(&writer->lock);
+    // Behind all of them in the same transaction.
+    if (!is_settled)
+        (void)writer_do(writer, write_nothing, NULL, NULL);
 }

@@ -22,6 +22,8 @@ Status writer_post(Writer *writer, StoreApply *apply, const void *work, size_t s
                    const StoreDone *done, StoreTicket **ticket);
 bool writer_withdraw(Writer *writer, StoreTicket *ticket);
 void writer_hurry(Writer *writer, StoreTicket *ticket);
+// Returns when all that was posted before, but what is low, is durable or could not be made so.
+void writer_settle(Writer *writer);
 
 const StoreTotals *writer_totals(const Writer *writer);
 

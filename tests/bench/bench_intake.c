@@ -202,7 +202,7 @@ static void measure_known(Store *store) {
         }
         took = now() - began;
     } while (took < seconds);
-    store_job_settle(store);
+    store_settle(store);
     printf("%-44s %10.0f /s %8.2f us of CPU with its row; held up %zu times\n",
            "known scenes of 2 KB, one thread", (double)count / took,
            1e6 * (cpu() - cpu_began) / (double)count, refused);
@@ -305,9 +305,9 @@ static void measure_index(bool is_rising, size_t most) {
         if (store_job_late(store, &row))
             i++;
         else
-            store_job_settle(store);
+            store_settle(store);
     }
-    store_job_settle(store);
+    store_settle(store);
     char name[64];
     snprintf(name, sizeof name, "%zu rows in batches, %s ids", most,
              is_rising ? "rising" : "random");

@@ -268,7 +268,7 @@ static void what_is_beyond_the_rules_goes_in_small_steps_and_no_more_than_that(v
                          STATUS_OK);
         wait_for(job);
         job_drop(job);
-        store_job_settle(room.store); // the second of a scene is written late: not too late
+        store_settle(room.store); // the second of a scene is written late: not too late
     }
     const JobRow unfinished = {.id = "j-0", .scene = "{}", .warnings = "[]", .created_unix_ms = 1};
     assert_int_equal(store_job_add(room.store, &unfinished, &problem), STATUS_OK);

@@ -459,7 +459,7 @@ static void late_rows_are_found_at_once_and_written_soon(void **state) {
         job_row_clear(&loaded);
     }
     assert_int_equal(store_job_load(store, "j-99999", &loaded, NULL), STATUS_NOT_FOUND);
-    store_job_settle(store);
+    store_settle(store);
     JobRows rows;
     const JobSearch all = job_search_all(10000);
     assert_int_equal(store_job_search(store, &all, &rows, NULL), STATUS_OK);

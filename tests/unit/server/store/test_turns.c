@@ -117,6 +117,17 @@ static void what_comes_soon_goes_with_what_comes_now_and_what_is_low_by_itself(v
     assert_int_equal(written_before[2], 3);
 }
 
+static void what_is_settled_was_all_written(void **state) {
+    (void)state;
+    post(1, STORE_LATER);
+    post(2, STORE_SOON);
+    post(3, STORE_LATER);
+    store_settle(store);
+    assert_int_equal(atomic_load(&count), 3);
+    store_settle(store); // there is nothing
+    wait_for(3);
+}
+
 static void what_was_withdrawn_is_not_written(void **state) {
     (void)state;
     hold_up();
@@ -160,6 +171,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         IN_STORE(what_is_hurried_comes_before_what_waits),
         IN_STORE(what_comes_soon_goes_with_what_comes_now_and_what_is_low_by_itself),
+        IN_STORE(what_is_settled_was_all_written),
         IN_STORE(what_was_withdrawn_is_not_written),
         IN_STORE(what_waits_is_written_in_the_end),
         IN_STORE(closing_writes_what_waits),
