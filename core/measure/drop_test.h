@@ -1,0 +1,61 @@
+// A drop test as it was done: what fell on what, and what was read. Raw data, never changed. Not
+// what follows from it (evaluation.h), nor the contacts in a force trace (trace.h). Used by
+// measure/ and by whoever stores tests.
+#ifndef CORE_MEASURE_DROP_TEST_H
+#define CORE_MEASURE_DROP_TEST_H
+
+#include "core/base/field.h"
+
+enum { DROPS_MOST = 1000, TRACES_MOST = 100, TRACE_SAMPLES_MOST = 1 << 20 };
+
+// One impact as it was read: heights or speeds, a duration, or some of them. Not known: NAN.
+typedef struct Drop {
+    double drop_height, rebound_height;   // above the buffer at rest [m]
+    double approach_speed, rebound_speed; // just before and after the contact [m/s]
+    double contact_time;                  // [s]
+    char *excluded; // why it is not to count; NULL: it counts
+    char *note;
+} Drop;
+typedef struct Drops {
+    Drop *at;
+    size_t count;
+} Drops;
+
+// A force transducer's record with one contact or several, evenly sampled.
+typedef struct Trace {
+    double interval;      // between samples [s]
+    Reals force;          // [N]; either sign, any baseline
+    Reals approach_speed; // of its contacts in order, as far as known [m/s]; may be empty
+    char *excluded;       // why it is not to count; NULL: it counts
+    char *note;
+} Trace;
+typedef struct Traces {
+    Trace *at;
+    size_t count;
+} Traces;
+
+typedef struct DropTest {
+    char *impactor; // "steel ball, 30 mm"
+    double impactor_mass; // [kg]
+    int base;             // MaterialBase; CHOICE_ABSENT: nobody says
+    double base_mass;     // of a free base [kg]
+    char *geometry;       // of the buffer and the set-up
+    double gravity;       // that pulls the impactor into the buffer during contact; 0: none, or not to be
+                          // taken into account [m/s^2]
+    double temperature;   // [degC]
+    char *instrument, *date, *person, *source, *notes;
+    // Standard uncertainty of one reading, from the instrument; NAN: not known.
+    double height_uncertainty; // [m]
+    double speed_uncertainty;  // [m/s]
+    double time_uncertainty;   // [s]
+    Drops drops;
+    Traces traces;
+} DropTest;
+
+extern const Field drop_test_fields[];
+
+// All faults that rows cannot see, and the rows', below `pointer`: no reading at all, a rebound
+// above the drop, heights beside speeds that they contradict, a date that is none ...
+Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem);
+
+#endif
