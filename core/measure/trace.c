@@ -18,24 +18,24 @@ static const double widest = 0.5; // interval over T_c that still is a figure
 
 // clang-format off
 const Field trace_contact_fields[] = {
-    FIELD_REAL(TraceContact, start, "s", ANY, ABSENT, "when the fitted contact begins, after the first sample"),
-    FIELD_REAL(TraceContact, end, "s", ANY, ABSENT, "when the fitted contact ends"),
-    FIELD_REAL(TraceContact, first, "s", ANY, ABSENT, "the first sample in contact, or above the threshold where nothing is fitted"),
-    FIELD_REAL(TraceContact, last, "s", ANY, ABSENT, "the last such sample"),
-    FIELD_COUNT(TraceContact, samples, NULL, AT_LEAST(0), ABSENT, "how many samples these are"),
-    FIELD_REAL(TraceContact, peak, "N", ANY, ABSENT, "largest force above the baseline, with its sign"),
-    FIELD_REAL(TraceContact, impulse, "N s", ANY, ABSENT, "of the fitted pulse"),
-    FIELD_REAL(TraceContact, crossing_time, "s", ANY, ABSENT, "between the crossings of the threshold on the pressing side"),
-    FIELD_REAL(TraceContact, crossing_uncertainty, "s", ANY, ABSENT, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceContact, crossing_shortfall, NULL, ANY, ABSENT, "share of T_c by which such a crossing time is short of the fitted pulse"),
-    FIELD_REAL(TraceContact, contact_time, "s", ANY, ABSENT, "T_c of the isolated pair, by the fit"),
-    FIELD_REAL(TraceContact, contact_time_uncertainty, "s", ANY, ABSENT, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, least_contact_time, "s", ANY, ABSENT, "T_c is at least this, with most_contact_time in 95 of 100 cases"),
-    FIELD_REAL(TraceContact, most_contact_time, "s", ANY, ABSENT, "T_c is at most this"),
-    FIELD_REAL(TraceContact, restitution, NULL, ANY, ABSENT, "e by the pulse's shape"),
-    FIELD_REAL(TraceContact, restitution_uncertainty, NULL, ANY, ABSENT, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, misfit, NULL, ANY, ABSENT, "rms of what the fit leaves during contact, over the noise"),
-    FIELD_REAL(TraceContact, misfit_share, NULL, ANY, ABSENT, "the same over the peak"),
+    FIELD_REAL(TraceContact, start, "s", ANY, OPTIONAL, "when the fitted contact begins, after the first sample"),
+    FIELD_REAL(TraceContact, end, "s", ANY, OPTIONAL, "when the fitted contact ends"),
+    FIELD_REAL(TraceContact, first, "s", ANY, OPTIONAL, "the first sample in contact, or above the threshold where nothing is fitted"),
+    FIELD_REAL(TraceContact, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceContact, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceContact, peak, "N", ANY, OPTIONAL, "largest force above the baseline, with its sign"),
+    FIELD_REAL(TraceContact, impulse, "N s", ANY, OPTIONAL, "of the fitted pulse"),
+    FIELD_REAL(TraceContact, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceContact, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceContact, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceContact, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair, by the fit"),
+    FIELD_REAL(TraceContact, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(TraceContact, least_contact_time, "s", ANY, OPTIONAL, "T_c is at least this, with most_contact_time in 95 of 100 cases"),
+    FIELD_REAL(TraceContact, most_contact_time, "s", ANY, OPTIONAL, "T_c is at most this"),
+    FIELD_REAL(TraceContact, restitution, NULL, ANY, OPTIONAL, "e by the pulse's shape"),
+    FIELD_REAL(TraceContact, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(TraceContact, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceContact, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
     FIELD_FLAG(TraceContact, is_doubtful, false, "a figure is given, but the trace is hardly the model's: see why"),
     FIELD_TEXT(TraceContact, why, TRACE_WHY_MOST, PRESENCE_OPTIONAL, 0, "why there is no figure of T_c, or why it is doubtful"),
     FIELD_END
@@ -70,7 +70,7 @@ static double hidden(double level, int separation, double *before) {
 
 // What of the trace one contact has for itself.
 typedef struct Stretch {
-    size_t from, to;           // samples from .. to - 1
+    size_t from, to;             // samples from .. to - 1
     bool is_at_begin, is_at_end; // of the trace
 } Stretch;
 
@@ -103,8 +103,11 @@ static void fill_window(const TraceFound *found, const TraceRun *run, const Stre
     const size_t samples = stretch->to - stretch->from;
     const size_t m = (samples + TRACE_BLOCKS_MOST - 1) / TRACE_BLOCKS_MOST;
     *window = (TraceWindow){
-        .blocks = samples / m, .per_block = m, .separation = separation,
-        .first = (long)(run->first - stretch->from), .last = (long)(run->last - stretch->from),
+        .blocks = samples / m,
+        .per_block = m,
+        .separation = separation,
+        .first = (long)(run->first - stretch->from),
+        .last = (long)(run->last - stretch->from),
     };
     for (size_t k = 0; k < window->blocks; k++) {
         const double *force = found->force + stretch->from + k * m;
@@ -167,20 +170,24 @@ static Status judge(const TraceWindow *window, const TraceFit *fit, double noise
         contact->restitution = contact->restitution_uncertainty = (double)NAN;
         if (contact->samples < SAMPLES_LEAST)
             return tell(&contact->why,
-                        "only %d samples are in contact, and pulses of very different length fit so few: sample "
+                        "only %d samples are in contact, and pulses of very different length fit "
+                        "so few: sample "
                         "at least %.0f times as fast, so that 5 or better 20 are",
                         (int)contact->samples, ceil(20.0 / (double)contact->samples));
         return tell(&contact->why,
-                    "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or more samples "
+                    "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
+                    "more samples "
                     "in contact would tell them apart",
                     contact->least_contact_time, contact->most_contact_time);
     }
     // So much is seldom left by chance.
     const double freedom = fmax((double)(contact->samples) - 4, 1);
-    if (contact->misfit_share > 0.01 && contact->misfit_share > noise * (1 + 3.7 / sqrt(2 * freedom))) {
+    if (contact->misfit_share > 0.01 &&
+        contact->misfit_share > noise * (1 + 3.7 / sqrt(2 * freedom))) {
         contact->is_doubtful = true;
         return tell(&contact->why,
-                    "the trace is hardly a pulse of the model's under the separation rule %s: the best one leaves "
+                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                    "best one leaves "
                     "%.2g %% of the peak, the noise is %.2g %% of it",
                     separation_names[window->separation], 100 * contact->misfit_share, 100 * noise);
     }
@@ -206,7 +213,8 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     trace_point_shape(window, &fit->at, &shape, &T);
     const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
     contact->crossing_shortfall = 1 - (visible.pressed - visible.from);
-    contact->impulse = fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
+    contact->impulse =
+        fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
     contact->misfit_share = left_over(window, fit);
     const double noise = found->noise / fabs(run->peak);
     contact->misfit = contact->misfit_share / noise;
@@ -244,8 +252,7 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    if (way->gravity > 0 && number < way->approach_speed_count &&
-        way->approach_speeds[number] > 0)
+    if (way->gravity > 0 && number < way->approach_speed_count && way->approach_speeds[number] > 0)
         window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
     return fit_contact(window, found, run, &stretch, interval, contact);
 }
@@ -283,9 +290,11 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
                                   &reading->contacts.at[i]);
         }
         if (status == STATUS_OK && found.count == 0)
-            status = tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
+            status =
+                tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
         if (status == STATUS_OK && found.is_full)
-            status = tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MOST);
+            status =
+                tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MOST);
     }
     trace_found_clear(&found);
     free(window);
@@ -311,6 +320,7 @@ void trace_pulse(const TraceContact *contact, const TraceWay *way, double approa
     const double size = contact->impulse / (trace_shape_impulse(&shape) * contact->contact_time);
     for (size_t i = 0; i < count; i++) {
         const double s = (start + (double)i * interval - contact->start) / contact->contact_time;
-        force[i] = is_known && s >= 0 && s <= shape.length ? size * trace_shape_force(&shape, s) : 0;
+        force[i] =
+            is_known && s >= 0 && s <= shape.length ? size * trace_shape_force(&shape, s) : 0;
     }
 }

@@ -1,5 +1,5 @@
-// Where in a force trace contacts are: its baseline, its noise, and the stretches above a threshold.
-// Not what the contacts are (trace_fit.h). Used by trace.c.
+// Where in a force trace contacts are: its baseline, its noise, and the stretches above a
+// threshold. Not what the contacts are (trace_fit.h). Used by trace.c.
 #ifndef CORE_MEASURE_TRACE_FIND_H
 #define CORE_MEASURE_TRACE_FIND_H
 
@@ -13,9 +13,9 @@ typedef struct TraceRun {
 } TraceRun;
 
 typedef struct TraceFound {
-    double *force;    // without baseline
-    double baseline;  // in the middle
-    double noise;     // standard deviation
+    double *force;      // without baseline
+    double baseline;    // in the middle
+    double noise;       // standard deviation
     double noise_count; // samples outside contacts, which it is from
     double threshold;
     TraceRun *runs;

@@ -1,8 +1,8 @@
-// Variable projection: for a start, an end and L the model's pulse f is known but for its size A and
-// the baseline b, which are linear: what is left to minimise is the sum of squares of x - A f - b
-// over start, end and L. The force jumps where a contact begins and ends, so the sum is smooth only
-// as long as the same samples are in contact: within a box, start and end stay in their gaps between
-// samples. There Levenberg and Marquardt's method serves; from box to box the fit climbs.
+// Variable projection: for a start, an end and L the model's pulse f is known but for its size A
+// and the baseline b, which are linear: what is left to minimise is the sum of squares of x - A f -
+// b over start, end and L. The force jumps where a contact begins and ends, so the sum is smooth
+// only as long as the same samples are in contact: within a box, start and end stay in their gaps
+// between samples. There Levenberg and Marquardt's method serves; from box to box the fit climbs.
 #include "core/measure/trace_fit.h"
 
 #include <float.h>
@@ -13,7 +13,8 @@
 
 enum { START, END, DECAY };
 
-static const double least_decay = -1, most_decay = 4.6; // e from 2.7, which only noise makes, to 0.01
+static const double least_decay = -1,
+                    most_decay = 4.6; // e from 2.7, which only noise makes, to 0.01
 
 TraceBox trace_box(long first, long last, long gaps) {
     return (TraceBox){
@@ -64,7 +65,8 @@ static bool pulse(const TraceWindow *window, const TracePoint *point, long first
     *from = (size_t)begin;
     *to = (size_t)end;
     // In whole blocks the pulse's oscillation follows from the two blocks before.
-    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step, fall = exp(-shape.decay * step);
+    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step,
+                 fall = exp(-shape.decay * step);
     const double turn = 2 * fall * (shape.turn > 0 ? cos(x) : cosh(x)), back = fall * fall;
     double before = 0, here = 0;
     for (long k = begin; k <= end; k++) {
@@ -241,7 +243,8 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
         }
         next.residue = trace_residue(window, &next.at, box);
         if (next.residue.sum < fit->residue.sum) {
-            const bool is_done = fit->residue.sum - next.residue.sum < 1e-7 * trace_variance(window, next.residue.sum);
+            const bool is_done = fit->residue.sum - next.residue.sum <
+                                 1e-7 * trace_variance(window, next.residue.sum);
             *fit = next;
             is_derived = false;
             damping /= 10;
@@ -249,7 +252,8 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
                 break;
         } else {
             damping = 10 * damping + 1e-9;
-            if (damping > 1e9 || size < 1e-12 || gain < 1e-9 * trace_variance(window, fit->residue.sum))
+            if (damping > 1e9 || size < 1e-12 ||
+                gain < 1e-9 * trace_variance(window, fit->residue.sum))
                 break;
         }
     }
@@ -290,14 +294,16 @@ static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
 
 // From gap to gap as long as it gets better.
 static void climb(const TraceWindow *window, TraceFit *fit) {
-    static const int moves[8][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
+    static const int moves[8][2] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
+                                    {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
     for (bool is_better = true; is_better;) {
         const long first = fit->first, last = fit->last;
         TraceFit best = *fit;
         is_better = false;
         for (long stride = 1; stride <= (last - first) / 8 + 1; stride *= 2)
             for (int way = 0; way < 8; way++) {
-                const long from = first + stride * moves[way][0], to = last + stride * moves[way][1];
+                const long from = first + stride * moves[way][0],
+                           to = last + stride * moves[way][1];
                 if (from < window->least_start || from > window->first || to < window->last ||
                     to > window->most_end)
                     continue;

@@ -1,6 +1,6 @@
 // The model's pulse fitted to one stretch of a force trace: least squares over its start, its end
-// and e, with size and baseline. Not finding the stretch (trace_find.h) and not how sure the figures
-// are (trace_interval.h). Used by trace.c and trace_interval.c.
+// and e, with size and baseline. Not finding the stretch (trace_find.h) and not how sure the
+// figures are (trace_interval.h). Used by trace.c and trace_interval.c.
 #ifndef CORE_MEASURE_TRACE_FIT_H
 #define CORE_MEASURE_TRACE_FIT_H
 
@@ -14,13 +14,13 @@ enum { TRACE_BLOCKS_MOST = 1024, TRACE_BLOCK_FROM = 400, TRACE_PARTS = 3, TRACE_
 typedef struct TraceWindow {
     double mean[TRACE_BLOCKS_MOST]; // [peak]
     size_t blocks, per_block;
-    double scatter; // sum of squares about those means
+    double scatter;     // sum of squares about those means
     double sum, square; // of the means, and of their squares
     // What the rest of the trace says of the noise: sum of squares and degrees of freedom.
     double noise_square, noise_freedom;
     int separation;
-    double pull_rate; // g / v0 [1/sample interval]; 0: none
-    long first, last; // samples that are surely above the threshold
+    double pull_rate;           // g / v0 [1/sample interval]; 0: none
+    long first, last;           // samples that are surely above the threshold
     long least_start, most_end; // samples beyond which the contact does not reach
 } TraceWindow;
 
@@ -46,7 +46,7 @@ typedef struct TraceFit {
     TracePoint at;
     long first, last; // samples in contact
     TraceResidue residue;
-    double slope[TRACE_PARTS];                // of half the sum of squares
+    double slope[TRACE_PARTS];                  // of half the sum of squares
     double curvature[TRACE_PARTS][TRACE_PARTS]; // Gauss-Newton
 } TraceFit;
 

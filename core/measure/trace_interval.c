@@ -24,7 +24,8 @@ typedef struct Points {
     size_t count, most;
 } Points;
 
-// What lies within [low, high] of a normal distribution and is not beyond e^-12 of its largest there.
+// What lies within [low, high] of a normal distribution and is not beyond e^-12 of its largest
+// there.
 static bool range(double mean, double deviation, double *low, double *high) {
     const double nearest = fmin(fmax(mean, *low), *high), away = nearest - mean;
     const double reach = sqrt(away * away + 24 * deviation * deviation);
@@ -81,8 +82,8 @@ static double profile(const TraceWindow *window, const TraceBox *box, TracePoint
 }
 
 // Fills a box; *height is the largest weight in it.
-static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit *fit, Points *points,
-                 double *height) {
+static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit *fit,
+                 Points *points, double *height) {
     double curvature[3][3], spread[3][3];
     const double variance = trace_variance(window, fit->residue.sum);
     for (int i = 0; i < 3; i++)
@@ -117,11 +118,10 @@ static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit 
         for (int j = 0; j < ends; j++) {
             point.part[END] = near + (j + 0.5) * end_step;
             const double beyond = point.part[END] - centre[END];
-            point.part[DECAY] = centre[DECAY] - (curvature[DECAY][START] * away +
-                                                 curvature[DECAY][END] * beyond) /
-                                                    curvature[DECAY][DECAY];
             point.part[DECAY] =
-                fmin(fmax(point.part[DECAY], box->least[DECAY]), box->most[DECAY]);
+                centre[DECAY] - (curvature[DECAY][START] * away + curvature[DECAY][END] * beyond) /
+                                    curvature[DECAY][DECAY];
+            point.part[DECAY] = fmin(fmax(point.part[DECAY], box->least[DECAY]), box->most[DECAY]);
             double bend;
             TraceResidue best = {0};
             const double value = profile(window, box, &point, step, &bend, &best);
@@ -166,7 +166,8 @@ static long gaps_of(const TraceWindow *window, const TraceFit *fit) {
 static void spread_out(const TraceWindow *window, const TraceFit *fits, size_t count,
                        Points *points) {
     const TraceFit *fit = fits;
-    static const int moves[8][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
+    static const int moves[8][2] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
+                                    {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
     bool is_seen[SIDE][SIDE] = {{false}};
     TraceFit from[SIDE * SIDE];
     int queue[SIDE * SIDE][2], head = 0, tail = 0;
@@ -190,8 +191,8 @@ static void spread_out(const TraceWindow *window, const TraceFit *fits, size_t c
         const TraceBox box =
             trace_box(fit->first + (p - REACH) * gaps, fit->last + (q - REACH) * gaps, gaps);
         trace_fit_box(window, &box, &here);
-        const double gain = trace_likelihood(window, here.residue.sum) -
-                            trace_likelihood(window, fit->residue.sum);
+        const double gain =
+            trace_likelihood(window, here.residue.sum) - trace_likelihood(window, fit->residue.sum);
         if (!(gain > -14) || !fill(window, &box, &here, points, &height))
             continue;
         for (int way = 0; way < 8; way++) {
@@ -215,7 +216,8 @@ static int by_contact_time(const void *a, const void *b) {
 static void believe(TraceBelief *belief, const Points *points, size_t member, double sum) {
     double mean = 0, square = 0;
     for (size_t i = 0; i < points->count; i++)
-        mean += points->at[i].weight * *(const double *)((const char *)&points->at[i] + member) / sum;
+        mean +=
+            points->at[i].weight * *(const double *)((const char *)&points->at[i] + member) / sum;
     for (size_t i = 0; i < points->count; i++) {
         const double off = *(const double *)((const char *)&points->at[i] + member) - mean;
         square += points->at[i].weight * off * off / sum;
@@ -236,7 +238,8 @@ static double quantile(const Points *points, double share, double sum) {
         double below = 0;
         for (size_t i = 0; i < points->count; i++) {
             const Point *point = &points->at[i];
-            const double part = (middle - point->contact_time + point->half_width) / (2 * point->half_width);
+            const double part =
+                (middle - point->contact_time + point->half_width) / (2 * point->half_width);
             below += point->weight * fmin(fmax(part, 0), 1);
         }
         *(below < share * sum ? &low : &high) = middle;

@@ -105,3 +105,21 @@ double trace_shape_impulse(const TraceShape *shape) {
     const double speed = fall * (cosine - shape->decay * sine) + shape->pull * fall * sine;
     return 1 - speed + shape->pull * s;
 }
+
+TraceVisible trace_shape_visible(const TraceShape *shape, double level) {
+    enum { PLACES = 400 };
+    TraceVisible visible = {.from = shape->length};
+    double peak = 0;
+    for (int i = 0; i <= PLACES; i++)
+        peak = fmax(peak, trace_shape_force(shape, shape->length * i / PLACES));
+    for (int i = 0; i <= PLACES; i++) {
+        const double s = shape->length * i / PLACES, force = trace_shape_force(shape, s);
+        if (fabs(force) < level * peak)
+            continue;
+        visible.from = fmin(visible.from, s);
+        visible.to = s;
+        if (force > 0)
+            visible.pressed = s;
+    }
+    return visible;
+}

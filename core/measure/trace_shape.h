@@ -17,7 +17,7 @@ typedef struct TraceShape {
     double turn;         // the square of the damped frequency times T_c
     double pull;         // g T_c / v0
     double sine, cosine; // as above
-    double length;       // of the contact under that pull, in T_c; 1 without, INFINITY: it never ends
+    double length; // of the contact under that pull, in T_c; 1 without, INFINITY: it never ends
 } TraceShape;
 
 // `pull` is g T_c / v0 of what pulls the pair together during contact, 0: nothing.
@@ -27,5 +27,12 @@ double trace_shape_force(const TraceShape *shape, double s);
 
 // The integral of the force over the contact [m_e v0].
 double trace_shape_impulse(const TraceShape *shape);
+
+// From when to when in T_c the size of the force is above `level` of its largest; pressed: until
+// when without the tensile end.
+typedef struct TraceVisible {
+    double from, pressed, to;
+} TraceVisible;
+TraceVisible trace_shape_visible(const TraceShape *shape, double level);
 
 #endif
