@@ -43,15 +43,9 @@ typedef struct DropTest {
     int base;             // MaterialBase; CHOICE_ABSENT: nobody says
     double base_mass;     // of a free base [kg]
     char *geometry;       // of the buffer and the set-up
-<<<<<<< HEAD
     double gravity;       // that pulls the impactor into the buffer during contact; 0: none, NAN:
                           // nobody says, and then it is not taken out [m/s^2]
     double temperature;   // [degC]
-=======
-    double gravity; // that pulls the impactor into the buffer during contact; 0: none, or not to be
-                    // taken into account [m/s^2]
-    double temperature; // [degC]
->>>>>>> edge
     char *instrument, *date, *person, *source, *notes;
     // Standard uncertainty of one reading, from the instrument; NAN: not known.
     double height_uncertainty; // [m]
