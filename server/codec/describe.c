@@ -310,6 +310,8 @@ static void print_properties(Printer *printer, const Field *fields) {
             print_properties(printer, field->fields);
             continue;
         }
+        if ((field->flags & FIELD_HIDDEN) != 0)
+            continue;
         open_member(printer, field->name, "{");
         if (field->doc != NULL)
             text_member(printer, "description", field->doc);
