@@ -21,6 +21,8 @@
     X(NOT_FOUND, "not-found", "Not found")                                                         \
     X(METHOD, "method-not-allowed", "Method not allowed")                                          \
     X(CONFLICT, "conflict", "Conflict")                                                            \
+    X(UNCONDITIONAL, "precondition-required", "A condition is required")                           \
+    X(STALE, "precondition-failed", "It has changed since it was read")                            \
     X(GONE, "gone", "Gone")                                                                        \
     X(TIMEOUT, "timeout", "Timed out")                                                             \
     X(UNREACHABLE, "unreachable", "The server cannot be reached")                                  \

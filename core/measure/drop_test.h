@@ -13,7 +13,7 @@ typedef struct Drop {
     double drop_height, rebound_height;   // above the buffer at rest [m]
     double approach_speed, rebound_speed; // just before and after the contact [m/s]
     double contact_time;                  // [s]
-    char *excluded; // why it is not to count; NULL: it counts
+    char *excluded;                       // why it is not to count; NULL: it counts
     char *note;
 } Drop;
 typedef struct Drops {
@@ -35,14 +35,14 @@ typedef struct Traces {
 } Traces;
 
 typedef struct DropTest {
-    char *impactor; // "steel ball, 30 mm"
+    char *impactor;       // "steel ball, 30 mm"
     double impactor_mass; // [kg]
     int base;             // MaterialBase; CHOICE_ABSENT: nobody says
     double base_mass;     // of a free base [kg]
     char *geometry;       // of the buffer and the set-up
-    double gravity;       // that pulls the impactor into the buffer during contact; 0: none, or not to be
-                          // taken into account [m/s^2]
-    double temperature;   // [degC]
+    double gravity; // that pulls the impactor into the buffer during contact; 0: none, or not to be
+                    // taken into account [m/s^2]
+    double temperature; // [degC]
     char *instrument, *date, *person, *source, *notes;
     // Standard uncertainty of one reading, from the instrument; NAN: not known.
     double height_uncertainty; // [m]

@@ -11,24 +11,25 @@ enum { TRACE_CONTACTS_MOST = 1000 };
 
 // How a trace is read.
 typedef struct TraceWay {
-    int separation;        // Separation
-    double threshold;      // of detection [N]; NAN: from the noise
-    double effective_mass; // of the pair, used only with gravity; NAN: not known [kg]
-    double gravity;        // that pulls the pair together during contact; 0: none [m/s^2]
+    int separation;                // Separation
+    double threshold;              // of detection [N]; NAN: from the noise
+    double effective_mass;         // of the pair, used only with gravity; NAN: not known [kg]
+    double gravity;                // that pulls the pair together during contact; 0: none [m/s^2]
     const double *approach_speeds; // of the contacts in order, used only with gravity [m/s]
     size_t approach_speed_count;
 } TraceWay;
 
 // One contact. What is not known is NAN; uncertainties are standard ones.
 typedef struct TraceContact {
-    double start, end;  // of the fitted pulse [s]
-    double first, last; // of the samples in contact [s]
-    uint64_t samples;   // in contact
-    double peak;        // largest force above the baseline [N]
-    double impulse;     // [N s]
-    double crossing_time, crossing_uncertainty; // between crossings of the threshold [s]
+    double start, end;                             // of the fitted pulse [s]
+    double first, last;                            // of the samples in contact [s]
+    uint64_t samples;                              // in contact
+    double peak;                                   // largest force above the baseline [N]
+    double impulse;                                // [N s]
+    double crossing_time, crossing_uncertainty;    // between crossings of the threshold [s]
     double contact_time, contact_time_uncertainty; // of an isolated pair, by the fit [s]
-    double least_contact_time, most_contact_time; // within which it lies, 95 %; also where there is no figure [s]
+    double least_contact_time,
+        most_contact_time; // within which it lies, 95 %; also where there is no figure [s]
     double restitution, restitution_uncertainty; // by the pulse's shape
     double misfit; // rms of what the fit leaves over the noise; large: the trace is not the model's
     char *why;     // no figure is given, or it is doubtful; NULL

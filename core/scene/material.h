@@ -10,10 +10,10 @@ enum { MATERIAL_ROWS = 1000, MATERIAL_SLUG_MOST = 63 };
 
 // What was measured at one approach speed; deviations are standard deviations, NAN: not known.
 typedef struct MaterialRow {
-    double approach_speed;        // [m/s]
-    double restitution;           // e [-]
-    double contact_time;          // T_c [s]
-    double restitution_deviation; // [-]
+    double approach_speed;         // [m/s]
+    double restitution;            // e [-]
+    double contact_time;           // T_c [s]
+    double restitution_deviation;  // [-]
     double contact_time_deviation; // [s]
 } MaterialRow;
 
@@ -24,13 +24,12 @@ typedef struct MaterialRows {
 
 // What the buffer lay on in the test.
 typedef enum MaterialBase { MATERIAL_BASE_FIXED, MATERIAL_BASE_FREE } MaterialBase;
-extern const char *const material_base_names[];       // "fixed", "free"; NULL-terminated
-extern const char *const material_separation_names[]; // by Separation; NULL-terminated
+extern const char *const material_base_names[]; // "fixed", "free"; NULL-terminated
 
 // What is not known is NAN, NULL, CHOICE_ABSENT or empty: never a figure that nobody measured.
 typedef struct Material {
-    char *name;  // for people
-    char *kind;  // "foam", "rubber", "metal" ...
+    char *name;       // for people
+    char *kind;       // "foam", "rubber", "metal" ...
     double thickness; // [m]
     char *hardness;   // with its scale: "Shore A 40"
     char *supplier, *notes;
@@ -41,15 +40,16 @@ typedef struct Material {
     int separation; // Separation: the rule by which a contact's end was told; CHOICE_ABSENT
     double least_speed, most_speed;             // approach speeds measured [m/s]
     double least_temperature, most_temperature; // [degC]
-    char *impactor;       // "steel ball, 30 mm"
-    double impactor_mass; // [kg]
-    int base;             // MaterialBase; CHOICE_ABSENT: nobody says
-    double base_mass;     // of a free base [kg]
-    char *source;         // DOI, report, or where the numbers come from
-    Reals measurements;   // of this material, by number, that the numbers were taken from
+    char *impactor;                             // "steel ball, 30 mm"
+    double impactor_mass;                       // [kg]
+    int base;                                   // MaterialBase; CHOICE_ABSENT: nobody says
+    double base_mass;                           // of a free base [kg]
+    char *source;                               // DOI, report, or where the numbers come from
+    Reals measurements; // of this material, by number, that the numbers were taken from
 } Material;
 
 extern const Field material_fields[];
+extern const Field material_list_fields[]; // of them only those that are lists
 
 // Whether `slug` may name a material: [a-z0-9_-]+, at most MATERIAL_SLUG_MOST of them.
 bool material_slug_is_good(const char *slug);

@@ -5,20 +5,8 @@
 #include <strings.h>
 
 #include "server/api/app.h"
-#include "server/base/link.h"
-#include "server/codec/write.h"
 #include "server/http/reply.h"
-
-static void write_material(Bytes *bytes, const MaterialRevision *material) {
-    bytes_text(bytes, "{");
-    if (write_members(bytes, material_fields, material, WRITE_REPORT) > 0)
-        bytes_text(bytes, ", ");
-    bytes_format(
-        bytes,
-        "\"links\": {\"self\": \"%s/v1/materials/%s\", \"revision\": \"%s/v1/materials/%s@%llu\"}}",
-        link_base(), material->slug, link_base(), material->slug,
-        (unsigned long long)material->revision);
-}
+#include "server/materials/catalogue.h"
 
 static bool holds(const char *text, const char *word) {
     const size_t size = strlen(word);
@@ -40,12 +28,14 @@ Status materials_list(App *app, const Request *request, Reply *reply, Problem *p
     bytes_text(&bytes, "{\"materials\": [");
     bool is_first = true;
     for (size_t i = 0; i < materials.count; i++) {
-        const MaterialRevision *material = &materials.at[i];
-        if (word != NULL && !holds(material->slug, word) && !holds(material->name, word) &&
-            !holds(material->source, word))
+        MaterialRevision *material = &materials.at[i];
+        const Material *said = &material->material;
+        if (word != NULL && !holds(material->slug, word) && !holds(said->name, word) &&
+            !holds(said->source, word))
             continue;
         bytes_text(&bytes, is_first ? "" : ",\n ");
-        write_material(&bytes, material);
+        (void)catalogue_read_lists(material, NULL);
+        catalogue_write(&bytes, material);
         is_first = false;
     }
     bytes_text(&bytes, "]}\n");
@@ -57,22 +47,22 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
                    Problem *problem) {
     MaterialRevision material = {0};
     const Status status =
-        store_material(app->store, request->parameters[0], revision, &material, problem);
+        catalogue_find(app->store, request->parameters[0], revision, &material, problem);
     if (status != STATUS_OK) {
-        fields_clear(material_fields, &material);
+        material_revision_clear(&material);
         return status;
     }
-    // A revision's status may still change (a draft is approved), so the tag tells it too.
-    char tag[96];
-    snprintf(tag, sizeof tag, "%.48s@%llu-%.20s", material.slug,
-             (unsigned long long)material.revision, material.status != NULL ? material.status : "");
+    // What is said of a revision may still change (a draft is approved): the version tells.
+    char tag[110];
+    snprintf(tag, sizeof tag, "%.63s@%llu-%llu", material.slug,
+             (unsigned long long)material.revision, (unsigned long long)material.version);
     Bytes bytes = {.most = app->reply_most};
     const bool is_known = reply_tagged(reply, request, tag);
     if (!is_known) {
-        write_material(&bytes, &material);
+        catalogue_write(&bytes, &material);
         bytes_text(&bytes, "\n");
     }
-    fields_clear(material_fields, &material);
+    material_revision_clear(&material);
     return is_known ? STATUS_OK : reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 

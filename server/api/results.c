@@ -17,6 +17,7 @@
 #include "server/encode/answer.h"
 #include "server/http/doorman.h"
 #include "server/http/reply.h"
+#include "server/materials/catalogue.h"
 #include "server/jobs/documents.h"
 
 const char no_impacts[] =
@@ -215,12 +216,12 @@ static void write_used(App *app, Bytes *bytes, const char *name, bool is_first) 
     if (size < sizeof slug) {
         memcpy(slug, name, size);
         slug[size] = '\0';
-        if (store_material(app->store, slug, revision, &material, NULL) == STATUS_OK) {
-            write_item(bytes, material_fields, &material, WRITE_REPORT);
-            fields_clear(material_fields, &material);
+        if (catalogue_find(app->store, slug, revision, &material, NULL) == STATUS_OK) {
+            catalogue_write_said(bytes, &material);
+            material_revision_clear(&material);
             return;
         }
-        fields_clear(material_fields, &material);
+        material_revision_clear(&material);
     }
     bytes_text(bytes, "{\"slug\": "); // no longer here: its numbers stand in the scene
     bytes_json_string(bytes, name);

@@ -126,6 +126,7 @@ static Status status_of(int code, const char *type) {
     case 504:
         return STATUS_UNREACHABLE;
     case 409:
+    case 412:
         return STATUS_CONFLICT;
     default:
         return STATUS_INTERNAL;

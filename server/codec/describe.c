@@ -4,11 +4,13 @@
 
 #include <stdio.h>
 
+#include "core/scene/material.h"
 #include "core/study/inquiry.h"
 
 // clang-format off
 const SchemaDocument schema_documents[] = {
     {"scene", "A scene: what impactd is asked to simulate", inquiry_fields},
+    {"material", "A buffer material: what one revision of it says", material_fields},
     {NULL, NULL, NULL},
 };
 // clang-format on

@@ -190,7 +190,7 @@ int write_problem_code(Status status) {
         [STATUS_USAGE] = 400,          [STATUS_TOO_LARGE] = 413,      [STATUS_UNSUPPORTED_TYPE] = 415,
         [STATUS_NOT_ACCEPTABLE] = 406, [STATUS_UNAUTHORIZED] = 401,   [STATUS_FORBIDDEN] = 403,
         [STATUS_NOT_FOUND] = 404,      [STATUS_METHOD] = 405,         [STATUS_CONFLICT] = 409,
-        [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
+        [STATUS_UNCONDITIONAL] = 428, [STATUS_STALE] = 412, [STATUS_GONE] = 410,           [STATUS_TIMEOUT] = 504,        [STATUS_BUSY] = 503,
         [STATUS_CANCELLED] = 409,      [STATUS_LIMIT] = 422,          [STATUS_UNSTABLE] = 422,
         [STATUS_QUOTA] = 429,          [STATUS_REUSED] = 422,         [STATUS_FULL] = 507,
         [STATUS_NO_MEMORY] = 500,      [STATUS_IO] = 500,             [STATUS_INTERNAL] = 500,

@@ -12,6 +12,7 @@
 #include "server/codec/read.h"
 #include "server/jobs/intake_state.h"
 #include "server/jobs/prepare_record.h"
+#include "server/store/material_rows.h"
 
 // "slug" or "slug@revision"; false if what stands behind @ is no revision.
 static bool split_name(const char *name, char slug[128], uint64_t *revision) {
@@ -98,9 +99,9 @@ static Status fill(Buffer *buffer, const MaterialRevision *material, const char 
     char name[160];
     snprintf(name, sizeof name, "%s@%llu", material->slug, (unsigned long long)material->revision);
     // Under impulse a canonical scene has no contact time: completion leaves it out again.
-    Status status = match(&buffer->restitution, material->restitution, pointer, "restitution", NULL,
+    Status status = match(&buffer->restitution, material->material.restitution, pointer, "restitution", NULL,
                           name, problem);
-    const Status second = match(&buffer->contact_time, material->contact_time, pointer,
+    const Status second = match(&buffer->contact_time, material->material.contact_time, pointer,
                                 "contact_time", "s", name, problem);
     if (status != STATUS_OK || second != STATUS_OK)
         return STATUS_INVALID;
@@ -136,7 +137,7 @@ static Status resolve(Store *store, Buffer *buffer, const char *pointer, Warning
     else
         status =
             problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
-    fields_clear(material_fields, &material);
+    material_revision_clear(&material);
     return status;
 }
 

@@ -29,7 +29,7 @@ MaterialMemory *material_memory_new(void) {
 
 static void forget(MaterialMemory *memory) {
     for (size_t i = 0; i < memory->count; i++)
-        fields_clear(material_fields, &memory->known[i].material);
+        material_revision_clear(&memory->known[i].material);
     memory->count = 0;
 }
 
@@ -48,7 +48,7 @@ bool material_memory_find(MaterialMemory *memory, uint64_t generation, const cha
     for (size_t i = 0; i < memory->count && generation == memory->generation && !is_found; i++) {
         const Known *known = &memory->known[i];
         is_found = known->asked == revision && strcmp(known->material.slug, slug) == 0 &&
-                   fields_copy(material_fields, &known->material, material) == STATUS_OK;
+                   material_revision_copy(&known->material, material) == STATUS_OK;
     }
     pthread_mutex_unlock(&memory->lock);
     return is_found;
@@ -64,7 +64,7 @@ void material_memory_put(MaterialMemory *memory, uint64_t generation, uint64_t r
         Known *known = &memory->known[memory->count];
         memory->generation = generation;
         known->asked = revision;
-        memory->count += fields_copy(material_fields, material, &known->material) == STATUS_OK;
+        memory->count += material_revision_copy(material, &known->material) == STATUS_OK;
     }
     pthread_mutex_unlock(&memory->lock);
 }

@@ -3,7 +3,7 @@
 #ifndef SERVER_STORE_MATERIAL_MEMORY_H
 #define SERVER_STORE_MATERIAL_MEMORY_H
 
-#include "server/store/store.h"
+#include "server/store/material_rows.h"
 
 typedef struct MaterialMemory MaterialMemory;
 

@@ -1,42 +1,23 @@
-// Materials, read only: the view material_states says of each revision what the last review made of
-// it.
+// Reading. The view material_states says of each revision what the last review made of it.
+#include "server/store/material_rows.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/store/access.h"
+#include "server/store/material_columns.h"
 #include "server/store/material_memory.h"
-#include "server/store/store.h"
-
-// clang-format off
-const Field material_fields[] = {
-    FIELD_TEXT(MaterialRevision, slug, 64, PRESENCE_REQUIRED, 0, "its name in scenes"),
-    FIELD_TEXT(MaterialRevision, name, 200, PRESENCE_REQUIRED, 0, "its name for people"),
-    FIELD_COUNT(MaterialRevision, revision, NULL, AT_LEAST(1), REQUIRED, "revisions are counted from 1 and never change"),
-    FIELD_TEXT(MaterialRevision, status, 16, PRESENCE_REQUIRED, 0, "draft, approved or deprecated"),
-    FIELD_REAL(MaterialRevision, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
-    FIELD_REAL(MaterialRevision, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
-    FIELD_TEXT(MaterialRevision, source, 1000, PRESENCE_REQUIRED, 0, "where the numbers come from"),
-    FIELD_END
-};
-
-static const RowColumn material_columns[] = {
-    ROW_COLUMN(MaterialRevision, slug, COLUMN_TEXT),
-    ROW_COLUMN(MaterialRevision, name, COLUMN_TEXT),
-    ROW_COLUMN(MaterialRevision, revision, COLUMN_COUNT),
-    ROW_COLUMN(MaterialRevision, status, COLUMN_TEXT),
-    ROW_COLUMN(MaterialRevision, restitution, COLUMN_REAL),
-    ROW_COLUMN(MaterialRevision, contact_time, COLUMN_REAL),
-    ROW_COLUMN(MaterialRevision, source, COLUMN_TEXT),
-    ROW_END
-};
-// clang-format on
 
 typedef struct Key {
     char *slug;
-    uint64_t revision;
+    uint64_t number; // of a revision, a measurement
 } Key;
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, slug, COLUMN_TEXT),
-                                        ROW_COLUMN(Key, revision, COLUMN_COUNT), ROW_END};
+                                        ROW_COLUMN(Key, number, COLUMN_COUNT), ROW_END};
+
+// SQLite counts with a sign; no number is that high.
+static Key key_of(const char *slug, uint64_t number) {
+    return (Key){(char *)slug, number > INT64_MAX ? INT64_MAX : number};
+}
 
 // The head: an approved revision before any other, the newest first; a deprecated one is nobody's
 // head.
@@ -44,16 +25,37 @@ static const char head_sql[] =
     "SELECT * FROM material_states WHERE slug = :slug AND status <> 'deprecated' "
     "ORDER BY status = 'approved' DESC, revision DESC LIMIT 1";
 static const char revision_sql[] =
-    "SELECT * FROM material_states WHERE slug = :slug AND revision = :revision";
+    "SELECT * FROM material_states WHERE slug = :slug AND revision = :number";
 static const char heads_sql[] = "SELECT * FROM (SELECT *, row_number() OVER (PARTITION BY slug "
                                 "ORDER BY status = 'approved' DESC, "
                                 "status = 'draft' DESC, revision DESC) AS place FROM "
                                 "material_states) WHERE place = 1 ORDER BY slug";
 
+void material_revision_clear(MaterialRevision *revision) {
+    fields_clear(material_fields, &revision->material);
+    row_clear(material_revision_columns, revision, sizeof *revision);
+}
+
+Status material_revision_copy(const MaterialRevision *revision, MaterialRevision *copy) {
+    Material material;
+    if (!row_copy(material_revision_columns, revision, copy, sizeof *copy))
+        return STATUS_NO_MEMORY;
+    if (fields_copy(material_fields, &revision->material, &material) != STATUS_OK) {
+        material_revision_clear(copy);
+        return STATUS_NO_MEMORY;
+    }
+    fields_clear(material_fields, &copy->material);
+    copy->material = material;
+    return STATUS_OK;
+}
+
+static Status refuse_slug(const char *slug, Problem *problem) {
+    return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
+}
+
 Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
                       Problem *problem) {
-    // SQLite counts with a sign; no revision is that high.
-    const Key key = {(char *)slug, revision > INT64_MAX ? INT64_MAX : revision};
+    const Key key = key_of(slug, revision);
     MaterialMemory *memory = store_material_memory(store);
     const uint64_t generation = store_generation(store);
     bool is_found;
@@ -61,31 +63,130 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
     if (material_memory_find(memory, generation, slug, revision, material))
         return STATUS_OK;
     TRY(store_first(store, revision == 0 ? head_sql : revision_sql, key_columns, &key,
-                    material_columns, material, &is_found, problem));
+                    material_revision_columns, material, &is_found, problem));
     if (is_found) {
         material_memory_put(memory, generation, revision, material);
         return STATUS_OK;
     }
     if (revision == 0)
-        return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
+        return refuse_slug(slug, problem);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no material \"%.64s\" with a revision %llu", slug,
                        (unsigned long long)revision);
 }
 
-Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem) {
-    void *at;
-    const Status status = store_all(store, heads_sql, NULL, NULL, material_columns,
-                                    sizeof *materials->at, &at, &materials->count, problem);
-    materials->at = at;
-    if (status != STATUS_OK)
-        material_revisions_clear(materials);
+// All rows of a query into a typed list; on failure it is cleared.
+static Status all(Store *store, const char *sql, const Key *key, const RowColumn *columns,
+                  size_t size, void *list, Problem *problem) {
+    List *rows = list;
+    *rows = (List){NULL, 0};
+    const Status status = store_all(store, sql, key == NULL ? NULL : key_columns, key, columns,
+                                    size, &rows->at, &rows->count, problem);
+    if (status == STATUS_OK)
+        return status;
+    for (size_t i = 0; i < rows->count; i++)
+        row_clear(columns, (char *)rows->at + i * size, size);
+    free(rows->at);
+    *rows = (List){NULL, 0};
     return status;
+}
+
+Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem) {
+    return all(store, heads_sql, NULL, material_revision_columns, sizeof *materials->at, materials,
+               problem);
+}
+
+Status store_material_revisions(Store *store, const char *slug, MaterialRevisions *revisions,
+                                Problem *problem) {
+    static const char own_sql[] =
+        "SELECT * FROM material_states WHERE slug = :slug ORDER BY revision";
+    static const char all_sql[] = "SELECT * FROM material_states ORDER BY slug, revision";
+    const Key key = key_of(slug, 0);
+    TRY(all(store, slug != NULL ? own_sql : all_sql, slug != NULL ? &key : NULL,
+            material_revision_columns, sizeof *revisions->at, revisions, problem));
+    return slug != NULL && revisions->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;
+}
+
+static void clear_all(const RowColumn *columns, size_t size, void *list) {
+    List *rows = list;
+    for (size_t i = 0; i < rows->count; i++)
+        row_clear(columns, (char *)rows->at + i * size, size);
+    free(rows->at);
+    *rows = (List){NULL, 0};
 }
 
 void material_revisions_clear(MaterialRevisions *materials) {
     for (size_t i = 0; i < materials->count; i++)
-        row_clear(material_columns, &materials->at[i], sizeof materials->at[i]);
+        material_revision_clear(&materials->at[i]);
     free(materials->at);
-    *materials = (MaterialRevisions){0};
+    *materials = (MaterialRevisions){NULL, 0};
+}
+
+Status store_material_reviews(Store *store, const char *slug, MaterialReviews *reviews,
+                              Problem *problem) {
+    static const char own_sql[] = "SELECT m.slug, v.* FROM material_reviews v JOIN materials m ON "
+                                  "m.number = v.material WHERE m.slug = :slug ORDER BY v.number";
+    static const char all_sql[] =
+        "SELECT m.slug, v.* FROM material_reviews v JOIN materials m ON m.number = v.material "
+        "ORDER BY m.slug, v.revision, v.number";
+    const Key key = key_of(slug, 0);
+    return all(store, slug != NULL ? own_sql : all_sql, slug != NULL ? &key : NULL,
+               material_review_columns, sizeof *reviews->at, reviews, problem);
+}
+
+void material_reviews_clear(MaterialReviews *reviews) {
+    clear_all(material_review_columns, sizeof *reviews->at, reviews);
+}
+
+static const char measurements_sql[] = "SELECT m.slug, t.* FROM material_measurements t JOIN "
+                                       "materials m ON m.number = t.material ORDER BY m.slug, "
+                                       "t.measurement";
+static const char own_measurements_sql[] =
+    "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
+    "WHERE m.slug = :slug ORDER BY t.measurement";
+static const char measurement_sql[] =
+    "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
+    "WHERE m.slug = :slug AND t.measurement = :number";
+
+Status store_material_measurements(Store *store, const char *slug,
+                                   MaterialMeasurements *measurements, Problem *problem) {
+    const Key key = key_of(slug, 0);
+    return all(store, slug != NULL ? own_measurements_sql : measurements_sql,
+               slug != NULL ? &key : NULL, material_measurement_columns, sizeof *measurements->at,
+               measurements, problem);
+}
+
+Status store_material_measurement(Store *store, const char *slug, uint64_t number,
+                                  MaterialMeasurement *measurement, Problem *problem) {
+    const Key key = key_of(slug, number);
+    bool is_found;
+    memset(measurement, 0, sizeof *measurement);
+    TRY(store_first(store, measurement_sql, key_columns, &key, material_measurement_columns,
+                    measurement, &is_found, problem));
+    if (is_found)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "there is no measurement %llu of a material \"%.64s\"",
+                       (unsigned long long)number, slug);
+}
+
+void material_measurement_clear(MaterialMeasurement *measurement) {
+    row_clear(material_measurement_columns, measurement, sizeof *measurement);
+}
+
+void material_measurements_clear(MaterialMeasurements *measurements) {
+    clear_all(material_measurement_columns, sizeof *measurements->at, measurements);
+}
+
+Status store_material_trail(Store *store, const char *slug, MaterialDeeds *deeds,
+                            Problem *problem) {
+    static const char sql[] = "SELECT t.* FROM material_trail t JOIN materials m ON m.number = "
+                              "t.material WHERE m.slug = :slug ORDER BY t.number";
+    const Key key = key_of(slug, 0);
+    TRY(all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem));
+    return deeds->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;
+}
+
+void material_deeds_clear(MaterialDeeds *deeds) {
+    clear_all(material_deed_columns, sizeof *deeds->at, deeds);
 }

@@ -40,7 +40,9 @@ static int bind(Statement *statement, int index, const RowColumn *column, const 
         return sqlite3_bind_int64(statement, index,
                                   (int64_t) * (const uint64_t *)(const void *)member);
     case COLUMN_CHOICE:
-        return sqlite3_bind_int(statement, index, *(const int *)(const void *)member);
+        return *(const int *)(const void *)member < 0
+                   ? sqlite3_bind_null(statement, index)
+                   : sqlite3_bind_int(statement, index, *(const int *)(const void *)member);
     case COLUMN_FLAG:
         return sqlite3_bind_int(statement, index, *(const bool *)(const void *)member);
     case COLUMN_BYTES: {
@@ -149,7 +151,9 @@ static bool read_column(Statement *statement, int index, const RowColumn *column
         *(uint64_t *)(void *)member = (uint64_t)sqlite3_column_int64(statement, index);
         return true;
     case COLUMN_CHOICE:
-        *(int *)(void *)member = sqlite3_column_int(statement, index);
+        *(int *)(void *)member = sqlite3_column_type(statement, index) == SQLITE_NULL
+                                     ? -1
+                                     : sqlite3_column_int(statement, index);
         return true;
     case COLUMN_FLAG:
         *(bool *)(void *)member = sqlite3_column_int(statement, index) != 0;
@@ -191,4 +195,32 @@ void row_clear(const RowColumn *columns, void *item, size_t size) {
     for (const RowColumn *column = columns; column->kind != COLUMN_END; column++)
         free_owned(column, item);
     memset(item, 0, size);
+}
+
+bool row_copy(const RowColumn *columns, const void *item, void *copy, size_t size) {
+    memset(copy, 0, size);
+    for (const RowColumn *column = columns; column->kind != COLUMN_END; column++) {
+        const void *from = (const char *)item + column->offset;
+        void *to = (char *)copy + column->offset;
+        if (column->kind != COLUMN_TEXT && column->kind != COLUMN_BYTES) {
+            memcpy(to, from, column->size);
+            continue;
+        }
+        const bool is_text = column->kind == COLUMN_TEXT;
+        const StoredBytes *bytes = from;
+        const char *text = is_text ? *(char *const *)from : bytes->at;
+        const size_t length = text == NULL ? 0 : is_text ? strlen(text) + 1 : bytes->size;
+        char *own = text == NULL ? NULL : malloc(length + 1);
+        if (own != NULL)
+            memcpy(own, text, length);
+        if (is_text)
+            *(char **)to = own;
+        else
+            *(StoredBytes *)to = (StoredBytes){own, length};
+        if (own == NULL && text != NULL) {
+            row_clear(columns, copy, size);
+            return false;
+        }
+    }
+    return true;
 }

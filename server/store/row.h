@@ -4,6 +4,7 @@
 #ifndef SERVER_STORE_ROW_H
 #define SERVER_STORE_ROW_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "core/base/status.h"
@@ -16,7 +17,7 @@ typedef enum ColumnKind {
     COLUMN_REAL,    // double; NAN is NULL
     COLUMN_INTEGER, // int64_t
     COLUMN_COUNT,   // uint64_t, size_t
-    COLUMN_CHOICE,  // int
+    COLUMN_CHOICE,  // int; negative is NULL
     COLUMN_FLAG,    // bool
     COLUMN_BYTES,   // StoredBytes, owned
 } ColumnKind;
@@ -30,6 +31,9 @@ typedef struct RowColumn {
 // clang-format off
 #define ROW_COLUMN(Type, member, kind_) \
     {.name = #member, .kind = kind_, .offset = offsetof(Type, member), .size = sizeof(((Type *)0)->member)}
+// A member of a nested struct under a column's name of its own.
+#define ROW_COLUMN_AS(Type, member, name_, kind_) \
+    {.name = name_, .kind = kind_, .offset = offsetof(Type, member), .size = sizeof(((Type *)0)->member)}
 #define ROW_END {.kind = COLUMN_END}
 // clang-format on
 
@@ -50,6 +54,10 @@ Status row_bind(Statement *statement, RowMap *map, const RowColumn *columns, con
 // Reads the current row into the members of its columns' names; the others stay as they are. `item`
 // holds no texts. On failure it is cleared.
 Status row_read(Statement *statement, const RowColumn *columns, void *item, Problem *problem);
+
+// A copy with texts of its own of what the columns name; the rest of `copy`, of `size` bytes, is
+// zero. False without memory, and then it is all zero.
+bool row_copy(const RowColumn *columns, const void *item, void *copy, size_t size);
 
 // Frees the texts and sets all of `item`, of `size` bytes, to zero.
 void row_clear(const RowColumn *columns, void *item, size_t size);

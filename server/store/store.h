@@ -61,24 +61,6 @@ typedef struct StoreTotals {
 } StoreTotals;
 const StoreTotals *store_totals(const Store *store);
 
-typedef struct MaterialRevision {
-    char *slug, *name, *status, *source;
-    uint64_t revision;
-    double restitution, contact_time;
-} MaterialRevision;
-typedef struct MaterialRevisions {
-    MaterialRevision *at;
-    size_t count;
-} MaterialRevisions;
-extern const Field material_fields[];
-// revision 0: the approved head, else the newest draft. STATUS_NOT_FOUND. Cleared by
-// fields_clear(material_fields). A member that is not known is NAN.
-Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
-                      Problem *problem);
-// The head of every material, by slug; of those that are all deprecated the newest revision.
-Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
-void material_revisions_clear(MaterialRevisions *materials);
-
 typedef struct JobRow {
     char id[40];
     int state; // JobState
@@ -134,6 +116,8 @@ typedef struct ResultRow {
     char *notes;    // JSON array, what the run itself warned of; NULL: nothing
     char *psd;      // JSON; NULL where none was asked for
     char *study;    // JSON, the answer of the scene's study; NULL: none
+    char *uses;     // when saved: what of the catalogue it was made with, "sponge@1", a line each;
+                    // NULL: nothing
     uint64_t count; // samples
     double sample_rate;
     int64_t created_unix_ms;

@@ -10,12 +10,12 @@
 #include <cmocka.h>
 
 static const MaterialRevision sponge = {.slug = "sponge",
-                                        .name = "Sponge",
-                                        .status = "approved",
-                                        .source = "s",
                                         .revision = 3,
-                                        .restitution = 0.61,
-                                        .contact_time = 0.025};
+                                        .material = {.name = "Sponge",
+                                                     .source = "s",
+                                                     .restitution = 0.61,
+                                                     .contact_time = 0.025},
+                                        .status = "approved"};
 
 static bool has(MaterialMemory *memory, uint64_t generation, const char *slug, uint64_t revision) {
     MaterialRevision found = {0};
@@ -24,8 +24,8 @@ static bool has(MaterialMemory *memory, uint64_t generation, const char *slug, u
         assert_string_equal(found.slug, slug);
         assert_string_equal(found.status, "approved");
         assert_int_equal(found.revision, 3);
-        assert_true(found.restitution == 0.61 && found.contact_time == 0.025);
-        fields_clear(material_fields, &found);
+        assert_true(found.material.restitution == 0.61 && found.material.contact_time == 0.025);
+        material_revision_clear(&found);
     }
     return is_found;
 }

@@ -1,6 +1,7 @@
 // The store from outside: durable when a call returns, one daemon a folder, seeds, jobs and
 // results.
 #include "server/store/job_search.h"
+#include "server/store/material_rows.h"
 #include "server/store/store.h"
 
 #include <pthread.h>
@@ -65,14 +66,14 @@ static void the_papers_materials_are_there(void **state) {
 
     MaterialRevision sponge;
     assert_int_equal(store_material(store, "sponge", 0, &sponge, NULL), STATUS_OK);
-    assert_string_equal(sponge.name, "Sponge");
+    assert_string_equal(sponge.material.name, "Sponge");
     assert_string_equal(sponge.status, "approved");
-    assert_string_equal(sponge.source, "doi:10.1002/stc.238, Table I");
+    assert_string_equal(sponge.material.source, "doi:10.1002/stc.238, Table I");
     assert_int_equal(sponge.revision, 1);
-    assert_true(sponge.restitution == 0.61 && sponge.contact_time == 0.025);
-    fields_clear(material_fields, &sponge);
+    assert_true(sponge.material.restitution == 0.61 && sponge.material.contact_time == 0.025);
+    material_revision_clear(&sponge);
     assert_int_equal(store_material(store, "sponge", 1, &sponge, NULL), STATUS_OK);
-    fields_clear(material_fields, &sponge);
+    material_revision_clear(&sponge);
     assert_int_equal(store_material(store, "sponge", 2, &sponge, NULL), STATUS_NOT_FOUND);
     assert_int_equal(store_material(store, "sponge", UINT64_MAX, &sponge, NULL), STATUS_NOT_FOUND);
     assert_int_equal(store_material(store, "spong", 0, &sponge, NULL), STATUS_NOT_FOUND);
@@ -419,9 +420,9 @@ static void revisions_of_materials_never_change(void **state) {
         database_execute(
             database,
             "INSERT INTO material_revisions (material, revision, name, restitution, source, "
-            "created_unix_ms) VALUES (1, 2, 'Sponge', 0.7, 'x', 0);"
+            "comment, created_unix_ms) VALUES (1, 2, 'Sponge', 0.7, 'x', 'y', 0);"
             "INSERT INTO material_revisions (material, revision, name, restitution, source, "
-            "created_unix_ms) VALUES (1, 3, 'Sponge', 0.8, 'x', 0);"
+            "comment, created_unix_ms) VALUES (1, 3, 'Sponge', 0.8, 'x', 'y', 0);"
             "INSERT INTO material_reviews (material, revision, status, reason, "
             "created_unix_ms) VALUES (1, 2, 'approved', 'better', 0)",
             NULL),
@@ -431,11 +432,11 @@ static void revisions_of_materials_never_change(void **state) {
     MaterialRevision sponge;
     assert_int_equal(store_material(store, "sponge", 0, &sponge, NULL), STATUS_OK);
     assert_int_equal(sponge.revision, 2);
-    assert_true(isnan(sponge.contact_time));
-    fields_clear(material_fields, &sponge);
+    assert_true(isnan(sponge.material.contact_time));
+    material_revision_clear(&sponge);
     assert_int_equal(store_material(store, "sponge", 3, &sponge, NULL), STATUS_OK);
     assert_string_equal(sponge.status, "draft");
-    fields_clear(material_fields, &sponge);
+    material_revision_clear(&sponge);
     store_close(store);
 }
 

@@ -1,0 +1,214 @@
+// A material says e and T_c once, for every approach speed, or as a table; what it does not know it
+// does not say.
+#include "core/scene/material.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/contact/contact.h"
+#include "core/contact/identify.h"
+
+const char *const material_base_names[] = {
+    [MATERIAL_BASE_FIXED] = "fixed", [MATERIAL_BASE_FREE] = "free", NULL};
+
+// clang-format off
+static const Field row_fields[] = {
+    FIELD_REAL(MaterialRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
+    FIELD_REAL(MaterialRow, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
+    FIELD_REAL(MaterialRow, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
+    FIELD_REAL(MaterialRow, restitution_deviation, NULL, AT_LEAST(0), OPTIONAL, "standard deviation of restitution"),
+    FIELD_REAL(MaterialRow, contact_time_deviation, "s", AT_LEAST(0), OPTIONAL, "standard deviation of contact_time"),
+    FIELD_END
+};
+
+#define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by")
+#define TABLE FIELD_LIST(Material, table, row_fields, MATERIAL_ROWS, PRESENCE_OPTIONAL, "restitution and contact_time over approach speed, in place of the two; linear between the rows, constant beyond them")
+#define MEASUREMENTS FIELD_REALS(Material, measurements, NULL, AT_LEAST(1), 1000, PRESENCE_OPTIONAL, "numbers of this material's measurements that restitution and contact_time were taken from")
+
+const Field material_fields[] = {
+    FIELD_TEXT(Material, name, 200, PRESENCE_REQUIRED, 0, "its name for people"),
+    FIELD_TEXT(Material, kind, 60, PRESENCE_OPTIONAL, 0, "what it is: foam, rubber, metal ..."),
+    FIELD_REAL(Material, thickness, "m", ABOVE(0), OPTIONAL, "of the layer at the stop"),
+    FIELD_TEXT(Material, hardness, 60, PRESENCE_OPTIONAL, 0, "with its scale, as \"Shore A 40\""),
+    FIELD_TEXT(Material, supplier, 200, PRESENCE_OPTIONAL, 0, "who sells it, under what number"),
+    FIELD_TEXT(Material, notes, 4000, PRESENCE_OPTIONAL, 0, "whatever else one should know"),
+    TAGS,
+    FIELD_REAL(Material, restitution, NULL, WITHIN(0, 1), OPTIONAL, "coefficient of restitution e, for every approach speed"),
+    FIELD_REAL(Material, restitution_deviation, NULL, AT_LEAST(0), OPTIONAL, "standard deviation of restitution"),
+    FIELD_REAL(Material, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact, for every approach speed"),
+    FIELD_REAL(Material, contact_time_deviation, "s", AT_LEAST(0), OPTIONAL, "standard deviation of contact_time"),
+    TABLE,
+    FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "the rule by which the end of a contact was told, where contact_time was fitted to a force trace"),
+    FIELD_REAL(Material, least_speed, "m/s", AT_LEAST(0), OPTIONAL, "least approach speed that was measured"),
+    FIELD_REAL(Material, most_speed, "m/s", AT_LEAST(0), OPTIONAL, "largest approach speed that was measured"),
+    FIELD_REAL(Material, least_temperature, "degC", AT_LEAST(-273.15), OPTIONAL, "lowest temperature at which it was measured"),
+    FIELD_REAL(Material, most_temperature, "degC", AT_LEAST(-273.15), OPTIONAL, "highest temperature at which it was measured"),
+    FIELD_TEXT(Material, impactor, 200, PRESENCE_OPTIONAL, 0, "what struck it in the test"),
+    FIELD_REAL(Material, impactor_mass, "kg", ABOVE(0), OPTIONAL, "mass of the impactor"),
+    FIELD_CHOICE(Material, base, material_base_names, OPTIONAL, "what it lay on in the test"),
+    FIELD_REAL(Material, base_mass, "kg", ABOVE(0), OPTIONAL, "mass of a free base"),
+    FIELD_TEXT(Material, source, 1000, PRESENCE_REQUIRED, 0, "where the numbers come from: DOI, report, test"),
+    MEASUREMENTS,
+    FIELD_END
+};
+
+const Field material_list_fields[] = {TAGS, TABLE, MEASUREMENTS, FIELD_END};
+// clang-format on
+
+static bool has(double value) {
+    return !isnan(value);
+}
+
+bool material_slug_is_good(const char *slug) {
+    const size_t size = strlen(slug);
+    return size > 0 && size <= MATERIAL_SLUG_MOST &&
+           strspn(slug, "abcdefghijklmnopqrstuvwxyz0123456789_-") == size;
+}
+
+static Status fault(const char *pointer, const char *name, Problem *problem, const char *detail) {
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
+}
+
+static Status check_text(const char *text, const char *pointer, const char *name,
+                         Problem *problem) {
+    if (text == NULL || text[strspn(text, " \t\r\n")] != '\0')
+        return STATUS_OK;
+    return fault(pointer, name, problem, "must not be empty: leave it out, or say something");
+}
+
+static Status check_order(double least, double most, const char *unit, const char *pointer,
+                          const char *name, Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)], is[32], than[32];
+    if (!(most < least))
+        return STATUS_OK;
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_add_real(problem, STATUS_INVALID, place, most, unit,
+                            "must be at least %s %s, the range's other end, is %s",
+                            text_real(than, least), unit, text_real(is, most));
+}
+
+static Status check_table(const Material *material, const char *pointer, Problem *problem) {
+    const MaterialRows *rows = &material->table;
+    char table[sizeof((Fault){0}.pointer)];
+    Status status = STATUS_OK;
+    pointer_join(table, sizeof table, pointer, "table");
+    if (rows->count == 1)
+        status = problem_add(problem, STATUS_INVALID, table,
+                             "must have at least two rows, has 1: restitution and contact_time "
+                             "alone hold for every approach speed");
+    for (size_t i = 0; i < rows->count; i++) {
+        const MaterialRow *row = &rows->at[i];
+        char at[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32], than[32];
+        pointer_index(at, sizeof at, table, i);
+        if (has(row->contact_time) != has(rows->at[0].contact_time))
+            status = fault(at, "contact_time", problem,
+                           "must be given in every row of the table or in none");
+        if (has(row->contact_time_deviation) && !has(row->contact_time))
+            status = fault(at, "contact_time_deviation", problem,
+                           "needs a contact_time that it belongs to");
+        if (i == 0 || row->approach_speed > rows->at[i - 1].approach_speed)
+            continue;
+        pointer_join(place, sizeof place, at, "approach_speed");
+        status = problem_add_real(problem, STATUS_INVALID, place, row->approach_speed, "m/s",
+                                  "must be above the row before, %s m/s, is %s",
+                                  text_real(than, rows->at[i - 1].approach_speed),
+                                  text_real(is, row->approach_speed));
+    }
+    return status;
+}
+
+// e and T_c once or as a table; a deviation belongs to its value.
+static Status check_ways(const Material *material, const char *pointer, Problem *problem) {
+    const bool has_table = material->table.count > 0;
+    const bool has_numbers = has(material->restitution) || has(material->contact_time) ||
+                             has(material->restitution_deviation) ||
+                             has(material->contact_time_deviation);
+    char table[sizeof((Fault){0}.pointer)];
+    pointer_join(table, sizeof table, pointer, "table");
+    if (has_table && has_numbers)
+        return problem_add(problem, STATUS_INVALID, table,
+                           "stands in place of restitution, contact_time and their deviations: "
+                           "leave one of the two out");
+    if (has_table || problem_concerns(problem, table))
+        return STATUS_OK;
+    Status status = STATUS_OK;
+    if (!has(material->restitution))
+        status = fault(pointer, "restitution", problem,
+                       "is required, or a table over approach speed: coefficient of restitution e");
+    if (has(material->contact_time_deviation) && !has(material->contact_time))
+        status = fault(pointer, "contact_time_deviation", problem,
+                       "needs a contact_time that it belongs to");
+    return status;
+}
+
+static Status check_base(const Material *material, const char *pointer, Problem *problem) {
+    char base[sizeof((Fault){0}.pointer)];
+    pointer_join(base, sizeof base, pointer, "base");
+    if (problem_concerns(problem, base))
+        return STATUS_OK;
+    if (has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
+        return fault(pointer, "base_mass", problem,
+                     "is the mass of a free base: say \"base\": \"free\", or leave it out");
+    return STATUS_OK;
+}
+
+static Status check_measurements(const Material *material, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < material->measurements.count; i++) {
+        const double number = material->measurements.at[i];
+        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32];
+        bool is_again = false;
+        for (size_t k = 0; k < i; k++)
+            is_again = is_again || material->measurements.at[k] == number;
+        if (!is_again && number == floor(number))
+            continue;
+        pointer_join(list, sizeof list, pointer, "measurements");
+        pointer_index(place, sizeof place, list, i);
+        status = problem_add_real(problem, STATUS_INVALID, place, number, NULL,
+                                  is_again ? "stands there twice, %s"
+                                           : "must be the number of a measurement, is %s",
+                                  text_real(is, number));
+    }
+    return status;
+}
+
+Status material_check(const Material *material, const char *pointer, Problem *problem) {
+    const Status faults[] = {
+        fields_check(material_fields, material, pointer, problem),
+        check_text(material->name, pointer, "name", problem),
+        check_text(material->kind, pointer, "kind", problem),
+        check_text(material->source, pointer, "source", problem),
+        check_ways(material, pointer, problem),
+        check_table(material, pointer, problem),
+        check_order(material->least_speed, material->most_speed, "m/s", pointer, "most_speed",
+                    problem),
+        check_order(material->least_temperature, material->most_temperature, "degC", pointer,
+                    "most_temperature", problem),
+        check_base(material, pointer, problem),
+        check_measurements(material, pointer, problem),
+    };
+    for (size_t i = 0; i < COUNT(faults); i++)
+        TRY(faults[i]);
+    return STATUS_OK;
+}
+
+void material_speeds(const Material *material, double *least, double *most) {
+    const MaterialRows *rows = &material->table;
+    *least = material->least_speed;
+    *most = material->most_speed;
+    if (!has(*least) && rows->count > 0)
+        *least = rows->at[0].approach_speed;
+    if (!has(*most) && rows->count > 0)
+        *most = rows->at[rows->count - 1].approach_speed;
+}
+
+double material_test_mass(const Material *material) {
+    if (material->base == MATERIAL_BASE_FIXED)
+        return material->impactor_mass;
+    if (material->base == MATERIAL_BASE_FREE && has(material->impactor_mass) &&
+        has(material->base_mass))
+        return effective_mass(material->impactor_mass, material->base_mass);
+    return (double)NAN;
+}
