@@ -139,24 +139,13 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     return STATUS_OK;
 }
 
-static void put_escaped(Bytes *bytes, const char *text) {
-    for (; *text != '\0'; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
-            strchr("-._~", c) != NULL)
-            bytes_put(bytes, text, 1);
-        else
-            bytes_format(bytes, "%%%02X", (unsigned)c);
-    }
-}
-
 static void link_next(const Request *request, Reply *reply, const char *last) {
     Bytes bytes = {.most = sizeof reply->link - 1};
     bytes_text(&bytes, "</v1/jobs?");
     for (size_t i = 0; i < request->query_count; i++)
         if (strcmp(request->queries[i].name, "before") != 0) {
             bytes_format(&bytes, "%s=", request->queries[i].name);
-            put_escaped(&bytes, request->queries[i].value);
+            bytes_percent(&bytes, request->queries[i].value);
             bytes_text(&bytes, "&");
         }
     bytes_format(&bytes, "before=%s>; rel=\"next\"", last);

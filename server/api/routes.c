@@ -12,6 +12,9 @@ static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
                                           "most_shift", "interval", "unit",  NULL};
 static const char *const of_materials[] = {"q", NULL};
+static const char *const of_records[] = {"q", "limit", "after", NULL};
+static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
+                                        "notes", "earthquake", "station", NULL};
 
 // clang-format off
 const Route routes[] = {
@@ -57,6 +60,12 @@ const Route routes[] = {
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
+    {"POST",   "/v1/records",                           "materials", of_record, "Upload a ground motion's file, or its samples as JSON", records_create},
+    {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list},
+    {"GET",    "/v1/records/{name}/samples.{format}",   "read",   NULL,         "A ground motion's samples as json, csv, npy, npz or mat", records_samples},
+    {"GET",    "/v1/records/{name}/samples",            "read",   NULL,         "A ground motion's samples, format by Accept", records_samples},
+    {"GET",    "/v1/records/{name}",                    "read",   NULL,         "A ground motion, and how much uses it", records_show},
+    {"DELETE", "/v1/records/{name}",                    "materials", NULL,      "Delete a ground motion that nothing uses", records_delete},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
     {"GET",    "/v1/examples/{name}",                   "read",   NULL,         "One of them, ready to submit", examples_show},
     {"GET",    "/schemas",                              "open",   NULL,         "JSON Schemas, by name", schemas_list},

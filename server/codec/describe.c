@@ -299,6 +299,7 @@ static void print_value(Printer *printer, const Field *field) {
         print_variant(printer, field);
         break;
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }
