@@ -237,6 +237,20 @@ bool header_etag_matches(const char *if_none_match, const char *etag) {
     return false;
 }
 
+bool header_etag_next(const char **list, const char **tag, size_t *size) {
+    const char *end = *list + strlen(*list);
+    Span item;
+    while (item_next(list, end, ',', &item)) {
+        const bool is_any = span_is(item, "*");
+        if (!is_any && (item.size < 2 || item.at[0] != '"' || item.at[item.size - 1] != '"'))
+            continue;
+        *tag = is_any ? item.at : item.at + 1;
+        *size = is_any ? 1 : item.size - 2;
+        return true;
+    }
+    return false;
+}
+
 bool header_type_is(const char *content_type, const char *type) {
     if (content_type == NULL)
         return false;
