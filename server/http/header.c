@@ -241,11 +241,11 @@ bool header_etag_next(const char **list, const char **tag, size_t *size) {
     const char *end = *list + strlen(*list);
     Span item;
     while (item_next(list, end, ',', &item)) {
-        const bool is_any = span_is(item, "*");
-        if (!is_any && (item.size < 2 || item.at[0] != '"' || item.at[item.size - 1] != '"'))
+        const bool is_strong = item.size >= 2 && item.at[0] == '"' && item.at[item.size - 1] == '"';
+        if (!is_strong && !span_is(item, "*"))
             continue;
-        *tag = is_any ? item.at : item.at + 1;
-        *size = is_any ? 1 : item.size - 2;
+        *tag = item.at;
+        *size = item.size;
         return true;
     }
     return false;

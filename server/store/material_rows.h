@@ -106,7 +106,7 @@ void material_deeds_clear(MaterialDeeds *deeds);
 typedef struct MaterialUses {
     struct MaterialUse {
         uint64_t revision, results;
-    } *at; // freed by free
+    } * at; // freed by free
     size_t count;
 } MaterialUses;
 Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem);

@@ -49,9 +49,9 @@ typedef struct UseSpan {
 static const RowColumn span_columns[] = {ROW_COLUMN(UseSpan, first, COLUMN_NAME),
                                          ROW_COLUMN(UseSpan, beyond, COLUMN_NAME), ROW_END};
 typedef struct MaterialUse MaterialUse;
-static const RowColumn material_use_columns[] = {
-    ROW_COLUMN(MaterialUse, revision, COLUMN_COUNT), ROW_COLUMN(MaterialUse, results, COLUMN_COUNT),
-    ROW_END};
+static const RowColumn material_use_columns[] = {ROW_COLUMN(MaterialUse, revision, COLUMN_COUNT),
+                                                 ROW_COLUMN(MaterialUse, results, COLUMN_COUNT),
+                                                 ROW_END};
 
 Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem) {
     static const char sql[] =
