@@ -56,8 +56,10 @@ static const Field trend_fields[] = {
 
 static const Field quantity_fields[] = {
     FIELD_COUNT(Quantity, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
-    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count"),
+    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
+    FIELD_REAL(Quantity, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
     FIELD_REAL(Quantity, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
+    FIELD_REAL(Quantity, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
     FIELD_REAL(Quantity, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
     FIELD_REAL(Quantity, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
     FIELD_REAL(Quantity, high, NULL, ANY, OPTIONAL, "likewise"),

@@ -70,10 +70,12 @@ typedef struct Trend {
 // e or T_c over all readings that count.
 typedef struct Quantity {
     uint64_t count;
-    double mean;
-    double deviation;      // standard deviation of the readings
-    double standard_error; // of the mean
-    double low, high;      // 95 % interval of the mean
+    double mean;            // weighted where the readings state their uncertainties
+    double unweighted_mean; // of the readings as they are
+    double deviation;       // standard deviation of the readings
+    double scatter;         // of them beyond their stated uncertainties; NAN: not weighted
+    double standard_error;  // of the mean
+    double low, high;       // 95 % interval of the mean
     double minimum, median, maximum;
     uint64_t outliers;
     double mean_without_outliers; // NAN: there are none

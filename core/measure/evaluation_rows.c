@@ -103,7 +103,7 @@ static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation
                        Problem *problem) {
     const DropTest *test = of->test;
     const Drop *drop = &test->drops.at[i];
-    EvaluationRow *row;
+    EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->place = i;
     row->approach_speed = drop_approach(test, drop);
@@ -126,7 +126,7 @@ static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation
 static Status add_contact(const Measurement *of, size_t index, size_t i, size_t number,
                           const TraceContact *contact, Evaluation *evaluation, Problem *problem) {
     const Trace *trace = &of->test->traces.at[i];
-    EvaluationRow *row;
+    EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->is_of_trace = true;
     row->place = i;
@@ -153,7 +153,7 @@ static Status add_contact(const Measurement *of, size_t index, size_t i, size_t 
 // A trace that tells nothing is a row, too.
 static Status add_silent(const Measurement *of, size_t index, size_t i, const char *why,
                          Evaluation *evaluation, Problem *problem) {
-    EvaluationRow *row;
+    EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->is_of_trace = true;
     row->place = i;
