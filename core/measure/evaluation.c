@@ -41,6 +41,8 @@ static const Field trend_fields[] = {
     FIELD_COUNT(Trend, count, NULL, AT_LEAST(0), OPTIONAL, "readings with a speed"),
     FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
     FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "which the line goes through"),
+    FIELD_REAL(Trend, mean_value, NULL, ANY, OPTIONAL, "there"),
     FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "per m/s, by least squares"),
     FIELD_REAL(Trend, standard_error, NULL, ANY, OPTIONAL, "of the slope"),
     FIELD_REAL(Trend, low, NULL, ANY, OPTIONAL, "95 % interval of the slope"),

@@ -59,6 +59,7 @@ extern const char *const trend_verdict_names[]; // "constant", "not_constant"; N
 typedef struct Trend {
     uint64_t count;                          // of readings with a speed
     double least_speed, most_speed;          // [m/s]
+    double mean_speed, mean_value;           // which the line goes through
     double slope, standard_error, low, high; // per m/s; 95 %
     double t, p;                             // of no slope at all
     double change;                           // that the line makes over the measured speeds

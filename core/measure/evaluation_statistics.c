@@ -270,6 +270,8 @@ static bool make_trend(const Reading *readings, size_t count, const char *name, 
     const double least = resolved * fabs(quantity->mean);
     const size_t freedom = line.count - 2;
     const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
+    trend->mean_speed = line.speed;
+    trend->mean_value = line.value;
     trend->slope = line.slope;
     trend->standard_error = sqrt(fmax(line.left / (double)freedom, least * least) / line.squares);
     trend->low = line.slope - t * trend->standard_error;
@@ -358,8 +360,19 @@ Status quantity_make(Reading *readings, size_t count, const char *name, const ch
         .median = none,
         .maximum = none,
         .mean_without_outliers = none,
-        .trend = {0, none, none, none, none, none, none, none, none, none, none, CHOICE_ABSENT,
-                  NULL},
+        .trend = {.least_speed = none,
+                  .most_speed = none,
+                  .mean_speed = none,
+                  .mean_value = none,
+                  .slope = none,
+                  .standard_error = none,
+                  .low = none,
+                  .high = none,
+                  .t = none,
+                  .p = none,
+                  .change = none,
+                  .missed_change = none,
+                  .verdict = CHOICE_ABSENT},
     };
     for (size_t i = 0; i < count; i++) {
         Reading *reading = &readings[i];
