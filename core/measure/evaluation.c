@@ -8,7 +8,7 @@
 
 const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
 const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
-const char *const trend_verdict_names[] = {"constant", "not_constant", NULL};
+const char *const trend_verdict_names[] = {"constant", "not_constant", "undecided", NULL};
 
 // clang-format off
 static const Field row_fields[] = {
@@ -51,7 +51,7 @@ static const Field trend_fields[] = {
     FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "chance of at least such a slope where there is none"),
     FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "that the line makes from the slowest to the fastest"),
     FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "the largest such change that the data do not rule out, 95 %"),
-    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "whether a slope is shown, p < 0.05; null: cannot be told"),
+    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "not_constant: a slope is shown, p < 0.05; constant: none is, and a change of 20 % would have been seen; undecided: it would not; null: no test can be made"),
     FIELD_TEXT(Trend, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
     FIELD_END
 };
@@ -138,7 +138,7 @@ static Status make_restitution(Reading *readings, Evaluation *evaluation, Proble
                                           .uncertainty = rows[i].restitution_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "restitution", "1", &evaluation->restitution, problem));
+    TRY(quantity_make(readings, count, "restitution", "", &evaluation->restitution, problem));
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].restitution_score = readings[i].score;
         rows[readings[i].row].restitution_is_outlier = readings[i].is_outlier;
@@ -155,7 +155,7 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
                                           .uncertainty = rows[i].contact_time_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "contact time", "s", &evaluation->contact_time, problem));
+    TRY(quantity_make(readings, count, "contact time", " s", &evaluation->contact_time, problem));
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].contact_time_score = readings[i].score;
         rows[readings[i].row].contact_time_is_outlier = readings[i].is_outlier;

@@ -52,8 +52,10 @@ typedef struct EvaluationRows {
     size_t count;
 } EvaluationRows;
 
-typedef enum TrendVerdict { TREND_CONSTANT, TREND_NOT_CONSTANT } TrendVerdict;
-extern const char *const trend_verdict_names[]; // "constant", "not_constant"; NULL-terminated
+// Constant: no slope is shown, and a change of more than TREND_MATTERS of the mean would have been.
+typedef enum TrendVerdict { TREND_CONSTANT, TREND_NOT_CONSTANT, TREND_UNDECIDED } TrendVerdict;
+extern const char *const trend_verdict_names[]; // "constant" ...; NULL-terminated
+#define TREND_MATTERS 0.2
 
 // A straight line over approach speed by least squares: whether "constant over speed" holds.
 typedef struct Trend {
@@ -64,7 +66,7 @@ typedef struct Trend {
     double t, p;                             // of no slope at all
     double change;                           // that the line makes over the measured speeds
     double missed_change; // the largest over them that the data do not rule out, 95 %
-    int verdict;          // TrendVerdict; CHOICE_ABSENT: cannot be told
+    int verdict;          // TrendVerdict; CHOICE_ABSENT: no test can be made
     char *detail;         // the verdict for people
 } Trend;
 

@@ -229,22 +229,24 @@ static Line fit_line(const Reading *readings, size_t count) {
 }
 
 static bool say_trend(const char *name, const char *unit, double mean, Trend *trend) {
-    const double percent = 100 / fabs(mean);
-    if (trend->verdict == TREND_CONSTANT)
+    const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
+    if (trend->verdict == TREND_NOT_CONSTANT)
         return sentence(&trend->detail,
-                        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g %s per m/s, "
-                        "p = %.2g) and may be taken as constant there; a change of up to %.2g%s%s "
-                        "(%.2g %%) over these speeds would not have been seen",
-                        name, trend->least_speed, trend->most_speed, trend->slope,
-                        trend->standard_error, unit, trend->p, trend->missed_change,
-                        unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
-                        trend->missed_change * percent);
+                        "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
+                        "constant over speed, and a table over speed says more than a mean",
+                        name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
+                        fabs(trend->change) * percent, trend->least_speed, trend->most_speed,
+                        trend->p);
+    const bool is_constant = trend->verdict == TREND_CONSTANT;
     return sentence(&trend->detail,
-                    "%s %s by %.2g%s%s (%.2g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
-                    "constant over speed, and a table over speed says more than a mean",
-                    name, trend->change < 0 ? "falls" : "rises", fabs(trend->change),
-                    unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
-                    fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
+                    "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
+                    "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
+                    "been seen",
+                    name, trend->least_speed, trend->most_speed, trend->slope,
+                    trend->standard_error, unit, trend->p,
+                    is_constant ? " and may be taken as constant there;"
+                                : ", but the readings are too few or too scattered to tell:",
+                    trend->missed_change, unit, missed);
 }
 
 static bool make_trend(const Reading *readings, size_t count, const char *name, const char *unit,
@@ -280,7 +282,10 @@ static bool make_trend(const Reading *readings, size_t count, const char *name, 
     trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
     trend->change = line.slope * span;
     trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
-    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT : TREND_CONSTANT;
+    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
+                     : trend->missed_change <= TREND_MATTERS * fabs(quantity->mean)
+                         ? TREND_CONSTANT
+                         : TREND_UNDECIDED;
     return say_trend(name, unit, quantity->mean, trend);
 }
 

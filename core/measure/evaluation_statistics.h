@@ -14,7 +14,7 @@ typedef struct Reading {
 } Reading;
 
 // Fills `quantity`, which may be uninitialised, and weighs, scores and marks the readings. `name`
-// and `unit` stand in sentences ("restitution", "1"). STATUS_NO_MEMORY.
+// and `unit` stand in sentences ("contact time", " s"). STATUS_NO_MEMORY.
 Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
                      Quantity *quantity, Problem *problem);
 

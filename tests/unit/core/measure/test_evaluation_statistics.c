@@ -27,7 +27,7 @@ static void make(const double *values, const double *speeds, size_t count) {
     for (size_t i = 0; i < count; i++)
         readings[i] = (Reading){
             .value = values[i], .uncertainty = none, .speed = speeds != NULL ? speeds[i] : none};
-    assert_int_equal(quantity_make(readings, count, "restitution", "1", &quantity, &problem),
+    assert_int_equal(quantity_make(readings, count, "restitution", "", &quantity, &problem),
                      STATUS_OK);
 }
 
@@ -88,12 +88,12 @@ static void what_speeds_cannot_tell_is_said(void **state) {
 static void one_reading_has_its_instruments_interval_or_none(void **state) {
     (void)state;
     readings[0] = (Reading){.value = 0.6, .uncertainty = 0.01, .speed = (double)NAN};
-    assert_int_equal(quantity_make(readings, 1, "e", "1", &quantity, &problem), STATUS_OK);
+    assert_int_equal(quantity_make(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
     assert_true(isnan(quantity.deviation));
     assert_near(quantity.high - quantity.low, 2 * 1.959963984540054 * 0.01, 1e-12);
     quantity_clear(&quantity);
     readings[0].uncertainty = (double)NAN;
-    assert_int_equal(quantity_make(readings, 1, "e", "1", &quantity, &problem), STATUS_OK);
+    assert_int_equal(quantity_make(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
     assert_true(isnan(quantity.low) && isnan(quantity.high));
     assert_non_null(strstr(quantity.why, "no interval"));
     quantity_clear(&quantity);
@@ -108,7 +108,7 @@ static void equal_readings_are_not_taken_for_certainty(void **state) {
     quantity_clear(&quantity);
     for (size_t i = 0; i < 4; i++)
         readings[i].uncertainty = 0.02;
-    assert_int_equal(quantity_make(readings, 4, "e", "1", &quantity, &problem), STATUS_OK);
+    assert_int_equal(quantity_make(readings, 4, "e", "", &quantity, &problem), STATUS_OK);
     assert_near(quantity.standard_error, 0.01, 1e-15);
     quantity_clear(&quantity);
 }
