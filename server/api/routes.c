@@ -16,6 +16,9 @@ static const char *const of_materials[] = {"q",   "kind",  "status", "e",
 static const char *const of_pages[] = {"limit", "before", NULL};
 static const char *const of_diff[] = {"from", "to", NULL};
 static const char *const of_uses[] = {"revision", "limit", "before", NULL};
+static const char *const of_records[] = {"q", "limit", "after", NULL};
+static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
+                                        "notes", "earthquake", "station", NULL};
 
 // clang-format off
 const Route routes[] = {
@@ -70,6 +73,12 @@ const Route routes[] = {
     {"GET",    "/v1/materials/{slug}/diff",             "read",   of_diff,      "In what two revisions of a material differ", materials_diff},
     {"GET",    "/v1/materials/{slug}/used-by",          "read",   of_uses,      "How many results were made with each revision; ?revision= lists them", materials_uses},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
+    {"POST",   "/v1/records",                           "materials", of_record, "Upload a ground motion's file, or its samples as JSON", records_create},
+    {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list},
+    {"GET",    "/v1/records/{name}/samples.{format}",   "read",   NULL,         "A ground motion's samples as json, csv, npy, npz or mat", records_samples},
+    {"GET",    "/v1/records/{name}/samples",            "read",   NULL,         "A ground motion's samples, format by Accept", records_samples},
+    {"GET",    "/v1/records/{name}",                    "read",   NULL,         "A ground motion, and how much uses it", records_show},
+    {"DELETE", "/v1/records/{name}",                    "materials", NULL,      "Delete a ground motion that nothing uses", records_delete},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
     {"GET",    "/v1/examples/{name}",                   "read",   NULL,         "One of them, ready to submit", examples_show},
     {"GET",    "/schemas",                              "open",   NULL,         "JSON Schemas, by name", schemas_list},

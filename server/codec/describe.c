@@ -304,6 +304,7 @@ static void print_value(Printer *printer, const Field *field) {
         print_variant(printer, field);
         break;
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }
@@ -315,6 +316,8 @@ static void print_properties(Printer *printer, const Field *fields) {
             print_properties(printer, field->fields);
             continue;
         }
+        if ((field->flags & FIELD_HIDDEN) != 0)
+            continue;
         open_member(printer, field->name, "{");
         if (field->doc != NULL)
             text_member(printer, "description", field->doc);
