@@ -229,7 +229,7 @@ def test_lists_are_searched_and_paged():
                                 ("q=stc.238", five), ("q=rubber", ["hard_rubber", "soft_rubber"]), ("q=lab%0Asoft", []), ("q=", None),
                                 ("kind=RUBBER", ["hard_rubber", "soft_rubber"]), ("kind=rubb", []), ("kind=wood&q=felt", ["cork"]),
                                 ("status=draft", ["felt", "gel"]), ("status=approved&kind=wood", ["cork"]), ("status=deprecated", []),
-                                ("e=0.75", ["cork"]), ("e=0.49..0.51&T_c=..0.01", ["gel"]), ("e=0.49..0.51&T_c=..0.008", []),
+                                ("e=0.75", ["cork"]), ("e=0.495..0.505&T_c=..0.01", ["gel"]), ("e=0.495..0.505&T_c=..0.008", []),
                                 ("e=..0.35&status=draft", ["felt"]), ("T_c=0.0195..&status=draft", ["felt"]), ("e=.74...76", ["cork"]),
                                 ("e=7e-1..7.6e-1&kind=wood", ["cork"]), ("e=0.61&T_c=0.025", ["sponge"])):
             assert found(f"?{query}") == (expected if expected is not None else found("")), query
