@@ -127,8 +127,7 @@ static void put_rows(Writer *writer, const Field *fields, const void *item) {
         const void *member = (const char *)item + field->offset;
         if (field->kind == FIELD_KIND_BASE) {
             put_rows(writer, field->fields, member);
-        } else if ((field->flags & FIELD_NOTE) == 0 && field->kind != FIELD_KIND_SHARED &&
-                   !field_is_absent(field, item)) {
+        } else if ((field->flags & FIELD_NOTE) == 0 && !field_is_absent(field, item)) {
             put_name(writer, field->name);
             put_value(writer, field, member);
         }

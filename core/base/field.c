@@ -325,12 +325,14 @@ static bool is_empty(const Field *field, const void *member) {
 
 static bool all_empty(const Field *fields, const void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
-        if (!is_empty(field, member_of(field, item)))
+        if ((field->flags & FIELD_HIDDEN) == 0 && !is_empty(field, member_of(field, item)))
             return false;
     return true;
 }
 
 bool field_is_absent(const Field *field, const void *item) {
+    if ((field->flags & FIELD_HIDDEN) != 0)
+        return true;
     switch (field->kind) {
     case FIELD_KIND_FLAG:
         return (field->flags & FIELD_RARE) != 0 && !*(const bool *)member_of(field, item);
@@ -389,7 +391,7 @@ const Field *fields_find(const Field *fields, const char *name, size_t *offset) 
                     *offset += field->offset;
                 return found;
             }
-        } else if (field->kind != FIELD_KIND_SHARED && strcmp(field->name, name) == 0) {
+        } else if ((field->flags & FIELD_HIDDEN) == 0 && strcmp(field->name, name) == 0) {
             return field;
         }
     }

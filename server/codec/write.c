@@ -131,7 +131,7 @@ static void put_members(Bytes *bytes, const Field *fields, const void *item, Wri
             continue;
         }
         const bool is_absent = field_is_absent(field, item);
-        if (field->kind == FIELD_KIND_SHARED || (is_absent && style == WRITE_SCENE))
+        if (is_absent && (style == WRITE_SCENE || (field->flags & FIELD_HIDDEN) != 0))
             continue;
         put_name(bytes, field->name, count);
         if ((is_absent && !is_array(field)) || is_emptied(field, item))
