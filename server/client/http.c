@@ -280,7 +280,9 @@ static bool headers_put(const Transfer *transfer, struct curl_slist **list) {
     if (transfer->http->token != NULL)
         is_well = is_well && header_put(list, "Authorization", token);
     if (ask->body != NULL)
-        is_well = is_well && header_put(list, "Content-Type", "application/json");
+        is_well =
+            is_well && header_put(list, "Content-Type",
+                                  ask->body_type != NULL ? ask->body_type : "application/json");
     if (ask->prefer != NULL)
         is_well = is_well && header_put(list, "Prefer", ask->prefer);
     if (ask->idempotency_key != NULL)

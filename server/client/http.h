@@ -34,7 +34,8 @@ bool http_exposes_token(const Http *http);
 typedef struct HttpAsk {
     const char *method;
     const char *path;            // "/v1/jobs?dry_run=1"
-    const Bytes *body;           // JSON; NULL: none
+    const Bytes *body;           // NULL: none
+    const char *body_type;       // NULL: JSON
     const char *prefer;          // NULL: not sent
     const char *idempotency_key; // NULL: not sent
     // Where the body of a 200 goes as it comes, `most` bytes at most; NULL: it is kept. A body that

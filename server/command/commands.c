@@ -14,6 +14,7 @@
 #include "server/command/ensemble.h"
 #include "server/command/get.h"
 #include "server/command/import.h"
+#include "server/command/records.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
 #include "server/command/submit.h"
@@ -41,12 +42,25 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,      &command_check,
-    &command_tradeoff, &command_ensemble, &command_study,
-    &command_sweep,    &command_import,   &command_token,
-    &command_backup,   &command_submit,   &command_watch,
-    &command_get,      &command_cancel,   &command_compare,
-    &command_help,     &command_version,  NULL,
+    &command_serve,
+    &command_run,
+    &command_check,
+    &command_tradeoff,
+    &command_ensemble,
+    &command_study,
+    &command_sweep,
+    &command_import,
+    &command_records,
+    &command_token,
+    &command_backup,
+    &command_submit,
+    &command_watch,
+    &command_get,
+    &command_cancel,
+    &command_compare,
+    &command_help,
+    &command_version,
+    NULL,
 };
 
 static const char overview[] =
