@@ -54,6 +54,9 @@ static void absent_all(const Field *fields, void *item) {
         case FIELD_KIND_VARIANT:
             *(Variant **)member = NULL;
             break;
+        case FIELD_KIND_SHARED:
+            *(Shared **)member = NULL;
+            break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
             absent_all(field->fields, member);
@@ -97,6 +100,9 @@ static void free_all(const Field *fields, void *item) {
         }
         case FIELD_KIND_VARIANT:
             variant_free(*(Variant **)member);
+            break;
+        case FIELD_KIND_SHARED:
+            shared_drop(*(Shared **)member);
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
@@ -260,6 +266,9 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
             TRY(copy_all(copy->kind->fields, variant, copy));
             break;
         }
+        case FIELD_KIND_SHARED:
+            *(Shared **)to = shared_hold(*(Shared *const *)from);
+            break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
             TRY(copy_all(field->fields, from, to));
@@ -302,6 +311,8 @@ static bool is_empty(const Field *field, const void *member) {
         return list_of(member).count == 0;
     case FIELD_KIND_VARIANT:
         return *(Variant *const *)member == NULL;
+    case FIELD_KIND_SHARED:
+        return *(Shared *const *)member == NULL;
     case FIELD_KIND_ITEM:
     case FIELD_KIND_BASE:
         return all_empty(field->fields, member);

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/base/shared.h"
 #include "core/base/status.h"
 
 typedef enum FieldKind {
@@ -26,6 +27,7 @@ typedef enum FieldKind {
     FIELD_KIND_VARIANT, // Variant *, owned: one of a plural table, by the name under its tag
     FIELD_KIND_BASE,    // a nested struct whose rows appear in the same object (a base, an inlined
                         // part)
+    FIELD_KIND_SHARED,  // Shared *, a hold; FIELD_HIDDEN
 } FieldKind;
 
 #define COUNT_ABSENT UINT64_MAX
@@ -214,6 +216,9 @@ struct Field {
 #define FIELD_BASE(Type, member, rows_) \
     {.name = #member, .kind = FIELD_KIND_BASE, .offset = offsetof(Type, member), .fields = rows_, \
      .size = sizeof(((Type *)0)->member)}
+#define FIELD_SHARED(Type, member) \
+    {.name = #member, .kind = FIELD_KIND_SHARED, .offset = FIELD_AT(Type, member, Shared *), \
+     .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN}
 #define FIELD_END {.kind = FIELD_KIND_END}
 // clang-format on
 

@@ -11,6 +11,7 @@
 #include "server/codec/read.h"
 #include "server/jobs/intake_state.h"
 #include "server/jobs/prepare_material.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/prepare_sweep.h"
 
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
@@ -22,7 +23,10 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     Status status = read_json(text, size, inquiry_fields, inquiry, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
     if (is_object && (status == STATUS_OK || status == STATUS_INVALID)) {
-        const Status resolved = prepare_materials(store, &inquiry->simulation, warnings, problem);
+        Status resolved = prepare_materials(store, &inquiry->simulation, warnings, problem);
+        const Status record = prepare_record(store, &inquiry->simulation, problem);
+        if (resolved == STATUS_OK || (record != STATUS_OK && record != STATUS_INVALID))
+            resolved = record;
         if (resolved != STATUS_OK && resolved != STATUS_INVALID)
             status = resolved;
         else if (inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep)

@@ -1,5 +1,5 @@
-// The points of a sweep are made without a store: every material that the scene or an axis names is
-// resolved once and pinned in the study.
+// The points of a sweep are made without a store: every material and record that the scene or an
+// axis names is resolved once and pinned in the study.
 #include "server/jobs/prepare_sweep.h"
 
 #include <stdio.h>
@@ -10,6 +10,7 @@
 #include "core/study/sweep.h"
 #include "server/base/bytes.h"
 #include "server/jobs/prepare_material.h"
+#include "server/jobs/prepare_record.h"
 
 // What the daemon knows of a material, kept in the sweep: its points need no store.
 static Status pin(Buffers *materials, const Buffer *buffer) {
@@ -107,7 +108,12 @@ static Status resolve_sweep(Store *store, Inquiry *inquiry, Warnings *warnings, 
             TRY(pin(&study->materials, sides[i % 3]));
     }
     const Status axes = resolve_axes(store, study, warnings, problem);
-    return status == STATUS_OK ? axes : status;
+    if (axes != STATUS_OK && axes != STATUS_INVALID)
+        return axes;
+    const Status records = prepare_sweep_records(store, inquiry, problem);
+    if (records != STATUS_OK && records != STATUS_INVALID)
+        return records;
+    return status != STATUS_OK ? status : axes != STATUS_OK ? axes : records;
 }
 
 // An axis's unknown name is no reason to leave the other values unjudged: its fault is told beside

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/study/sweep.h"
+#include "server/jobs/prepare_record.h"
 
 static bool has_line(const Bytes *bytes, const char *name, size_t length) {
     for (size_t at = 0; at < bytes->count;) {
@@ -32,6 +33,7 @@ void uses_write(Bytes *bytes, const Inquiry *inquiry) {
         add(bytes, &dampers->at[i].left_buffer);
         add(bytes, &dampers->at[i].right_buffer);
     }
+    prepare_record_uses(inquiry, bytes);
     if (inquiry->study == NULL || study_kind(inquiry->study) != &study_sweep)
         return;
     const SweepStudy *study = (const SweepStudy *)(const void *)inquiry->study;

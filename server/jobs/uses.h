@@ -6,8 +6,8 @@
 #include "core/study/inquiry.h"
 #include "server/base/bytes.h"
 
-// Adds a line for each revision of a material that the prepared scene or its sweep names,
-// "sponge@1\n", each once.
+// Adds a line for each revision of a material, "sponge@1\n", and each record,
+// "record:elcentro\n", that the prepared scene or its sweep names.
 void uses_write(Bytes *bytes, const Inquiry *inquiry);
 
 // One of those lines.

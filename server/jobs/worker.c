@@ -77,11 +77,10 @@ static Status describe(Computation *computation, Findings *findings) {
     row->work = take(&work, &status);
     row->notes = take(&notes, &status);
     row->energy = take(&energy, &status);
+    row->uses = take(&uses, &status);
     row->impacts = take(&impacts, &status);
     if (outcome->spectrum.densities.count > 0)
         row->psd = take(&psd, &status);
-    if (uses.count > 0 || uses.is_failed)
-        row->uses = take(&uses, &status);
     row->count = outcome->response.count;
     row->sample_rate = outcome->response.sample_rate;
     row->created_unix_ms = clock_unix_ms();
