@@ -80,6 +80,28 @@ Status amend_append(Bytes *text, const char *list, const Bytes *value, Problem *
     return object_write(text, root, json_array_append_new(items, given) == 0, problem);
 }
 
+static void nulls_drop(json_t *value) {
+    const char *name;
+    json_t *inner;
+    void *next;
+    size_t i;
+    json_object_foreach_safe(value, next, name, inner) {
+        if (json_is_null(inner))
+            (void)json_object_del(value, name);
+        else
+            nulls_drop(inner);
+    }
+    json_array_foreach(value, i, inner) nulls_drop(inner);
+}
+
+Status amend_known(Bytes *text, Problem *problem) {
+    json_t *root = object_read(text);
+    if (root == NULL)
+        return STATUS_OK;
+    nulls_drop(root);
+    return object_write(text, root, true, problem);
+}
+
 Status amend_take(const Bytes *text, const char *name, Bytes *part, Problem *problem) {
     json_t *root = object_read(text);
     const json_t *found = json_object_get(root, name);

@@ -13,6 +13,9 @@ Status amend_set(Bytes *text, const char *name, const Bytes *value, Problem *pro
 // Appends to a list, which is made where it is missing. Where it is no list, as above.
 Status amend_append(Bytes *text, const char *list, const Bytes *value, Problem *problem);
 
+// Drops members that are null, at any depth.
+Status amend_known(Bytes *text, Problem *problem);
+
 // The text of the object at `name`. STATUS_NOT_FOUND.
 Status amend_take(const Bytes *text, const char *name, Bytes *part, Problem *problem);
 // The text that stands at `name`; "" if there is none. Cut to fit.

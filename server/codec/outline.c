@@ -1,4 +1,5 @@
-// An object's own values come first, as one block, then what is in it, each under its name.
+// An object's own values come first, as one block, then what is in it, each under its name; objects
+// in it that are alike stand side by side.
 #include "server/codec/outline.h"
 
 #include <jansson.h>
@@ -9,7 +10,7 @@
 #include "server/base/bytes.h"
 #include "server/codec/scan.h"
 
-enum { VALUES_SHOWN = 24, DEPTH = 6 };
+enum { VALUES_SHOWN = 24, SENTENCE = 32, DEPTH = 6 };
 
 typedef struct Walk {
     const OutlineWay *way;
@@ -131,6 +132,15 @@ static void pairs_add(Walk *walk, const json_t *object, const char *heading) {
     }
 }
 
+static char *head_of(const Walk *walk, const char *name) {
+    const char *unit = unit_of(walk, name);
+    Bytes head = {0};
+    bytes_text(&head, name);
+    if (unit != NULL)
+        bytes_format(&head, " [%s]", unit);
+    return bytes_take(&head, NULL);
+}
+
 static const OutlineTable *table_find(const Walk *walk, const char *list) {
     for (const OutlineTable *one = walk->way->tables; one != NULL && one->list != NULL; one++)
         if (strcmp(one->list, list) == 0)
@@ -172,33 +182,158 @@ static void table_add(Walk *walk, const json_t *list, const char *heading, const
     block->has_heads = true;
     block->more = all - rows;
     for (size_t k = 0; k < count; k++) {
-        const char *unit = unit_of(walk, columns[k]);
-        Bytes head = {0};
-        bytes_text(&head, columns[k]);
-        if (unit != NULL)
-            bytes_format(&head, " [%s]", unit);
-        cell_set(walk, block, k, bytes_take(&head, NULL));
+        cell_set(walk, block, k, head_of(walk, columns[k]));
         for (size_t i = 0; i < rows; i++)
             cell_set(walk, block, (i + 1) * count + k,
                      cell_of(json_object_get(json_array_get(list, i), columns[k]), NULL));
     }
 }
 
-static void object_add(Walk *walk, const json_t *object, const char *heading, int depth) {
+static const char *heading_join(char target[256], const char *heading, const char *name) {
+    char joined[400];
+    snprintf(joined, sizeof joined, "%s%s%.100s", heading, heading[0] != '\0' ? " " : "", name);
+    text_fit(target, 256, joined);
+    return target;
+}
+
+static bool has_same_names(const json_t *a, const json_t *b) {
     const char *name;
     json_t *value;
-    pairs_add(walk, object, heading);
-    json_object_foreach((json_t *)(uintptr_t)object, name, value) {
-        char inner[256], joined[400];
-        if (is_plain(value) || is_besides(walk, name) || depth == DEPTH)
-            continue;
-        snprintf(joined, sizeof joined, "%s%s%.100s", heading, heading[0] != '\0' ? " " : "", name);
-        text_fit(inner, sizeof inner, joined);
-        if (json_is_object(value))
-            object_add(walk, value, inner, depth + 1);
-        else
-            table_add(walk, value, inner, name);
+    json_object_foreach((json_t *)(uintptr_t)a, name, value) {
+        if (json_object_get(b, name) == NULL)
+            return false;
     }
+    return json_object_size(a) == json_object_size(b);
+}
+
+// Two objects or more that have the same names stand side by side; sentences among their values
+// would not, and follow as lines.
+typedef struct Alike {
+    const char *names[OUTLINE_COLUMNS - 1];
+    const json_t *objects[OUTLINE_COLUMNS - 1];
+    size_t count;
+} Alike;
+
+static bool is_beside(const Walk *walk, const Alike *alike, const char *name) {
+    bool says = false;
+    for (size_t k = 0; k < alike->count; k++) {
+        const json_t *value = json_object_get(alike->objects[k], name);
+        if (!is_plain(value) || (json_is_string(value) && json_string_length(value) > SENTENCE))
+            return false;
+        says = says || says_something(value);
+    }
+    return says && !is_besides(walk, name);
+}
+
+static void alike_table(Walk *walk, const Alike *alike, const char *heading) {
+    const char *name;
+    json_t *value;
+    const size_t columns = alike->count + 1;
+    size_t rows = 0, row = 0;
+    json_object_foreach((json_t *)(uintptr_t)alike->objects[0], name, value) rows +=
+        is_beside(walk, alike, name);
+    OutlineBlock *block = rows > 0 ? block_add(walk, heading, rows + 1, columns) : NULL;
+    if (block == NULL)
+        return;
+    block->has_heads = true;
+    cell_set(walk, block, 0, strdup(" "));
+    for (size_t k = 0; k < alike->count; k++)
+        cell_set(walk, block, k + 1, head_of(walk, alike->names[k]));
+    json_object_foreach((json_t *)(uintptr_t)alike->objects[0], name, value) {
+        if (!is_beside(walk, alike, name))
+            continue;
+        row++;
+        cell_set(walk, block, row * columns, strdup(name));
+        for (size_t k = 0; k < alike->count; k++)
+            cell_set(walk, block, row * columns + k + 1,
+                     cell_of(json_object_get(alike->objects[k], name), unit_of(walk, name)));
+    }
+}
+
+static void alike_sentences(Walk *walk, const Alike *alike, const char *heading) {
+    char inner[256];
+    for (size_t k = 0; k < alike->count; k++) {
+        const char *name;
+        json_t *value;
+        json_object_foreach((json_t *)(uintptr_t)alike->objects[k], name, value) {
+            if (!is_plain(value) || is_beside(walk, alike, name) || !says_something(value) ||
+                is_besides(walk, name))
+                continue;
+            OutlineBlock *block = block_add(walk, heading, 1, 2);
+            if (block == NULL)
+                return;
+            cell_set(walk, block, 0, strdup(heading_join(inner, alike->names[k], name)));
+            cell_set(walk, block, 1, cell_of(value, unit_of(walk, name)));
+        }
+    }
+}
+
+static void object_add(Walk *walk, const json_t *object, const char *heading, int depth);
+
+static void insides_add(Walk *walk, const json_t *object, const char *heading, int depth);
+
+static void alike_add(Walk *walk, const Alike *alike, const char *heading, int depth) {
+    char inner[256];
+    if (alike->count == 1) {
+        object_add(walk, alike->objects[0], heading_join(inner, heading, alike->names[0]), depth);
+        return;
+    }
+    alike_table(walk, alike, heading);
+    alike_sentences(walk, alike, heading);
+    for (size_t k = 0; k < alike->count; k++)
+        insides_add(walk, alike->objects[k], heading_join(inner, heading, alike->names[k]), depth);
+}
+
+// A list whose items have parts is shown item by item.
+static void list_add(Walk *walk, const json_t *list, const char *heading, const char *name,
+                     int depth) {
+    const char *key;
+    json_t *value;
+    bool has_parts = false;
+    json_object_foreach(json_array_get(list, 0), key, value) has_parts =
+        has_parts || (json_is_object(value) && !is_besides(walk, key));
+    if (!has_parts || table_find(walk, name) != NULL) {
+        table_add(walk, list, heading, name);
+        return;
+    }
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        char number[24], inner[256];
+        snprintf(number, sizeof number, "%zu", i + 1);
+        object_add(walk, json_array_get(list, i), heading_join(inner, heading, number), depth);
+    }
+}
+
+// The objects and lists in an object.
+static void insides_add(Walk *walk, const json_t *object, const char *heading, int depth) {
+    const char *name;
+    json_t *value;
+    Alike alike = {0};
+    if (depth == DEPTH)
+        return;
+    json_object_foreach((json_t *)(uintptr_t)object, name, value) {
+        char inner[256];
+        const bool is_shown = !is_plain(value) && !is_besides(walk, name);
+        const bool goes_on = is_shown && json_is_object(value) && alike.count > 0 &&
+                             alike.count < COUNT(alike.names) &&
+                             has_same_names(alike.objects[0], value);
+        if (alike.count > 0 && is_shown && !goes_on) {
+            alike_add(walk, &alike, heading, depth + 1);
+            alike.count = 0;
+        }
+        if (is_shown && json_is_object(value)) {
+            alike.names[alike.count] = name;
+            alike.objects[alike.count++] = value;
+        } else if (is_shown) {
+            list_add(walk, value, heading_join(inner, heading, name), name, depth + 1);
+        }
+    }
+    if (alike.count > 0)
+        alike_add(walk, &alike, heading, depth + 1);
+}
+
+static void object_add(Walk *walk, const json_t *object, const char *heading, int depth) {
+    pairs_add(walk, object, heading);
+    insides_add(walk, object, heading, depth);
 }
 
 Status outline_read(const char *text, size_t size, const OutlineWay *way, Outline *outline,

@@ -1,6 +1,6 @@
-// A JSON document as blocks that people read: of each object its names and values, of each list of
-// objects a table. Not a reader by Field rows: what a newer server tells is shown as well. Used by
-// command/.
+// A JSON document as blocks that people read: of each object its names and values, of objects that
+// are alike and of each list of objects a table. Not a reader by Field rows: what a newer server
+// tells is shown as well. Used by command/.
 #ifndef SERVER_CODEC_OUTLINE_H
 #define SERVER_CODEC_OUTLINE_H
 
