@@ -101,13 +101,21 @@ static Status read_rows(TextReader reader, TraceColumns *rows, Problem *problem)
 static Status take_times(const TraceColumns *rows, double *interval, Problem *problem) {
     const double *times = rows->times;
     const double mean = (times[rows->count - 1] - times[0]) / (double)(rows->count - 1);
-    char place[64], is[32], step[32];
-    for (size_t i = 1; i < rows->count; i++)
-        if (!(times[i] > times[i - 1]) ||
-            !(fabs(times[i] - times[0] - (double)i * mean) <= unevenness * mean))
-            return problem_add(problem, STATUS_UNREADABLE, text_place(place, rows->lines[i], 0),
-                               "times must rise evenly, by %s s on the whole; is %s s",
-                               text_real(step, mean), text_real(is, times[i]));
+    char place[64], is[32], before[32];
+    bool is_even = true;
+    size_t worst = 1; // what is wrong bends the mean, and with it all that is behind
+    for (size_t i = 1; i < rows->count; i++) {
+        const double step = times[i] - times[i - 1];
+        is_even = is_even && step > 0 &&
+                  fabs(times[i] - times[0] - (double)i * mean) <= unevenness * mean;
+        if (fabs(step - mean) > fabs(times[worst] - times[worst - 1] - mean))
+            worst = i;
+    }
+    if (!is_even)
+        return problem_add(problem, STATUS_UNREADABLE, text_place(place, rows->lines[worst], 0),
+                           "times must rise evenly: is %s s after %s s, where steps are %.4g s",
+                           text_real(is, times[worst]), text_real(before, times[worst - 1]),
+                           rows->count > 2 && worst > 1 ? times[1] - times[0] : mean);
     // Differences of printed decimals: twelve digits are all they have.
     const double scale = pow(10, 11 - floor(log10(mean)));
     *interval = isfinite(scale) && scale > 0 ? nearbyint(mean * scale) / scale : mean;

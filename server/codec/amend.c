@@ -113,10 +113,3 @@ Status amend_take(const Bytes *text, const char *name, Bytes *part, Problem *pro
     free(taken);
     return part->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory") : STATUS_OK;
 }
-
-void amend_text(const Bytes *text, const char *name, char *target, size_t size) {
-    json_t *root = object_read(text);
-    const char *found = json_string_value(json_object_get(root, name));
-    text_fit(target, size, found != NULL ? found : "");
-    json_decref(root);
-}

@@ -18,7 +18,5 @@ Status amend_known(Bytes *text, Problem *problem);
 
 // The text of the object at `name`. STATUS_NOT_FOUND.
 Status amend_take(const Bytes *text, const char *name, Bytes *part, Problem *problem);
-// The text that stands at `name`; "" if there is none. Cut to fit.
-void amend_text(const Bytes *text, const char *name, char *target, size_t size);
 
 #endif

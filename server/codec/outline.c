@@ -90,7 +90,8 @@ static char *cell_of(const json_t *value, const char *unit) {
 // With room for `cells` of them; NULL without memory or beyond the limit.
 static OutlineBlock *block_add(Walk *walk, const char *heading, size_t rows, size_t columns) {
     Outline *outline = walk->outline;
-    if (outline->count == OUTLINE_BLOCKS)
+    outline->is_cut = outline->count == OUTLINE_BLOCKS;
+    if (outline->is_cut)
         return NULL;
     OutlineBlock *at = realloc(outline->at, (outline->count + 1) * sizeof *at);
     if (at != NULL)

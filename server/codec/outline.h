@@ -33,6 +33,7 @@ typedef struct OutlineBlock {
 typedef struct Outline {
     OutlineBlock *at;
     size_t count;
+    bool is_cut; // there are more blocks
 } Outline;
 
 // In the document's order; what is null or empty is passed over. STATUS_UNREADABLE if it is no JSON

@@ -101,7 +101,13 @@ Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
         return STATUS_OK;
     }
     Status status = outline_read(answer->body.at, answer->body.count, &way, &outline, NULL);
-    if (status == STATUS_OK)
+    for (size_t i = 0; i < outline.count; i++)
+        if (outline.at[i].has_heads && outline.at[i].rows == MATERIALS_MOST + 1)
+            fprintf(stderr, "impactd materials: the first %d; narrow it down to see others\n",
+                    MATERIALS_MOST);
+    if (status == STATUS_OK && outline.count == 0)
+        fputs("impactd materials: nothing fits\n", stderr);
+    else if (status == STATUS_OK)
         sheet_print(&outline);
     else if (status == STATUS_UNREADABLE)
         status = problem_set(problem, STATUS_UNREACHABLE,
@@ -110,16 +116,25 @@ Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
     return status;
 }
 
+typedef struct ReviewTold {
+    bool self_approved;
+} ReviewTold;
 typedef struct RevisionTold {
     char *slug, *status;
     uint64_t revision;
+    ReviewTold review;
 } RevisionTold;
 
 // clang-format off
+static const Field review_told_fields[] = {
+    FIELD_FLAG(ReviewTold, self_approved, false, "by whoever wrote the revision"),
+    FIELD_END,
+};
 static const Field revision_told_fields[] = {
     FIELD_TEXT(RevisionTold, slug, 0, PRESENCE_OPTIONAL, 0, "slug"),
     FIELD_TEXT(RevisionTold, status, 0, PRESENCE_OPTIONAL, 0, "status"),
     FIELD_COUNT(RevisionTold, revision, NULL, ANY, OPTIONAL, "revision"),
+    FIELD_ITEM_OR_NULL(RevisionTold, review, review_told_fields, PRESENCE_OPTIONAL, "last review"),
     FIELD_END,
 };
 // clang-format on
@@ -139,7 +154,8 @@ Status materials_print_revision(const MaterialsCall *call, const HttpAnswer *ans
     } else {
         told_tame(told.slug);
         told_tame(told.status);
-        printf("%s@%llu %s\n", told.slug, (unsigned long long)told.revision, told.status);
+        printf("%s@%llu %s%s\n", told.slug, (unsigned long long)told.revision, told.status,
+               told.review.self_approved ? ", by its own author" : "");
     }
     fields_clear(revision_told_fields, &told);
     return status;

@@ -19,9 +19,6 @@ static const OutlineTable tables[] = {
     {NULL, {NULL}},
 };
 
-// Of a list that ends where there may be more.
-enum { MOST = 1000 };
-
 static Status get(MaterialsCall *call, Bytes *path, Problem *problem) {
     HttpAnswer answer;
     Status status = materials_ask(call, "GET", path, NULL, NULL, &answer, problem);
@@ -33,7 +30,7 @@ static Status get(MaterialsCall *call, Bytes *path, Problem *problem) {
 
 static void most_put(Bytes *path) {
     char most[16];
-    snprintf(most, sizeof most, "%d", MOST);
+    snprintf(most, sizeof most, "%d", MATERIALS_MOST);
     materials_query(path, "limit", most);
 }
 

@@ -53,4 +53,6 @@ void sheet_print(Outline *outline) {
             puts(block->heading);
         block_print(block);
     }
+    if (outline->is_cut)
+        puts("\n... and more; --json has all");
 }
