@@ -8,6 +8,7 @@
 
 #include "core/excite/import_text.h"
 
+enum { UNIT_MOST = 12 };              // bytes; what is longer is no unit
 static const double unevenness = 0.3; // of an interval, that a printed time may be off
 
 typedef struct TraceColumns {
@@ -42,12 +43,13 @@ static Status check_header(const TextLine *line, Problem *problem) {
         const char *begin = at + 1, *end = begin;
         while (end < line->end && *end != ']' && *end != ')')
             end++;
-        const int size = (int)(end - begin);
-        if (size == 1 && (*begin == 's' || *begin == 'N'))
+        const ptrdiff_t size = end - begin;
+        const bool is_right = size == 1 && (*begin == 's' || *begin == 'N');
+        if (is_right || size > UNIT_MOST)
             continue;
         return problem_add(problem, STATUS_UNREADABLE, text_place(place, line->number, 0),
-                           "must have times in [s] and forces in [N], tells \"%.*s\"",
-                           size < 40 ? size : 40, begin);
+                           "must have times in [s] and forces in [N], tells [%.*s]", (int)size,
+                           begin);
     }
     return STATUS_OK;
 }

@@ -37,13 +37,24 @@ static bool is_besides(const Walk *walk, const char *name) {
     return false;
 }
 
-static const char *unit_of(const Walk *walk, const char *name) {
-    for (const Field *const *one = walk->way->fields; one != NULL && *one != NULL; one++) {
-        const Field *row = fields_find(*one, name, NULL);
-        if (row != NULL && row->unit != NULL)
-            return row->unit;
+// Of a row of that name, also among the parts of others.
+static const char *unit_in(const Field *fields, const char *name, int depth) {
+    const char *unit = NULL;
+    for (const Field *row = fields; row->kind != FIELD_KIND_END && unit == NULL; row++) {
+        if (strcmp(row->name, name) == 0)
+            unit = row->unit;
+        if (unit == NULL && row->fields != NULL && depth < DEPTH)
+            unit = unit_in(row->fields, name, depth + 1);
     }
-    return NULL;
+    return unit;
+}
+
+static const char *unit_of(const Walk *walk, const char *name) {
+    const char *unit = NULL;
+    for (const Field *const *one = walk->way->fields; one != NULL && *one != NULL && unit == NULL;
+         one++)
+        unit = unit_in(*one, name, 0);
+    return unit;
 }
 
 // Whether the value stands in a cell: a scalar, or a list of them.
@@ -149,17 +160,27 @@ static const OutlineTable *table_find(const Walk *walk, const char *list) {
     return NULL;
 }
 
-// All plain members of the list's objects that say something anywhere, by first appearance.
+// Whether a column has more than what is unknown, and "no" all the way down.
+static bool is_worth_a_column(const json_t *list, const char *name) {
+    for (size_t i = 0; i < json_array_size(list) && i < OUTLINE_ROWS; i++) {
+        const json_t *value = json_object_get(json_array_get(list, i), name);
+        if (says_something(value) && is_plain(value) && !json_is_false(value))
+            return true;
+    }
+    return false;
+}
+
+// The members of the list's objects, by first appearance.
 static size_t columns_find(const Walk *walk, const json_t *list, const char **columns) {
     size_t count = 0;
     for (size_t i = 0; i < json_array_size(list) && i < OUTLINE_ROWS; i++) {
         const char *name;
         json_t *value;
         json_object_foreach(json_array_get(list, i), name, value) {
-            bool is_known = !is_plain(value) || !says_something(value) || is_besides(walk, name);
+            bool is_known = is_besides(walk, name);
             for (size_t k = 0; k < count && !is_known; k++)
                 is_known = strcmp(columns[k], name) == 0;
-            if (!is_known && count < OUTLINE_COLUMNS)
+            if (!is_known && count < OUTLINE_COLUMNS && is_worth_a_column(list, name))
                 columns[count++] = name;
         }
     }
@@ -170,10 +191,9 @@ static void table_add(Walk *walk, const json_t *list, const char *heading, const
     const OutlineTable *table = table_find(walk, name);
     const char *columns[OUTLINE_COLUMNS];
     size_t count = 0;
-    while (table != NULL && count < OUTLINE_COLUMNS && table->columns[count] != NULL) {
-        columns[count] = table->columns[count];
-        count++;
-    }
+    for (size_t i = 0; table != NULL && table->columns[i] != NULL; i++)
+        if (is_worth_a_column(list, table->columns[i]))
+            columns[count++] = table->columns[i];
     if (table == NULL)
         count = columns_find(walk, list, columns);
     const size_t all = json_array_size(list), rows = all < OUTLINE_ROWS ? all : OUTLINE_ROWS;
@@ -251,22 +271,29 @@ static void alike_table(Walk *walk, const Alike *alike, const char *heading) {
     }
 }
 
+static bool is_sentence(const Walk *walk, const Alike *alike, const char *name,
+                        const json_t *value) {
+    return is_plain(value) && says_something(value) && !is_besides(walk, name) &&
+           !is_beside(walk, alike, name);
+}
+
 static void alike_sentences(Walk *walk, const Alike *alike, const char *heading) {
-    char inner[256];
-    for (size_t k = 0; k < alike->count; k++) {
-        const char *name;
-        json_t *value;
+    const char *name;
+    json_t *value;
+    size_t count = 0, row = 0;
+    for (size_t k = 0; k < alike->count; k++)
+        json_object_foreach((json_t *)(uintptr_t)alike->objects[k], name, value) count +=
+            is_sentence(walk, alike, name, value);
+    OutlineBlock *block = count > 0 ? block_add(walk, heading, count, 2) : NULL;
+    for (size_t k = 0; k < alike->count && block != NULL; k++)
         json_object_foreach((json_t *)(uintptr_t)alike->objects[k], name, value) {
-            if (!is_plain(value) || is_beside(walk, alike, name) || !says_something(value) ||
-                is_besides(walk, name))
+            char inner[256];
+            if (!is_sentence(walk, alike, name, value))
                 continue;
-            OutlineBlock *block = block_add(walk, heading, 1, 2);
-            if (block == NULL)
-                return;
-            cell_set(walk, block, 0, strdup(heading_join(inner, alike->names[k], name)));
-            cell_set(walk, block, 1, cell_of(value, unit_of(walk, name)));
+            cell_set(walk, block, 2 * row, strdup(heading_join(inner, alike->names[k], name)));
+            cell_set(walk, block, 2 * row + 1, cell_of(value, unit_of(walk, name)));
+            row++;
         }
-    }
 }
 
 static void object_add(Walk *walk, const json_t *object, const char *heading, int depth);

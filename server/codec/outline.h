@@ -8,7 +8,8 @@
 
 enum { OUTLINE_BLOCKS = 200, OUTLINE_ROWS = 2000, OUTLINE_COLUMNS = 12 };
 
-// Which columns the table of a list has, in this order; other lists have all that say something.
+// Which columns the table of a list has, in this order, as far as they say something; other lists
+// have all that do.
 typedef struct OutlineTable {
     const char *list;
     const char *columns[OUTLINE_COLUMNS + 1]; // NULL-terminated

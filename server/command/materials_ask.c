@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/measure/derived.h"
+#include "core/measure/evaluation.h"
 #include "core/scene/buffer.h"
 #include "core/scene/material.h"
 #include "server/codec/amend.h"
@@ -93,7 +94,8 @@ Status materials_tag(MaterialsCall *call, const char *slug, char tag[256], Probl
 Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
                        const OutlineTable *tables, Problem *problem) {
     static const char *const besides[] = {"links", "test", NULL};
-    const Field *const fields[] = {material_fields, derived_pair_fields, buffer_fields, NULL};
+    const Field *const fields[] = {material_fields, derived_pair_fields, evaluation_fields,
+                                   buffer_fields, NULL};
     const OutlineWay way = {besides, tables, fields};
     Outline outline;
     if (call->settings->json) {

@@ -73,14 +73,15 @@ Status materials_measure_act(MaterialsCall *call, Problem *problem) {
     return status;
 }
 
-// What was shown is what is said, under the comment given.
+// What was shown is what is said, under the comment given, else its own.
 static Status confirm(MaterialsCall *call, const Bytes *shown, Problem *problem) {
     const char *slug = call->operands[0];
     Bytes body = {0}, comment = {0};
     HttpAnswer answer = {0};
     Status status = amend_take(shown, "revision", &body, problem);
-    bytes_json_string(&comment, call->settings->comment);
-    if (status == STATUS_OK)
+    if (call->settings->comment != NULL)
+        bytes_json_string(&comment, call->settings->comment);
+    if (status == STATUS_OK && call->settings->comment != NULL)
         status = amend_set(&body, "comment", &comment, problem);
     if (status == STATUS_OK)
         status = materials_write(call, slug, slug, "/revisions", &body, &answer, problem);
@@ -99,8 +100,6 @@ Status materials_propose_act(MaterialsCall *call, Problem *problem) {
     Bytes path;
     HttpAnswer answer = {0};
     TRY(materials_name(call->operands[0], false, problem));
-    if (settings->confirm && settings->comment == NULL)
-        return problem_set(problem, STATUS_USAGE, "--confirm needs --comment TEXT: why");
     materials_path(&path, call->operands[0], "/proposal");
     materials_query(&path, "measurements", settings->measurements);
     if (settings->separation != CHOICE_ABSENT)

@@ -49,7 +49,8 @@ void sheet_print(Outline *outline) {
         told_tame(block->heading);
         if (i > 0)
             putchar('\n');
-        if (block->heading[0] != '\0' && outline->count > 1)
+        const bool is_same = i > 0 && strcmp(block->heading, outline->at[i - 1].heading) == 0;
+        if (block->heading[0] != '\0' && outline->count > 1 && !is_same)
             puts(block->heading);
         block_print(block);
     }

@@ -62,7 +62,7 @@ static void values_stand_under_their_names_with_units(void **state) {
 static void a_list_of_objects_is_a_table(void **state) {
     (void)state;
     Outline outline = good("{\"rows\": [{\"name\": \"x\", \"length\": 1, \"none\": null}, "
-                           "{\"name\": \"y\", \"mass\": 2.5, \"links\": {}}, 7], "
+                           "{\"name\": \"y\", \"mass\": 2.5, \"links\": {}, \"is\": false}, 7], "
                            "\"chosen\": [{\"a\": 1, \"b\": \"two\", \"c\": {\"d\": 1}}]}");
     static const char *const all[] = {"name", "length [m]", "mass [kg]", "x", "1", "",  "y",
                                       "",     "2.5",        "",          "",  "",  NULL};
