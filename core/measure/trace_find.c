@@ -174,8 +174,8 @@ static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
     return true;
 }
 
-// Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though not
-// to the baseline, or as the tensile end, which is smaller and follows soon.
+// Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though
+// not to the baseline, or as the tensile end, which is smaller and follows soon.
 static bool belongs(const TraceFound *found, const TraceRun *run, const TraceRun *next) {
     const size_t length = run->last - run->first + 1, other = next->last - next->first + 1;
     const size_t longer = length > other ? length : other, gap = next->first - run->last - 1;

@@ -53,8 +53,8 @@ static bool invert(double a[3][3], double inverse[3][3]) {
     return det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
-// The log likelihood at the best L given start and end, and the residue there; *width is that of the
-// normal distribution that L has about it.
+// The log likelihood at the best L given start and end, and the residue there; *width is that of
+// the normal distribution that L has about it.
 static double profile(const TraceWindow *window, const TraceBox *box, TracePoint *point,
                       double step, double *width, TraceResidue *best) {
     double value = -(double)INFINITY;
@@ -137,7 +137,8 @@ static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit 
                 !trace_point_shape(window, &point, &shape, &target->contact_time))
                 continue;
             *target = (Point){
-                .weight = value + log(width) - log(best.model_square) / 2 + log(start_step * end_step),
+                .weight =
+                    value + log(width) - log(best.model_square) / 2 + log(start_step * end_step),
                 .contact_time = target->contact_time,
                 .half_width = (fabs(1 - share) * start_step + end_step) / 4 / shape.length,
                 .start = point.part[START],
