@@ -127,8 +127,6 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/jobs/{id}/events": {"id": job["id"]},
                   **{f"/v1/records/{{name}}{rest}": {"name": "shake"} for rest in ("", "/samples", "/samples.{format}")},
-                  "/v1/materials/{slug}": {"slug": "sponge"},
-                  "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
 
         def call(method, path, target, **options):
@@ -149,13 +147,24 @@ def test_real_answers_have_the_promised_shapes():
         shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 1, 0]}
         assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
 
+        drops = {"drops": [{"drop_height": 0.1, "rebound_height": 0.04, "contact_time": 0.001}]}
+        measurements = "/v1/materials/{slug}/measurements"
+        for body in (drops, {}):
+            call("POST", measurements, "/v1/materials/sponge/measurements", json=body)
+            call("POST", measurements, "/v1/materials/sponge/measurements?dry_run=1", json=body)
+        call("POST", measurements, "/v1/materials/none/measurements", json=drops)
+        call("POST", measurements, "/v1/materials/sponge/measurements", json=drops, headers={"If-Match": '"x"'})
+        call("POST", measurements, "/v1/materials/sponge/measurements", body="{}")
+
         for (method, path), operation in operations().items():
             if method != "GET":
                 continue
             formats = [p["schema"]["enum"] for p in operation.get("parameters", []) if p["name"] == "format"]
             for extension in formats[0] if formats else [None]:
-                target = path.format(**{"id": job["result"], "format": extension, **values.get(path, {})})
+                target = path.format(**{"id": job["result"], "format": extension, "slug": "sponge", "revision": "1",
+                                           "number": "1", **values.get(path, {})})
                 target += f"?a={job['result']}&b={studies['compare']['id']}" if path == "/v1/compare" else ""
+                target += "?damper_mass=1" if path.endswith("/derived") else ""
                 call(method, path, target)
                 if "400" in operation["responses"]:
                     call(method, path, target.split("?")[0] + "?unknown=1")
