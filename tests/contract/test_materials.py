@@ -269,7 +269,7 @@ def test_differences_history_and_pages():
             problem(daemon.get("/v1/materials/felt/diff" + query), 400)
         for number in range(12):
             revise(daemon, "felt", notes=f"number {number}")
-        for size in (1, 4, 15, 16, 1000):
+        for size in (1, 4, 15, 16, 100):
             assert [m["revision"] for page in pages(daemon, f"/v1/materials/felt/revisions?limit={size}", "revisions") for m in page] == [
                 *range(15, 0, -1)], size
             assert [d["version"] for page in pages(daemon, f"/v1/materials/felt/history?limit={size}", "history") for d in page] == [
