@@ -14,6 +14,7 @@
 #include "server/command/ensemble.h"
 #include "server/command/get.h"
 #include "server/command/import.h"
+#include "server/command/materials.h"
 #include "server/command/records.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
@@ -50,6 +51,7 @@ const Command *const commands[] = {
     &command_study,
     &command_sweep,
     &command_import,
+    &command_materials,
     &command_records,
     &command_token,
     &command_backup,
@@ -75,6 +77,7 @@ static const char overview[] =
     "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
     "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd token create --name lab      let a client in who has this token\n"
+    "  impactd materials list               what the lab has measured, and what became of it\n"
     "  impactd backup lab.db                copy the database while the daemon runs\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"

@@ -137,7 +137,7 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
         bytes_real(&target, settings->interval);
     }
     const HttpAsk ask = {
-        .method = "POST", .path = target.at, .body = text, .body_type = "text/plain"};
+        .method = "POST", .path = target.at, .body = text, .content_type = "text/plain"};
     Status status = target.is_failed ? problem_set(problem, STATUS_USAGE, "tells too much of it")
                                      : daemon_ask(daemon, &ask, &answer, problem);
     if (status == STATUS_OK)
