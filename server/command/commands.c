@@ -15,6 +15,7 @@
 #include "server/command/get.h"
 #include "server/command/import.h"
 #include "server/command/materials.h"
+#include "server/command/records.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
 #include "server/command/submit.h"
@@ -50,8 +51,9 @@ const Command *const commands[] = {
     &command_study,
     &command_sweep,
     &command_import,
-    &command_token,
     &command_materials,
+    &command_records,
+    &command_token,
     &command_backup,
     &command_submit,
     &command_watch,
