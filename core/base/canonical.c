@@ -116,6 +116,7 @@ static void put_value(Writer *writer, const Field *field, const void *member) {
         break;
     }
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }

@@ -54,6 +54,9 @@ static void absent_all(const Field *fields, void *item) {
         case FIELD_KIND_VARIANT:
             *(Variant **)member = NULL;
             break;
+        case FIELD_KIND_SHARED:
+            *(Shared **)member = NULL;
+            break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
             absent_all(field->fields, member);
@@ -97,6 +100,9 @@ static void free_all(const Field *fields, void *item) {
         }
         case FIELD_KIND_VARIANT:
             variant_free(*(Variant **)member);
+            break;
+        case FIELD_KIND_SHARED:
+            shared_drop(*(Shared **)member);
             break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
@@ -260,6 +266,9 @@ static Status copy_all(const Field *fields, const void *source, void *target) {
             TRY(copy_all(copy->kind->fields, variant, copy));
             break;
         }
+        case FIELD_KIND_SHARED:
+            *(Shared **)to = shared_hold(*(Shared *const *)from);
+            break;
         case FIELD_KIND_ITEM:
         case FIELD_KIND_BASE:
             TRY(copy_all(field->fields, from, to));
@@ -302,6 +311,8 @@ static bool is_empty(const Field *field, const void *member) {
         return list_of(member).count == 0;
     case FIELD_KIND_VARIANT:
         return *(Variant *const *)member == NULL;
+    case FIELD_KIND_SHARED:
+        return *(Shared *const *)member == NULL;
     case FIELD_KIND_ITEM:
     case FIELD_KIND_BASE:
         return all_empty(field->fields, member);
@@ -314,12 +325,14 @@ static bool is_empty(const Field *field, const void *member) {
 
 static bool all_empty(const Field *fields, const void *item) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
-        if (!is_empty(field, member_of(field, item)))
+        if ((field->flags & FIELD_HIDDEN) == 0 && !is_empty(field, member_of(field, item)))
             return false;
     return true;
 }
 
 bool field_is_absent(const Field *field, const void *item) {
+    if ((field->flags & FIELD_HIDDEN) != 0)
+        return true;
     switch (field->kind) {
     case FIELD_KIND_FLAG:
         return (field->flags & FIELD_RARE) != 0 && !*(const bool *)member_of(field, item);
@@ -378,7 +391,7 @@ const Field *fields_find(const Field *fields, const char *name, size_t *offset) 
                     *offset += field->offset;
                 return found;
             }
-        } else if (strcmp(field->name, name) == 0) {
+        } else if ((field->flags & FIELD_HIDDEN) == 0 && strcmp(field->name, name) == 0) {
             return field;
         }
     }

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/base/shared.h"
 #include "core/base/status.h"
 
 typedef enum FieldKind {
@@ -26,6 +27,7 @@ typedef enum FieldKind {
     FIELD_KIND_VARIANT, // Variant *, owned: one of a plural table, by the name under its tag
     FIELD_KIND_BASE,    // a nested struct whose rows appear in the same object (a base, an inlined
                         // part)
+    FIELD_KIND_SHARED,  // Shared *, a hold; FIELD_HIDDEN
 } FieldKind;
 
 #define COUNT_ABSENT UINT64_MAX
@@ -112,6 +114,10 @@ enum {
     FIELD_RARE = 32,
     // TEXTS: each is a JSON number, string, true or false, kept as JSON text.
     FIELD_SCALARS = 64,
+    // Stays inside: copied and cleared with the struct, and for all else as if it were not there.
+    // Not read, written, described, judged or found by its name, and no part of the canonical form.
+    // Its presence is OPTIONAL.
+    FIELD_HIDDEN = 128,
 };
 
 struct Field {
@@ -165,6 +171,9 @@ struct Field {
 #define FIELD_REAL(Type, member, unit_, range_, default_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REAL, .offset = FIELD_AT(Type, member, double), .unit = unit_, \
      .range = range_, .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
+#define FIELD_HIDDEN_REAL(Type, member) \
+    {.name = #member, .kind = FIELD_KIND_REAL, .offset = FIELD_AT(Type, member, double), .range = ANY, \
+     .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN}
 #define FIELD_COUNT(Type, member, unit_, range_, default_, doc_) \
     {.name = #member, .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(Type, member, uint64_t), .unit = unit_, \
      .range = range_, .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
@@ -208,6 +217,9 @@ struct Field {
 #define FIELD_BASE(Type, member, rows_) \
     {.name = #member, .kind = FIELD_KIND_BASE, .offset = offsetof(Type, member), .fields = rows_, \
      .size = sizeof(((Type *)0)->member)}
+#define FIELD_SHARED(Type, member) \
+    {.name = #member, .kind = FIELD_KIND_SHARED, .offset = FIELD_AT(Type, member, Shared *), \
+     .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN}
 #define FIELD_END {.kind = FIELD_KIND_END}
 // clang-format on
 
@@ -231,7 +243,7 @@ Status fields_copy(const Field *fields, const void *source, void *target);
 // Whether the member under `field` of `item` is absent: NAN, COUNT_ABSENT, NULL, no elements ...
 // Never absent are FLAG (but FIELD_RARE), BASE and, under PRESENCE_DEFAULT, an ITEM and what has
 // elements (an empty list was asked for then). Any other ITEM is absent if all its members are,
-// whatever their presence (its flags do not count).
+// whatever their presence (its flags do not count). What is FIELD_HIDDEN always is.
 bool field_is_absent(const Field *field, const void *item);
 
 // So many zeros, of its own; false without memory, and then it has none.

@@ -214,6 +214,7 @@ static Status check_member(const Field *field, const void *item, const char *poi
     case FIELD_KIND_BASE:
         return fields_check(field->fields, member, pointer, problem);
     case FIELD_KIND_FLAG:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }

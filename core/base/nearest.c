@@ -67,7 +67,7 @@ static void nearest_try_fields(Nearest *nearest, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++)
         if (field->kind == FIELD_KIND_BASE)
             nearest_try_fields(nearest, field->fields);
-        else
+        else if ((field->flags & FIELD_HIDDEN) == 0)
             nearest_try(nearest, field->name);
 }
 

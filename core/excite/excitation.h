@@ -26,6 +26,8 @@ typedef struct Span {
 
 typedef struct ExcitationKind {
     Kind kind;
+    // Judges what the run does not matter for, beside what rows can see. NULL: nothing.
+    Status (*check)(const Excitation *excitation, const char *pointer, Problem *problem);
     // Judges what ranges cannot say and completes defaults that depend on the run, below `pointer`.
     // May be NULL.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,

@@ -17,6 +17,10 @@ const char *const import_unit_names[] = {
 static const double unit_sizes[] = {
     [IMPORT_G] = 9.80665, [IMPORT_METRES] = 1, [IMPORT_CENTIMETRES] = 0.01}; // [m/s^2]
 
+double import_unit_size(int unit) {
+    return unit_sizes[unit];
+}
+
 // The numbers of a file as its rows hold them.
 typedef struct Numbers {
     double *at;

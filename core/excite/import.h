@@ -7,6 +7,7 @@
 
 typedef enum ImportUnit { IMPORT_G, IMPORT_METRES, IMPORT_CENTIMETRES } ImportUnit;
 extern const char *const import_unit_names[]; // "g", "m/s^2", "cm/s^2"; NULL-terminated
+double import_unit_size(int unit);            // [m/s^2]
 
 // What the caller knows of the file.
 typedef struct ImportRequest {

@@ -8,10 +8,13 @@
 
 enum { DROPS_MOST = 1000, TRACES_MOST = 100, TRACE_SAMPLES_MOST = 1 << 20 };
 
+// What a height's speed is worth where a test does not say what pulls [m/s^2].
+#define STANDARD_GRAVITY 9.80665
+
 // One impact as it was read: heights or speeds, a duration, or some of them. Not known: NAN.
 typedef struct Drop {
-    double drop_height, rebound_height;   // above the buffer at rest [m]
-    double approach_speed, rebound_speed; // just before and after the contact [m/s]
+    double drop_height, rebound_height;   // of the impactor above the buffer at rest [m]
+    double approach_speed, rebound_speed; // relative to the base, just before and after [m/s]
     double contact_time;                  // [s]
     char *excluded;                       // why it is not to count; NULL: it counts
     char *note;
@@ -40,9 +43,9 @@ typedef struct DropTest {
     int base;             // MaterialBase; CHOICE_ABSENT: nobody says
     double base_mass;     // of a free base [kg]
     char *geometry;       // of the buffer and the set-up
-    double gravity; // that pulls the impactor into the buffer during contact; 0: none, or not to be
-                    // taken into account [m/s^2]
-    double temperature; // [degC]
+    double gravity;       // that pulls the impactor into the buffer during contact; 0: none, NAN:
+                          // nobody says, and then it is not taken out [m/s^2]
+    double temperature;   // [degC]
     char *instrument, *date, *person, *source, *notes;
     // Standard uncertainty of one reading, from the instrument; NAN: not known.
     double height_uncertainty; // [m]
@@ -55,7 +58,16 @@ typedef struct DropTest {
 extern const Field drop_test_fields[];
 
 // All faults that rows cannot see, and the rows', below `pointer`: no reading at all, a rebound
-// above the drop, heights beside speeds that they contradict, a date that is none ...
+// above the drop, heights beside speeds that they contradict, a date that is none ... A drop that
+// is excluded may contradict itself: that may be why.
 Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem);
+
+// What a drop says of its speeds [m/s]: as read, else by its heights; relative to the base. NAN
+// where nothing tells. A free base takes part of a rebound: heights then need both masses.
+double drop_approach(const DropTest *test, const Drop *drop);
+double drop_rebound(const DropTest *test, const Drop *drop);
+
+// Of the test's pair; NAN where its masses are not known [kg].
+double drop_test_mass(const DropTest *test);
 
 #endif

@@ -1,14 +1,102 @@
-// What drop tests of one material come to: e and T_c with their spread, whether they hold over
-// speed, and the revision that would say so. Not the tests themselves (drop_test.h) and not their
-// storage. Used by whoever shows or proposes it.
+// What drop tests of one material come to: every reading as a row, e and T_c with their spread,
+// whether they hold over speed. Not the tests themselves (drop_test.h), not the revision that would
+// say so (proposal.h) and not their storage. Used by whoever shows or proposes it.
 #ifndef CORE_MEASURE_EVALUATION_H
 #define CORE_MEASURE_EVALUATION_H
 
 #include "core/measure/drop_test.h"
 #include "core/measure/trace.h"
-#include "core/scene/material.h"
+#include "core/plan/plan.h"
 
-// The owner of this file completes it: see drop_test.h and trace.h for what goes in, material.h for
-// what is proposed.
+enum { EVALUATION_ROWS_MOST = 20000 };
+#define EVALUATION_CONFIDENCE 0.95
+
+// One test, by its number of the material; COUNT_ABSENT: it has none yet. Borrowed.
+typedef struct Measurement {
+    uint64_t number;
+    const DropTest *test;
+} Measurement;
+
+// Where a row's e and T_c come from.
+typedef enum RestitutionBy {
+    RESTITUTION_BY_HEIGHTS,
+    RESTITUTION_BY_SPEEDS,
+    RESTITUTION_BY_PULSE
+} RestitutionBy;
+typedef enum ContactTimeBy { CONTACT_TIME_BY_DURATION, CONTACT_TIME_BY_PULSE } ContactTimeBy;
+extern const char *const restitution_by_names[];  // "heights" ...; NULL-terminated
+extern const char *const contact_time_by_names[]; // "duration", "pulse"; NULL-terminated
+
+// One reading. Uncertainties are standard ones; what is not known is NAN, CHOICE_ABSENT or NULL.
+typedef struct EvaluationRow {
+    uint64_t measurement;                              // its number; COUNT_ABSENT
+    char *from;                                        // "drop 3"; "trace 1, contact 2"
+    double approach_speed, approach_speed_uncertainty; // [m/s]
+    double restitution, restitution_uncertainty;       // [-]
+    int restitution_by;                                // RestitutionBy
+    double contact_time, contact_time_uncertainty;     // [s]
+    int contact_time_by;                               // ContactTimeBy
+    double least_contact_time, most_contact_time;      // of a trace, 95 % [s]
+    double read_restitution, read_contact_time; // before gravity was taken out; NAN: it was not
+    bool restitution_counts, contact_time_counts;
+    double restitution_score, contact_time_score;         // deviations from the middle, robust ones
+    bool restitution_is_outlier, contact_time_is_outlier; // which counts all the same
+    char *excluded;                                       // why neither counts
+    char *note;                                           // what else there is to know of it
+    bool is_of_trace; // "/traces/0" rather than "/drops/0"; no members of the answer:
+    size_t place;
+    size_t test; // of those given
+} EvaluationRow;
+typedef struct EvaluationRows {
+    EvaluationRow *at;
+    size_t count;
+} EvaluationRows;
+
+typedef enum TrendVerdict { TREND_CONSTANT, TREND_NOT_CONSTANT } TrendVerdict;
+extern const char *const trend_verdict_names[]; // "constant", "not_constant"; NULL-terminated
+
+// A straight line over approach speed by least squares: whether "constant over speed" holds.
+typedef struct Trend {
+    uint64_t count;                          // of readings with a speed
+    double least_speed, most_speed;          // [m/s]
+    double slope, standard_error, low, high; // per m/s; 95 %
+    double t, p;                             // of no slope at all
+    double change;                           // that the line makes over the measured speeds
+    double missed_change; // the largest over them that the data do not rule out, 95 %
+    int verdict;          // TrendVerdict; CHOICE_ABSENT: cannot be told
+    char *detail;         // the verdict for people
+} Trend;
+
+// e or T_c over all readings that count.
+typedef struct Quantity {
+    uint64_t count;
+    double mean;
+    double deviation;      // standard deviation of the readings
+    double standard_error; // of the mean
+    double low, high;      // 95 % interval of the mean
+    double minimum, median, maximum;
+    uint64_t outliers;
+    double mean_without_outliers; // NAN: there are none
+    char *why;                    // how the interval was made, or why there is none
+    Trend trend;
+} Quantity;
+
+typedef struct Evaluation {
+    int separation; // Separation: the rule by which traces were read
+    double confidence;
+    Quantity restitution, contact_time;
+    EvaluationRows rows;
+    double least_speed, most_speed;             // of rows that count; NAN: not known [m/s]
+    double least_temperature, most_temperature; // likewise [degC]
+    Warnings warnings;                          // pointers lead into the tests: "/drops/2"
+} Evaluation;
+
+extern const Field evaluation_fields[]; // without the warnings
+
+// `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
+// STATUS_LIMIT: too many rows. Cleared by evaluation_clear in any case.
+Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
+                       Evaluation *evaluation, Problem *problem);
+void evaluation_clear(Evaluation *evaluation);
 
 #endif

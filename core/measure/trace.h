@@ -7,32 +7,41 @@
 #include "core/base/field.h"
 #include "core/contact/contact.h"
 
-enum { TRACE_CONTACTS_MOST = 1000 };
+enum { TRACE_CONTACTS_MOST = 1000, TRACE_WHY_MOST = 400 };
 
 // How a trace is read.
 typedef struct TraceWay {
-    int separation;                // Separation
-    double threshold;              // of detection [N]; NAN: from the noise
-    double effective_mass;         // of the pair, used only with gravity; NAN: not known [kg]
-    double gravity;                // that pulls the pair together during contact; 0: none [m/s^2]
-    const double *approach_speeds; // of the contacts in order, used only with gravity [m/s]
+    int separation;   // Separation
+    double threshold; // of detection [N]; NAN: from the noise
+    // What pulls the pair together during contact, 0: nothing [m/s^2]. Only with it are used the
+    // approach speeds of the contacts in order, as far as known [m/s], and where one is not known
+    // the pair's effective mass [kg], NAN: not known, from which and from the force it follows.
+    double gravity;
+    double effective_mass;
+    const double *approach_speeds;
     size_t approach_speed_count;
 } TraceWay;
 
 // One contact. What is not known is NAN; uncertainties are standard ones.
 typedef struct TraceContact {
-    double start, end;                             // of the fitted pulse [s]
-    double first, last;                            // of the samples in contact [s]
-    uint64_t samples;                              // in contact
-    double peak;                                   // largest force above the baseline [N]
-    double impulse;                                // [N s]
-    double crossing_time, crossing_uncertainty;    // between crossings of the threshold [s]
-    double contact_time, contact_time_uncertainty; // of an isolated pair, by the fit [s]
+    double start, end; // of the fitted pulse, from the first sample on [s]
+    double first,
+        last; // of the samples in contact, or above the threshold where nothing is fitted [s]
+    uint64_t samples; // from the one to the other
+    double peak;      // largest force above the baseline, with its sign [N]
+    double impulse;   // of the fitted pulse, with its sign [N s]
+    // Between the crossings of the threshold on the pressing side, which is short of T_c by so much
+    // of it as the fitted pulse has it.
+    double crossing_time, crossing_uncertainty;    // [s]
+    double crossing_shortfall;                     // [-]
+    double contact_time, contact_time_uncertainty; // T_c of an isolated pair, by the fit [s]
     double least_contact_time,
         most_contact_time; // within which it lies, 95 %; also where there is no figure [s]
     double restitution, restitution_uncertainty; // by the pulse's shape
-    double misfit; // rms of what the fit leaves over the noise; large: the trace is not the model's
-    char *why;     // no figure is given, or it is doubtful; NULL
+    double misfit;                               // rms of what the fit leaves over the noise
+    double misfit_share;                         // and over the peak
+    bool is_doubtful;                            // a figure is given, but see why
+    char *why;                                   // no figure is given, or it is doubtful; NULL
 } TraceContact;
 typedef struct TraceContacts {
     TraceContact *at;
@@ -42,7 +51,7 @@ typedef struct TraceContacts {
 typedef struct TraceReading {
     double baseline, noise, threshold; // [N]
     TraceContacts contacts;
-    char *why; // there are none
+    char *why; // there are none, or not all; NULL
 } TraceReading;
 
 extern const Field trace_contact_fields[];
@@ -53,8 +62,9 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
                   TraceReading *reading, Problem *problem);
 void trace_reading_clear(TraceReading *reading);
 
-// The fitted pulse's force without baseline at `count` times from `start` on, for drawing [N].
-void trace_pulse(const TraceContact *contact, const TraceWay *way, double start, double interval,
-                 size_t count, double *force);
+// The fitted pulse's force without baseline at `count` times from `start` on, for drawing [N]; 0
+// everywhere where there is no figure. `approach_speed` [m/s] is used only with gravity.
+void trace_pulse(const TraceContact *contact, const TraceWay *way, double approach_speed,
+                 double start, double interval, size_t count, double *force);
 
 #endif

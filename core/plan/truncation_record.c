@@ -15,28 +15,29 @@ typedef struct Integrated {
 static Integrated integrate(const Mode *mode, const ExcitationRecord *base) {
     enum { Q, P, A, B, SIZE };
     const double omega = omega_of(mode, mode->time), wave = 1 / square(omega);
+    const double interval = record_interval(base);
+    const Reals *samples = record_samples(base);
     long double system[SIZE * SIZE] = {0}, gain[SIZE * SIZE];
     system[Q * SIZE + P] = system[A * SIZE + B] = 1;
     system[P * SIZE + Q] = -(long double)omega * omega;
     system[P * SIZE + P] = -2 * (long double)mode->slack;
     system[P * SIZE + A] = -1;
-    exponential_increment(system, SIZE, base->interval, gain);
+    exponential_increment(system, SIZE, interval, gain);
     double g[2][4];
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 4; j++)
             g[i][j] = (double)gain[i * SIZE + j];
-    const double last = floor(mode->time / base->interval);
-    const size_t count =
-        last + 1 < (double)base->samples.count ? (size_t)last + 1 : base->samples.count;
+    const double last = floor(mode->time / interval);
+    const size_t count = last + 1 < (double)samples->count ? (size_t)last + 1 : samples->count;
     double q = 0, p = 0, peak = 0, stray = 0, sums[3] = {0};
     for (size_t i = 0; i + 1 < count; i++) {
-        const double a = base->samples.at[i] * base->scale;
-        const double b = (base->samples.at[i + 1] * base->scale - a) / base->interval;
+        const double a = samples->at[i] * base->scale;
+        const double b = (samples->at[i + 1] * base->scale - a) / interval;
         const double dq = g[0][0] * q + g[0][1] * p + g[0][2] * a + g[0][3] * b;
         const double dp = g[1][0] * q + g[1][1] * p + g[1][2] * a + g[1][3] * b;
         q += dq;
         p += dp;
-        const double off = q + wave * (a + b * base->interval);
+        const double off = q + wave * (a + b * interval);
         peak = fmax(peak, fabs(q));
         stray = fmax(stray, fabs(off));
         sums[0] += q * q;
@@ -44,15 +45,15 @@ static Integrated integrate(const Mode *mode, const ExcitationRecord *base) {
         sums[2] += dp * dp;
     }
     const double rest = hypot(q, p / omega);
-    const double after = fmax(mode->time - (double)(count - 1) * base->interval, 0);
+    const double after = fmax(mode->time - (double)(count - 1) * interval, 0);
     const double left = square(rest) / 2 * kept(mode->slack, after) * after;
-    const bool goes_on = after > base->interval;
+    const bool goes_on = after > interval;
     return (Integrated){
         .peak = fmax(peak, goes_on ? rest : 0),
-        .rms = sqrt((sums[0] * base->interval + left) / mode->time),
+        .rms = sqrt((sums[0] * interval + left) / mode->time),
         .stray = fmax(stray, goes_on ? rest : 0),
-        .stray_rms = sqrt((sums[1] * base->interval + left) / mode->time),
-        .accelerated = sqrt((sums[2] / base->interval + left * square(square(omega))) / mode->time),
+        .stray_rms = sqrt((sums[1] * interval + left) / mode->time),
+        .accelerated = sqrt((sums[2] / interval + left * square(square(omega))) / mode->time),
     };
 }
 
@@ -78,13 +79,15 @@ void levels_of_record(const Plan *plan, const ExcitationRecord *base, Level *lev
     static const double steps_most = 2e6; // about what the modes themselves take to be found
     static const double doubt = 1.5;      // of what lies between
     const size_t n = plan->modes.count;
+    const double interval = record_interval(base);
+    const Reals *samples = record_samples(base);
     double highest = 0, sum = 0;
-    for (size_t i = 0; i < base->samples.count; i++) {
-        highest = fmax(highest, fabs(base->samples.at[i] * base->scale));
-        sum += square(base->samples.at[i] * base->scale) * base->interval;
+    for (size_t i = 0; i < samples->count; i++) {
+        highest = fmax(highest, fabs(samples->at[i] * base->scale));
+        sum += square(samples->at[i] * base->scale) * interval;
     }
     *wave = (Wave){highest > 0 ? fmin(sqrt(sum / plan->duration) / highest, 1) : 0, 1, 0};
-    const double fit = steps_most / (double)base->samples.count;
+    const double fit = steps_most / (double)samples->count;
     const size_t stride = fit < (double)n ? (size_t)ceil((double)n / fmax(fit, 6)) : 1;
     size_t from = 0;
     Mode mode = mode_of(plan, 0);

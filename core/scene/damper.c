@@ -6,7 +6,7 @@
 
 #include "core/contact/identify.h"
 
-static const char *const identified_for_names[] = {
+const char *const identified_for_names[] = {
     [IDENTIFIED_FOR_SCENE] = "scene", [IDENTIFIED_FOR_RIG] = "rig", NULL};
 
 // clang-format off

@@ -18,6 +18,7 @@ typedef struct Rig {
 } Rig;
 
 typedef enum IdentifiedFor { IDENTIFIED_FOR_SCENE, IDENTIFIED_FOR_RIG } IdentifiedFor;
+extern const char *const identified_for_names[]; // "scene", "rig"; NULL-terminated
 
 // Stops at u = offset +- clearance / 2, u being the free mass's displacement relative to the
 // structure.

@@ -167,6 +167,8 @@ static Status complete_starts(Scene *scene, size_t storeys, Problem *problem) {
 static Status complete_excitation(Scene *scene, size_t most_samples, Problem *problem) {
     Excitation *excitation = (Excitation *)(void *)scene->excitation;
     const ExcitationKind *kind = excitation_kind(excitation);
+    if (kind->check != NULL)
+        TRY(kind->check(excitation, "/excitation", problem));
     if (kind->complete == NULL || !is_positive(scene->duration) ||
         !is_positive(scene->sample_rate) || problem_concerns(problem, "/duration"))
         return STATUS_OK;

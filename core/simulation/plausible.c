@@ -61,6 +61,8 @@ static Status warn_rows(const Field *fields, const void *item, const char *point
             TRY(warn_rows(field->fields, member, pointer, warnings));
             continue;
         }
+        if ((field->flags & FIELD_HIDDEN) != 0)
+            continue;
         pointer_join(place, sizeof place, pointer, field->name);
         if (field->kind == FIELD_KIND_REALS) {
             TRY(warn_reals(field, member, place, warnings));

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excite/record.h"
 #include "core/study/sweep_judge.h"
 #include "core/study/sweep_run.h"
 
@@ -47,7 +48,7 @@ const char *sweep_metric_unit(const char *name) {
 
 // clang-format off
 static const Field axis_fields[] = {
-    FIELD_TEXT(SweepAxis, pointer, 200, PRESENCE_REQUIRED, 0, "JSON Pointer to what varies in the scene, /dampers/0/clearance; a buffer's takes names of materials, a kind's name (/contact/model) makes it that kind"),
+    FIELD_TEXT(SweepAxis, pointer, 200, PRESENCE_REQUIRED, 0, "JSON Pointer to what varies in the scene, /dampers/0/clearance; a buffer's takes names of materials, /excitation/name names of records, a kind's name (/contact/model) makes it that kind"),
     FIELD_TEXTS(SweepAxis, values, NULL, NULL, SWEEP_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "what it takes, one after the other; or a range"),
     FIELD_REAL(SweepAxis, from, NULL, ANY, OPTIONAL, "first number of a range"),
     FIELD_REAL(SweepAxis, to, NULL, ANY, OPTIONAL, "its last"),
@@ -56,11 +57,19 @@ static const Field axis_fields[] = {
     FIELD_END
 };
 
+const Field pinned_record_fields[] = {
+    FIELD_TEXT(PinnedRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "of an uploaded record"),
+    FIELD_TEXT(PinnedRecord, digest, RECORD_DIGEST_SIZE - 1, PRESENCE_OPTIONAL, 0, "SHA-256 of its interval and samples"),
+    FIELD_SHARED(PinnedRecord, named),
+    FIELD_END
+};
+
 static const Field study_fields[] = {
     FIELD_LIST(SweepStudy, axes, axis_fields, SWEEP_AXES, PRESENCE_REQUIRED, "what varies; changes are made in this order, and of a grid the last axis varies fastest"),
     FIELD_CHOICE(SweepStudy, mode, sweep_mode_names, SWEEP_GRID, "grid: every combination of the axes' values; list: their first values together, then their second, and so on"),
     FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, usual_metrics, SWEEP_METRICS, PRESENCE_DEFAULT, 0, "what is kept of each point: the summary's numbers, and steps, the solver's"),
     FIELD_LIST(SweepStudy, materials, buffer_fields, 0, PRESENCE_OPTIONAL, "numbers of the materials that the scene and the axes name, as they were when it was submitted; need not be given"),
+    FIELD_LIST(SweepStudy, records, pinned_record_fields, 0, PRESENCE_OPTIONAL, "ground motions that the axes name, as they were when it was submitted; need not be given"),
     FIELD_END
 };
 

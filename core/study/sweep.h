@@ -36,13 +36,26 @@ typedef struct Buffers {
     size_t count;
 } Buffers;
 
+// A record that an axis names, as it was when the sweep was submitted.
+typedef struct PinnedRecord {
+    char *name, *digest;
+    Shared *named; // a NamedRecord; NULL: not found yet
+} PinnedRecord;
+
+typedef struct PinnedRecords {
+    PinnedRecord *at;
+    size_t count;
+} PinnedRecords;
+extern const Field pinned_record_fields[];
+
 // What is asked.
 typedef struct SweepStudy {
     Study study;
     SweepAxes axes; // of a grid the last one varies fastest
     int mode;       // SweepMode
     Texts metrics;
-    Buffers materials; // the numbers of every material that the scene or an axis names
+    Buffers materials;     // the numbers of every material that the scene or an axis names
+    PinnedRecords records; // the ground motions that an axis names
 } SweepStudy;
 
 // What a point can be measured by: the summary's numbers in their order, then the solver's steps.

@@ -133,6 +133,20 @@ static void fill_materials(const Buffers *materials, Simulation *target) {
     }
 }
 
+// Likewise the ground motion that the scene names now.
+static Status fill_record(const PinnedRecords *records, Simulation *target) {
+    ExcitationRecord *record = (ExcitationRecord *)(void *)target->scene.excitation;
+    if (excitation_kind(&record->excitation) != &excitation_record || record->name == NULL)
+        return STATUS_OK;
+    for (size_t i = 0; i < records->count; i++) {
+        const PinnedRecord *pinned = &records->at[i];
+        if (pinned->named != NULL && strcmp(pinned->name, record->name) == 0)
+            return record_resolve(record, (NamedRecord *)(void *)pinned->named) ? STATUS_OK
+                                                                                : STATUS_NO_MEMORY;
+    }
+    return STATUS_OK;
+}
+
 static void clear_texts(Texts *texts) {
     for (size_t i = 0; i < texts->count; i++)
         free(texts->at[i]);
@@ -160,7 +174,7 @@ static Status apply(const SweepPlan *plan, size_t point, Simulation *target, siz
                         &values->at[sweep_plan_index(plan, i, point)], why));
     }
     fill_materials(&plan->study->materials, target);
-    return STATUS_OK;
+    return fill_record(&plan->study->records, target);
 }
 
 Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
@@ -185,7 +199,7 @@ size_t sweep_affordable(const SweepPlan *plan, size_t scenes) {
     const double n = (double)structure_storeys(scene_structure(scene));
     double cost = 1 + n / 4 + n * n / 64;
     if (excitation_kind(excitation) == &excitation_record)
-        cost += 1e-3 * (double)((const ExcitationRecord *)(const void *)excitation)->samples.count;
+        cost += 1e-3 * (double)record_samples((const void *)excitation)->count;
     if (scenes == SIZE_MAX)
         return SIZE_MAX;
     const size_t most = (size_t)((double)scenes / cost);

@@ -37,6 +37,10 @@ Handler cache_show, cache_explain;
 Handler compare_results, compare_measured;
 Handler sweeps_table, sweeps_point, sweeps_scene;
 Handler materials_list, materials_show, materials_show_revision;
+Handler materials_create, materials_revise, materials_revert, materials_review;
+Handler materials_revisions, materials_history, materials_diff, materials_uses,
+    materials_uses_revision;
+Handler records_create, records_list, records_show, records_samples, records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 

@@ -8,12 +8,13 @@
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/api/job_document.h"
+#include "server/api/query.h"
 #include "server/base/clock.h"
 #include "server/http/reply.h"
 #include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
 
-enum { LIST_INITIAL = 20, LIST_MOST = 100, TEXT_MOST = 200 };
+enum { LIST_INITIAL = 20, LIST_MOST = 100 };
 
 // Unfinished jobs whose state is asked for are looked at one by one, this many at a time.
 enum { LOOKED_AT = 256 };
@@ -60,44 +61,10 @@ static bool list_row(App *app, Bytes *bytes, const JobRow *row, int state, const
     return true;
 }
 
-// The query's text, NULL where it is absent or empty.
-static Status read_text(const Request *request, const char *name, const char **text,
-                        Problem *problem) {
-    *text = request_query(request, name);
-    if (*text != NULL && strlen(*text) > TEXT_MOST)
-        return problem_set(problem, STATUS_USAGE,
-                           "the query parameter \"%s\" may have %d bytes, has %zu", name, TEXT_MOST,
-                           strlen(*text));
-    if (*text != NULL && **text == '\0')
-        *text = NULL;
-    return STATUS_OK;
-}
-
-// Which of `names` it is; `initial` where it is absent.
-static Status read_choice(const Request *request, const char *name, const char *const *names,
-                          int initial, int *choice, Problem *problem) {
-    const char *text;
-    TRY(read_text(request, name, &text, problem));
-    *choice = initial;
-    if (text == NULL)
-        return STATUS_OK;
-    char list[160] = "";
-    for (int i = 0; names[i] != NULL; i++) {
-        if (strcmp(names[i], text) == 0) {
-            *choice = i;
-            return STATUS_OK;
-        }
-        text_list(list, sizeof list, names[i]);
-    }
-    return problem_set(problem, STATUS_USAGE,
-                       "the query parameter \"%s\" must be one of %s, is \"%.40s\"", name, list,
-                       text);
-}
-
 static Status read_time(const Request *request, const char *name, bool is_end, int64_t *unix_ms,
                         Problem *problem) {
     const char *text;
-    TRY(read_text(request, name, &text, problem));
+    TRY(query_text(request, name, &text, problem));
     if (text == NULL)
         return STATUS_OK;
     if (!clock_read(text, unix_ms))
@@ -119,14 +86,14 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     int kind;
     TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
     *search = job_search_all(limit);
-    TRY(read_choice(request, "status", job_state_names, -1, state, problem));
-    TRY(read_choice(request, "kind", kinds, -1, &kind, problem));
-    TRY(read_text(request, "before", &search->before, problem));
+    TRY(query_choice(request, "status", job_state_names, -1, state, problem));
+    TRY(query_choice(request, "kind", kinds, -1, &kind, problem));
+    TRY(query_text(request, "before", &search->before, problem));
     if (search->before != NULL)
         search->before_unix_ms = job_id_unix_ms(search->before);
-    TRY(read_text(request, "q", &search->words, problem));
-    TRY(read_text(request, "label", &search->label, problem));
-    TRY(read_text(request, "result", &search->result, problem));
+    TRY(query_text(request, "q", &search->words, problem));
+    TRY(query_text(request, "label", &search->label, problem));
+    TRY(query_text(request, "result", &search->result, problem));
     TRY(read_time(request, "since", false, &search->since_unix_ms, problem));
     TRY(read_time(request, "until", true, &search->until_unix_ms, problem));
     if (kind >= 0) // the names are the studies' own, and outlive this
@@ -137,32 +104,6 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
     else if (*state >= 0)
         search->least_state = search->most_state = *state;
     return STATUS_OK;
-}
-
-static void put_escaped(Bytes *bytes, const char *text) {
-    for (; *text != '\0'; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
-            strchr("-._~", c) != NULL)
-            bytes_put(bytes, text, 1);
-        else
-            bytes_format(bytes, "%%%02X", (unsigned)c);
-    }
-}
-
-static void link_next(const Request *request, Reply *reply, const char *last) {
-    Bytes bytes = {.most = sizeof reply->link - 1};
-    bytes_text(&bytes, "</v1/jobs?");
-    for (size_t i = 0; i < request->query_count; i++)
-        if (strcmp(request->queries[i].name, "before") != 0) {
-            bytes_format(&bytes, "%s=", request->queries[i].name);
-            put_escaped(&bytes, request->queries[i].value);
-            bytes_text(&bytes, "&");
-        }
-    bytes_format(&bytes, "before=%s>; rel=\"next\"", last);
-    if (!bytes.is_failed)
-        snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
-    bytes_clear(&bytes);
 }
 
 // Up to `most` jobs into `bytes`. `last` gets the last one's id where more may follow, else "".
@@ -215,6 +156,6 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     }
     bytes_text(&bytes, "]}\n");
     if (last[0] != '\0')
-        link_next(request, reply, last);
+        query_link_next(request, reply, "before", last);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -1,46 +1,100 @@
-// Buffer materials, read only: the list, a slug's head, one revision.
+// One material: a slug's head, one revision.
+#include "server/api/materials.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-#include "server/api/app.h"
+#include "server/base/clock.h"
+#include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-static bool holds(const char *text, const char *word) {
-    const size_t size = strlen(word);
-    for (; text != NULL; text = *text != '\0' ? text + 1 : NULL)
-        if (strncasecmp(text, word, size) == 0)
-            return true;
-    return false;
+void material_tag(const char *slug, uint64_t revision, uint64_t version, char tag[MATERIAL_TAG]) {
+    snprintf(tag, MATERIAL_TAG, "%.63s@%llu-%llu", slug, (unsigned long long)revision,
+             (unsigned long long)version);
 }
 
-Status materials_list(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const char *word = request_query(request, "q");
-    MaterialRevisions materials = {0};
-    const Status status = store_materials(app->store, &materials, problem);
-    if (status != STATUS_OK) {
-        material_revisions_clear(&materials);
-        return status;
-    }
-    Bytes bytes = {.most = app->reply_most};
-    bytes_text(&bytes, "{\"materials\": [");
-    bool is_first = true;
-    for (size_t i = 0; i < materials.count; i++) {
-        MaterialRevision *material = &materials.at[i];
-        const Material *said = &material->material;
-        if (word != NULL && !holds(material->slug, word) && !holds(said->name, word) &&
-            !holds(said->source, word))
+// A number of at most 18 digits; *text goes on behind it.
+static bool read_count(const char **text, const char *end, uint64_t *count) {
+    const char *from = *text;
+    *count = 0;
+    for (; *text < end && **text >= '0' && **text <= '9'; (*text)++)
+        *count = 10 * *count + (uint64_t)(**text - '0');
+    return *text > from && *text - from <= 18;
+}
+
+// The version in a tag of this material, with its quotes; what was packed has a word behind it.
+static bool read_tag(const char *tag, size_t size, const char *slug, uint64_t *version) {
+    const char *end = tag + size - 1, *text = tag + 1;
+    const size_t length = strlen(slug);
+    uint64_t revision;
+    if (size < length + 6 || memcmp(text, slug, length) != 0 || text[length] != '@')
+        return false;
+    text += length + 1;
+    return read_count(&text, end, &revision) && *text++ == '-' && read_count(&text, end, version) &&
+           (text == end || *text == '-');
+}
+
+Status material_condition(App *app, const Request *request, const char *slug, bool is_required,
+                          uint64_t *version, MaterialState *state, Problem *problem) {
+    const char *list = request->if_match, *tag;
+    uint64_t seen = 0, newest = 0;
+    size_t size;
+    *version = ANY_VERSION;
+    TRY(store_material_state(app->store, slug, state, problem));
+    const unsigned long long current = state->version;
+    if (list == NULL && !is_required)
+        return STATUS_OK;
+    if (list == NULL)
+        return problem_set(problem, STATUS_UNCONDITIONAL,
+                           "send If-Match with the ETag that GET /v1/materials/%.63s told you, so "
+                           "that you change what you have seen; it is \"%.63s@%llu-%llu\" now",
+                           slug, slug, (unsigned long long)state->latest, current);
+    while (header_etag_next(&list, &tag, &size)) {
+        if (*tag == '*')
+            return STATUS_OK;
+        if (!read_tag(tag, size, slug, &seen))
             continue;
-        bytes_text(&bytes, is_first ? "" : ",\n ");
-        (void)catalogue_read_lists(material, NULL);
-        catalogue_write(&bytes, material);
-        is_first = false;
+        if (seen == state->version) {
+            *version = seen;
+            return STATUS_OK;
+        }
+        newest = seen > newest ? seen : newest;
     }
-    bytes_text(&bytes, "]}\n");
-    material_revisions_clear(&materials);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
+    if (newest == 0)
+        return problem_set(problem, STATUS_STALE,
+                           "If-Match has no tag of the material \"%.63s\": its ETag is "
+                           "\"%.63s@%llu-%llu\" now, you sent %.80s",
+                           slug, slug, (unsigned long long)state->latest, current,
+                           request->if_match);
+    return problem_set(problem, STATUS_STALE,
+                       "the material \"%.63s\" has changed since you read it: it is at version "
+                       "%llu, you have seen version %llu; read it again",
+                       slug, current, (unsigned long long)newest);
+}
+
+Status material_revision_number(const char *text, uint64_t *revision, Problem *problem) {
+    const size_t size = strlen(text);
+    *revision = 0;
+    if (size <= 9 && strspn(text, "0123456789") == size)
+        *revision = strtoull(text, NULL, 10);
+    if (*revision > 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_NOT_FOUND,
+                       "there is no revision \"%.20s\"; they count from 1", text);
+}
+
+void material_put_text(Bytes *bytes, const char *name, const char *text) {
+    bytes_format(bytes, ", \"%s\": ", name);
+    bytes_json_string(bytes, text);
+}
+
+void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
+    char text[32];
+    if (unix_ms > 0)
+        clock_rfc3339(unix_ms, text);
+    material_put_text(bytes, name, unix_ms > 0 ? text : NULL);
 }
 
 static Status show(App *app, const Request *request, uint64_t revision, Reply *reply,
@@ -52,10 +106,8 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
         material_revision_clear(&material);
         return status;
     }
-    // What is said of a revision may still change (a draft is approved): the version tells.
-    char tag[110];
-    snprintf(tag, sizeof tag, "%.63s@%llu-%llu", material.slug,
-             (unsigned long long)material.revision, (unsigned long long)material.version);
+    char tag[MATERIAL_TAG];
+    material_tag(material.slug, material.revision, material.version, tag);
     Bytes bytes = {.most = app->reply_most};
     const bool is_known = reply_tagged(reply, request, tag);
     if (!is_known) {
@@ -71,13 +123,7 @@ Status materials_show(App *app, const Request *request, Reply *reply, Problem *p
 }
 
 Status materials_show_revision(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const char *text = request->parameters[1];
-    const size_t size = strlen(text);
-    unsigned long long revision = 0;
-    if (size > 0 && size <= 9 && strspn(text, "0123456789") == size)
-        revision = strtoull(text, NULL, 10);
-    if (revision == 0)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "there is no revision \"%.20s\"; they count from 1", text);
+    uint64_t revision;
+    TRY(material_revision_number(request->parameters[1], &revision, problem));
     return show(app, request, revision, reply, problem);
 }

@@ -11,7 +11,14 @@ static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
                                           "most_shift", "interval", "unit",  NULL};
-static const char *const of_materials[] = {"q", NULL};
+static const char *const of_materials[] = {"q",   "kind",  "status", "e",
+                                           "T_c", "limit", "after",  NULL};
+static const char *const of_pages[] = {"limit", "before", NULL};
+static const char *const of_diff[] = {"from", "to", NULL};
+static const char *const of_uses[] = {"revision", "limit", "before", NULL};
+static const char *const of_records[] = {"q", "limit", "after", NULL};
+static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
+                                        "notes", "earthquake", "station", NULL};
 
 // clang-format off
 const Route routes[] = {
@@ -54,9 +61,24 @@ const Route routes[] = {
     {"POST",   "/v1/compare",                           "read",   of_measured,  "A result beside a measured motion", compare_measured},
     {"GET",    "/v1/cache",                             "read",   NULL,         "How often what is known already helped, by layer", cache_show},
     {"POST",   "/v1/cache/explain",                     "read",   NULL,         "Whether a scene is known, and in what it differs from the nearest that is", cache_explain},
-    {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches", materials_list},
+    {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches, ?kind= ?status= ?e= ?T_c= choose", materials_list},
+    {"POST",   "/v1/materials",                         "materials", NULL,      "Add a material", materials_create},
+    {"POST",   "/v1/materials/{slug}@{revision}/review", "materials", NULL,     "Approve or deprecate a revision, with a reason", materials_review},
+    {"GET",    "/v1/materials/{slug}@{revision}/used-by", "read", of_pages,     "Results made with a revision, newest first", materials_uses_revision},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
+    {"POST",   "/v1/materials/{slug}/revisions",        "materials", NULL,      "Add a revision of a material", materials_revise},
+    {"GET",    "/v1/materials/{slug}/revisions",        "read",   of_pages,     "Revisions of a material, newest first", materials_revisions},
+    {"POST",   "/v1/materials/{slug}/revert",           "materials", NULL,      "Say an old revision again, as a new one", materials_revert},
+    {"GET",    "/v1/materials/{slug}/history",          "read",   of_pages,     "What was done to a material, by whom and why, newest first", materials_history},
+    {"GET",    "/v1/materials/{slug}/diff",             "read",   of_diff,      "In what two revisions of a material differ", materials_diff},
+    {"GET",    "/v1/materials/{slug}/used-by",          "read",   of_uses,      "How many results were made with each revision; ?revision= lists them", materials_uses},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
+    {"POST",   "/v1/records",                           "materials", of_record, "Upload a ground motion's file, or its samples as JSON", records_create},
+    {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list},
+    {"GET",    "/v1/records/{name}/samples.{format}",   "read",   NULL,         "A ground motion's samples as json, csv, npy, npz or mat", records_samples},
+    {"GET",    "/v1/records/{name}/samples",            "read",   NULL,         "A ground motion's samples, format by Accept", records_samples},
+    {"GET",    "/v1/records/{name}",                    "read",   NULL,         "A ground motion, and how much uses it", records_show},
+    {"DELETE", "/v1/records/{name}",                    "materials", NULL,      "Delete a ground motion that nothing uses", records_delete},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
     {"GET",    "/v1/examples/{name}",                   "read",   NULL,         "One of them, ready to submit", examples_show},
     {"GET",    "/schemas",                              "open",   NULL,         "JSON Schemas, by name", schemas_list},

@@ -174,6 +174,17 @@ void bytes_json_string(Bytes *bytes, const char *text) {
     bytes_put(bytes, "\"", 1);
 }
 
+void bytes_percent(Bytes *bytes, const char *text) {
+    for (; *text != '\0'; text++) {
+        const unsigned char c = (unsigned char)*text;
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+            strchr("-._~", c) != NULL)
+            bytes_put(bytes, text, 1);
+        else
+            bytes_format(bytes, "%%%02X", (unsigned)c);
+    }
+}
+
 char *bytes_take(Bytes *bytes, size_t *size) {
     const bool is_whole = bytes_reserve(bytes, 0);
     char *at = is_whole ? bytes->at : NULL;

@@ -6,11 +6,16 @@
 
 #include "core/scene/material.h"
 #include "core/study/inquiry.h"
+#include "server/codec/material_bodies.h"
 
 // clang-format off
 const SchemaDocument schema_documents[] = {
     {"scene", "A scene: what impactd is asked to simulate", inquiry_fields},
     {"material", "A buffer material: what one revision of it says", material_fields},
+    {"new_material", "A new material: its first revision", new_material_fields},
+    {"material_revision", "A new revision of a material: all that it says, and why", material_revision_fields},
+    {"material_revert", "A revision to say again", material_revert_fields},
+    {"material_review", "What becomes of a revision", material_review_fields},
     {NULL, NULL, NULL},
 };
 // clang-format on
@@ -299,6 +304,7 @@ static void print_value(Printer *printer, const Field *field) {
         print_variant(printer, field);
         break;
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }
@@ -310,6 +316,8 @@ static void print_properties(Printer *printer, const Field *fields) {
             print_properties(printer, field->fields);
             continue;
         }
+        if ((field->flags & FIELD_HIDDEN) != 0)
+            continue;
         open_member(printer, field->name, "{");
         if (field->doc != NULL)
             text_member(printer, "description", field->doc);

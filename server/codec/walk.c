@@ -237,6 +237,7 @@ static void read_value(Reader *reader, const json_t *value, const Field *field, 
         read_variant(reader, value, field, member, pointer);
         break;
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }

@@ -103,6 +103,7 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
         put_variant(bytes, field->kinds, *(Variant *const *)member, style);
         break;
     case FIELD_KIND_BASE:
+    case FIELD_KIND_SHARED:
     case FIELD_KIND_END:
         break;
     }
@@ -135,7 +136,7 @@ static void put_members(Bytes *bytes, const Field *fields, const void *item, Wri
             continue;
         }
         const bool is_absent = field_is_absent(field, item);
-        if (is_absent && style == WRITE_SCENE)
+        if (is_absent && (style == WRITE_SCENE || (field->flags & FIELD_HIDDEN) != 0))
             continue;
         put_name(bytes, field->name, count);
         if ((is_absent && !is_array(field)) || is_emptied(field, item))

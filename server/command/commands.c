@@ -6,6 +6,7 @@
 #include "core/simulation/simulation.h"
 #include "server/api/app.h"
 #include "server/command/any_study.h"
+#include "server/command/backup.h"
 #include "server/command/cancel.h"
 #include "server/command/check.h"
 #include "server/command/command.h"
@@ -40,10 +41,12 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,   &command_run,   &command_check,  &command_tradeoff, &command_ensemble,
-    &command_study,   &command_sweep, &command_import, &command_token,    &command_submit,
-    &command_watch,   &command_get,   &command_cancel, &command_compare,  &command_help,
-    &command_version, NULL,
+    &command_serve,    &command_run,      &command_check,
+    &command_tradeoff, &command_ensemble, &command_study,
+    &command_sweep,    &command_import,   &command_token,
+    &command_backup,   &command_submit,   &command_watch,
+    &command_get,      &command_cancel,   &command_compare,
+    &command_help,     &command_version,  NULL,
 };
 
 static const char overview[] =
@@ -58,6 +61,7 @@ static const char overview[] =
     "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
     "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd token create --name lab      let a client in who has this token\n"
+    "  impactd backup lab.db                copy the database while the daemon runs\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"
     "  impactd get JOB series -o out.npy    what became of it\n"

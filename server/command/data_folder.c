@@ -22,3 +22,13 @@ Status data_folder_default(char **folder, Problem *problem) {
     *folder = strdup(text);
     return *folder != NULL ? STATUS_OK : problem_set(problem, STATUS_NO_MEMORY, "no memory");
 }
+
+Status data_folder_find(char **folder, Problem *problem) {
+    const char *environment = getenv("IMPACTD_DATA");
+    if (*folder == NULL && environment != NULL) {
+        *folder = strdup(environment);
+        if (*folder == NULL)
+            return problem_set(problem, STATUS_NO_MEMORY, "no memory");
+    }
+    return data_folder_default(folder, problem);
+}

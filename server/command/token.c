@@ -124,7 +124,6 @@ static Status read_name(const TokenSettings *settings, const Options *options, b
 }
 
 static Status act(TokenSettings *settings, const Options *options, Problem *problem) {
-    const char *environment = getenv("IMPACTD_DATA");
     const struct Action *action = NULL;
     TokenRow row = {0};
     for (size_t i = 0; options->operand_count > 0 && i < COUNT(actions); i++)
@@ -140,9 +139,7 @@ static Status act(TokenSettings *settings, const Options *options, Problem *prob
         return problem_set(problem, STATUS_USAGE, "\"%.60s\" is one operand too many",
                            options->operands[2]);
     TRY(read_name(settings, options, action->needs_name, &row, problem));
-    if (settings->data == NULL && environment != NULL)
-        settings->data = strdup(environment);
-    TRY(data_folder_default(&settings->data, problem));
+    TRY(data_folder_find(&settings->data, problem));
     Store *store = NULL;
     TRY(store_open_beside(settings->data, &store, problem));
     const Status status = action->act(store, settings, &row, problem);

@@ -237,6 +237,20 @@ bool header_etag_matches(const char *if_none_match, const char *etag) {
     return false;
 }
 
+bool header_etag_next(const char **list, const char **tag, size_t *size) {
+    const char *end = *list + strlen(*list);
+    Span item;
+    while (item_next(list, end, ',', &item)) {
+        const bool is_strong = item.size >= 2 && item.at[0] == '"' && item.at[item.size - 1] == '"';
+        if (!is_strong && !span_is(item, "*"))
+            continue;
+        *tag = item.at;
+        *size = item.size;
+        return true;
+    }
+    return false;
+}
+
 bool header_type_is(const char *content_type, const char *type) {
     if (content_type == NULL)
         return false;

@@ -1,6 +1,6 @@
-// The values of the request headers that mean something here: Accept, Prefer, Range, If-None-Match,
-// Content-Type. Not the request's safety (gate.h) and not the target (request.h). Used by
-// dispatch.c, body.c and api/.
+// The values of the request headers that mean something here: Accept, Prefer, Range, If-Match,
+// If-None-Match, Content-Type. Not the request's safety (gate.h) and not the target (request.h).
+// Used by dispatch.c, body.c and api/.
 #ifndef SERVER_HTTP_HEADER_H
 #define SERVER_HTTP_HEADER_H
 
@@ -34,6 +34,10 @@ RangeKind header_range(const char *range, size_t size, size_t *first, size_t *la
 
 // Whether If-None-Match ("*" or a list, weak ones included) names `etag`.
 bool header_etag_matches(const char *if_none_match, const char *etag);
+
+// The next entity tag of a list (If-Match), which goes on behind it: with its quotes, or *. Weak
+// ones, which never match strongly, and what is no tag are passed over. False at the end.
+bool header_etag_next(const char **list, const char **tag, size_t *size);
 
 // Whether a Content-Type is `type`, whatever its parameters.
 bool header_type_is(const char *content_type, const char *type);

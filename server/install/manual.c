@@ -191,6 +191,8 @@ static void rows_print(FILE *file, const Field *fields, const char *place) {
             rows_print(file, row->fields, place);
             continue;
         }
+        if ((row->flags & FIELD_HIDDEN) != 0)
+            continue;
         snprintf(inner, sizeof inner, "%s%s%s%s", place, place[0] != '\0' ? "." : "", row->name,
                  row->kind == FIELD_KIND_LIST ? "[]" : "");
         fputs(".TP\n.B ", file);

@@ -104,6 +104,7 @@ void intake_drop(Intake *intake) {
     pthread_cond_destroy(&intake->keys_free);
     pthread_cond_destroy(&intake->settled);
     pthread_mutex_destroy(&intake->retries);
+    naming_destroy(&intake->naming);
     pthread_mutex_destroy(&intake->lock);
     free(intake);
 }
@@ -177,6 +178,7 @@ Status intake_open(Store *store, const IntakeSettings *settings, Intake **opened
         intake->settings.queue_bytes = queue_bytes_usual;
     pthread_mutex_init(&intake->lock, NULL);
     pthread_mutex_init(&intake->retries, NULL);
+    naming_init(&intake->naming);
     pthread_cond_init(&intake->work, NULL);
     pthread_cond_init(&intake->spare_work, NULL);
     pthread_cond_init(&intake->keys_free, NULL);

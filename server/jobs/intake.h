@@ -115,6 +115,10 @@ Status intake_outcome(Intake *intake, const char *result, const Waker *waker, Ou
 // Tries again to store what could not be stored for want of room; to be called now and then.
 void intake_retry(Intake *intake);
 
+// Deletes a ground-motion record that no result was made with and no unfinished job names, also
+// none that is being accepted just now. STATUS_CONFLICT, STATUS_NOT_FOUND.
+Status intake_record_delete(Intake *intake, const char *name, Problem *problem);
+
 // Deletes a result for good; its jobs stay and say so. STATUS_CONFLICT while it is being computed,
 // STATUS_NOT_FOUND.
 Status intake_delete(Intake *intake, const char *result, Problem *problem);

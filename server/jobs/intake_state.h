@@ -11,6 +11,7 @@
 #include "server/jobs/index.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/known.h"
+#include "server/jobs/naming.h"
 #include "server/jobs/queue.h"
 #include "server/jobs/totals.h"
 
@@ -94,6 +95,7 @@ struct Intake {
     pthread_cond_t settled;    // nothing is posted any more
     pthread_cond_t keys_free;  // a KeyHold was given up
     pthread_mutex_t retries;   // retries of sweeps come one by one; taken before `lock`
+    Naming naming;             // taken before `lock`
     struct KeyHold *keys;
     Job *keyed;          // held, by next_keyed: came with a key, and the store may not have them
     Worker *workers;     // settings.workers of them, and the spare one

@@ -11,6 +11,7 @@
 #include "server/base/digest.h"
 #include "server/codec/read.h"
 #include "server/jobs/intake_state.h"
+#include "server/jobs/prepare_record.h"
 #include "server/store/material_rows.h"
 
 // "slug" or "slug@revision"; false if what stands behind @ is no revision.
@@ -257,7 +258,12 @@ static Status resolve_sweep(Store *store, Inquiry *inquiry, Warnings *warnings, 
             TRY(pin(&study->materials, sides[i % 3]));
     }
     const Status axes = resolve_axes(store, study, warnings, problem);
-    return status == STATUS_OK ? axes : status;
+    if (axes != STATUS_OK && axes != STATUS_INVALID)
+        return axes;
+    const Status records = prepare_sweep_records(store, inquiry, problem);
+    if (records != STATUS_OK && records != STATUS_INVALID)
+        return records;
+    return status != STATUS_OK ? status : axes != STATUS_OK ? axes : records;
 }
 
 // An axis's unknown name is no reason to leave the other values unjudged: its fault is told beside
@@ -299,7 +305,10 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     Status status = read_json(text, size, inquiry_fields, inquiry, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
     if (is_object && (status == STATUS_OK || status == STATUS_INVALID)) {
-        const Status resolved = resolve_all(store, &inquiry->simulation, warnings, problem);
+        Status resolved = resolve_all(store, &inquiry->simulation, warnings, problem);
+        const Status record = prepare_record(store, &inquiry->simulation, problem);
+        if (resolved == STATUS_OK || (record != STATUS_OK && record != STATUS_INVALID))
+            resolved = record;
         if (resolved != STATUS_OK && resolved != STATUS_INVALID)
             status = resolved;
         else if (inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep)

@@ -284,6 +284,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     job->client = client;
     Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
+    naming_enter(&intake->naming);
     Status status = intake_prepare(intake->store, submission->text, submission->size,
                                    &intake->settings.limits, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
@@ -292,6 +293,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
         status = fill_sender(job, submission, hold);
     if (status == STATUS_OK)
         status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
+    naming_leave(&intake->naming);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {

@@ -5,6 +5,7 @@
 
 #include "server/codec/read.h"
 #include "server/jobs/job.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/sweep.h"
 
 // Bytes of rows that are read at once, more only where one of each chunk is.
@@ -23,6 +24,11 @@ static Status read_scene(SweepShow *show, Problem *problem) {
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
+    // Points' scenes take their records from here. Where one is gone they say so.
+    if (status == STATUS_OK) {
+        (void)prepare_record(show->store, &show->inquiry.simulation, fault);
+        (void)prepare_sweep_records(show->store, &show->inquiry, fault);
+    }
     free(fault);
     if (status != STATUS_OK)
         return STATUS_INTERNAL;

@@ -11,6 +11,7 @@
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/gather.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/study.h"
 
 // A computation's run, or the study after it, as a part of the whole.
@@ -55,7 +56,7 @@ static Status describe(Computation *computation, Findings *findings) {
     const Watch watch = {computation, computation_is_wanted};
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
-    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0};
+    Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0}, uses = {0};
     Bytes impacts = {.most = DOCUMENT_BYTES}, psd = {.most = DOCUMENT_BYTES};
     Status status = STATUS_OK;
     document_plan(&plan, &outcome->plan);
@@ -63,6 +64,7 @@ static Status describe(Computation *computation, Findings *findings) {
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);
+    prepare_record_uses(&computation->inquiry, &uses);
     if (!document_impacts(&impacts, &outcome->response, &watch) ||
         (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
         status = STATUS_CANCELLED;
@@ -75,6 +77,7 @@ static Status describe(Computation *computation, Findings *findings) {
     row->work = take(&work, &status);
     row->notes = take(&notes, &status);
     row->energy = take(&energy, &status);
+    row->uses = take(&uses, &status);
     row->impacts = take(&impacts, &status);
     if (outcome->spectrum.densities.count > 0)
         row->psd = take(&psd, &status);

@@ -7,19 +7,20 @@
 #include <string.h>
 
 #include "server/base/clock.h"
+#include "server/codec/material_bodies.h"
 #include "server/codec/write.h"
 #include "server/materials/catalogue.h"
+#include "server/materials/slug.h"
 
 enum { NAME_MOST = 64, WORDS_MOST = 10000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 const char exchange_format[] = "impactd-materials";
-const char *const exchange_statuses[] = {"approved", "deprecated", NULL};
 static const char *const kind_names[] = {
     [EXCHANGE_REVISION] = "revision", [EXCHANGE_MEASUREMENT] = "measurement", NULL};
 
 // clang-format off
 static const Field review_fields[] = {
-    FIELD_CHOICE(ExchangeReview, status, exchange_statuses, REQUIRED, "what was found"),
+    FIELD_CHOICE(ExchangeReview, status, material_verdicts, REQUIRED, "what was found"),
     FIELD_TEXT(ExchangeReview, reason, WORDS_MOST, PRESENCE_REQUIRED, 0, "why"),
     FIELD_TEXT(ExchangeReview, reviewer, NAME_MOST, PRESENCE_OPTIONAL, FIELD_NULL_IS_EMPTY, "whose review it is; null: nobody known; if absent, the importer's"),
     FIELD_TEXT(ExchangeReview, created, 40, PRESENCE_OPTIONAL, 0, "when; if absent, now"),
@@ -137,7 +138,7 @@ static bool take_reviews(ImportRevision *revision, ExchangeReviews *reviews, Pro
         taken->review.created_unix_ms = read_time(review->created, place, problem);
         taken->review.reason = take_text(&review->reason);
         taken->review.reviewer = take_name(&review->reviewer);
-        taken->review.status = strdup(review->status >= 0 ? exchange_statuses[review->status] : "");
+        taken->review.status = strdup(review->status >= 0 ? material_verdicts[review->status] : "");
         if (taken->review.status == NULL)
             return false;
     }
@@ -209,16 +210,6 @@ static Status take_measurement(MaterialImport *import, ImportMeasurement *measur
     return made->document != NULL ? STATUS_OK : no_memory(problem);
 }
 
-static Status refuse_slug(const char *slug, const char *place, Problem *problem) {
-    Fault fault = {.row = 0};
-    text_fit(fault.pointer, sizeof fault.pointer, place);
-    text_quote(fault.value, sizeof fault.value, slug);
-    text_fit(fault.detail, sizeof fault.detail,
-             slug[0] == '\0' ? "is required: the material's slug"
-                             : "must be 1 to 63 of a-z, 0-9, _ and -");
-    return problem_put(problem, STATUS_INVALID, &fault);
-}
-
 static Status take(Exchange *exchange, char *slug, ExchangeKind kind, ExchangeRow *row,
                    const char *place, size_t faults, Problem *problem) {
     MaterialImport *import = &exchange->import;
@@ -251,10 +242,8 @@ Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, Ex
                      const char *place, const char *slug_place, size_t faults, Problem *problem) {
     const MaterialImport *import = &exchange->import;
     Status status;
-    if (slug == NULL || !material_slug_is_good(slug)) {
-        (void)refuse_slug(slug != NULL ? slug : "", slug_place, problem);
+    if (slug_check(slug != NULL ? slug : "", slug_place, problem) != STATUS_OK)
         slug = NULL;
-    }
     if (import->revision_count + import->measurement_count == EXCHANGE_ROWS_MOST)
         status = problem_set(problem, STATUS_LIMIT,
                              "there are more than %d revisions and measurements; bring them in "

@@ -15,7 +15,7 @@ extern const char exchange_format[]; // "impactd-materials"
 typedef enum ExchangeKind { EXCHANGE_REVISION, EXCHANGE_MEASUREMENT } ExchangeKind;
 
 typedef struct ExchangeReview {
-    int status; // an index into exchange_statuses
+    int status; // of material_verdicts
     char *reason;
     char *reviewer; // NULL: not said; "": nobody known
     char *created;  // RFC 3339
@@ -24,7 +24,6 @@ typedef struct ExchangeReviews {
     ExchangeReview *at;
     size_t count;
 } ExchangeReviews;
-extern const char *const exchange_statuses[]; // "approved", "deprecated"
 
 // A revision or a measurement.
 typedef struct ExchangeRow {

@@ -26,6 +26,7 @@ Status store_post(Store *store, StoreApply *apply, const void *work, size_t size
 atomic_uint_fast64_t *store_evictions(Store *store); // of series
 struct Late *store_late(Store *store);               // NULL: its database is in memory
 struct MaterialMemory *store_material_memory(Store *store);
+struct RecordMemory *store_record_memory(Store *store);
 struct ResultFilter *store_result_filter(Store *store);
 
 // A connection for reading, to be put back soon: there are few. Waits for one.

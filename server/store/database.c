@@ -67,6 +67,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     case SQLITE_LOCKED:
         status = STATUS_BUSY;
         break;
+    case SQLITE_INTERRUPT:
+        return problem_set(problem, STATUS_CANCELLED, "%s was interrupted", doing);
     case SQLITE_ERROR:
     case SQLITE_MISUSE:
     case SQLITE_RANGE:
@@ -204,6 +206,11 @@ static const char settings[] = "PRAGMA synchronous = FULL;"
                                "PRAGMA trusted_schema = OFF;"
                                "PRAGMA foreign_keys = ON;";
 
+// Of a file that is filled once and then synced by whoever has it filled.
+static const char copy_settings[] = "PRAGMA locking_mode = EXCLUSIVE;"
+                                    "PRAGMA journal_mode = MEMORY;"
+                                    "PRAGMA synchronous = OFF;";
+
 // SQLite would make it readable for all; its other files follow this one.
 static Status make_file(const char *path, Problem *problem) {
     const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
@@ -254,7 +261,7 @@ Status database_open(const char *path, DatabaseMode mode, Database **database, P
     } else {
         sqlite3_extended_result_codes(made->connection, 1);
         sqlite3_busy_timeout(made->connection, 5000);
-        if (mode == DATABASE_WRITER)
+        if (mode != DATABASE_COPY)
             status = check_owner(made, problem);
         if (status == STATUS_OK && mode == DATABASE_WRITER)
             status = database_execute(made, writer_settings, problem);
@@ -262,6 +269,8 @@ Status database_open(const char *path, DatabaseMode mode, Database **database, P
             status = database_execute(made, settings, problem);
         if (status == STATUS_OK && mode == DATABASE_READER)
             status = database_execute(made, "PRAGMA query_only = ON", problem);
+        if (status == STATUS_OK && mode == DATABASE_COPY)
+            status = database_execute(made, copy_settings, problem);
     }
     if (status != STATUS_OK) {
         database_close(made);
@@ -324,4 +333,47 @@ Status database_migrate(Database *database, const EmbeddedFile *files, Problem *
     for (; version < last; version++)
         TRY(migrate_step(database, &files[version], version + 1, problem));
     return STATUS_OK;
+}
+
+// The open transaction is what makes it one moment: without it the copy would begin anew whenever
+// another process has written.
+static Status copy_pages(Database *from, Database *to, const Watch *watch, Problem *problem) {
+    enum { PAGES = 64 };
+    int64_t tables;
+    TRY(read_number(from, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
+    sqlite3_backup *backup = sqlite3_backup_init(to->connection, "main", from->connection, "main");
+    if (backup == NULL)
+        return report(to->connection, "copying the database", problem);
+    int code;
+    bool is_wanted = true;
+    do {
+        code = sqlite3_backup_step(backup, PAGES);
+        const int all = sqlite3_backup_pagecount(backup);
+        is_wanted = watch_advance(
+            watch, all > 0 ? 1 - (double)sqlite3_backup_remaining(backup) / (double)all : 0);
+    } while (code == SQLITE_OK && is_wanted);
+    (void)sqlite3_backup_finish(backup); // the copy's connection has its error
+    if (!is_wanted)
+        return problem_set(problem, STATUS_CANCELLED, "copying the database was interrupted");
+    return code == SQLITE_DONE ? STATUS_OK
+                               : report(to->connection, "copying the database", problem);
+}
+
+Status database_copy(Database *from, Database *to, const Watch *watch, Problem *problem) {
+    TRY(database_execute(from, "BEGIN", problem));
+    const Status status = copy_pages(from, to, watch, problem);
+    (void)database_execute(from, "ROLLBACK", NULL);
+    TRY(status);
+    // Its journal's mode came with the first page; so it needs no files beside it.
+    return database_execute(to, "PRAGMA journal_mode = MEMORY", problem);
+}
+
+static int ask(void *watch) {
+    return !watch_advance(watch, 0);
+}
+
+void database_watch(Database *database, const Watch *watch) {
+    enum { OPERATIONS = 20000 };
+    sqlite3_progress_handler(database->connection, OPERATIONS, watch != NULL ? ask : NULL,
+                             (void *)(uintptr_t)watch);
 }

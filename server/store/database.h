@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "core/base/status.h"
+#include "core/base/watch.h"
 #include "server/base/embedded.h"
 
 typedef struct Database Database;
@@ -18,6 +19,7 @@ struct RowColumn;
 typedef enum DatabaseMode {
     DATABASE_WRITER, // makes the file if it is missing
     DATABASE_READER,
+    DATABASE_COPY, // an empty file that nobody else has, to be filled; not durable by itself
 } DatabaseMode;
 
 // Opens the file at `path`; NULL is a private database in memory.
@@ -62,5 +64,13 @@ void statement_end(Statement *statement); // NULL is fine
 // has there. The rest of it is not read.
 Status database_read_part(Database *database, const char *table, const char *column, int64_t number,
                           size_t offset, size_t size, void *target, Problem *problem);
+
+// Fills `to` with all that is in `from` at this moment, while others write to that. `watch` (NULL:
+// nobody) is told how far it is. STATUS_CANCELLED when it wants no more.
+Status database_copy(Database *from, Database *to, const Watch *watch, Problem *problem);
+
+// Until NULL is given, `watch` is asked now and then whether a statement that takes long shall go
+// on; where not it is STATUS_CANCELLED.
+void database_watch(Database *database, const Watch *watch);
 
 #endif

@@ -111,8 +111,12 @@ static Status add_rows(Database *database, const void *work, Problem *problem) {
     return STATUS_OK;
 }
 
-Status job_rows_add(Store *store, const void *const *rows, size_t count, Problem *problem) {
+Status job_rows_add(void *store, const void *const *rows, size_t count, Problem *problem) {
     return store_write(store, add_rows, &(Batch){rows, count}, problem);
+}
+
+Status job_rows_put(void *database, const void *const *rows, size_t count, Problem *problem) {
+    return add_rows(database, &(Batch){rows, count}, problem);
 }
 
 bool store_job_late(Store *store, const JobRow *row) {

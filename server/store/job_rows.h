@@ -1,5 +1,6 @@
 // What a transaction over several tables needs of the jobs'. Everything else of them is in store.h.
-// Not for the rest of the server. Used by result_rows.c, job_search.c and store.c.
+// Not for the rest of the server. Used by result_rows.c, job_search.c, store.c and
+// backup.c.
 #ifndef SERVER_STORE_JOB_ROWS_H
 #define SERVER_STORE_JOB_ROWS_H
 
@@ -13,8 +14,10 @@ extern const RowColumn job_columns[];
     "run, total, title, problem, warnings, labels, study, client"
 // Of a row that is read.
 #define JOB_SHOWN JOB_SHORT ", EXISTS (SELECT 1 FROM results WHERE id = jobs.result) AS has_result"
-// Jobs whole, passing over those that are there already.
-Status job_rows_add(Store *store, const void *const *rows, size_t count, Problem *problem);
+// Jobs whole, passing over those that are there already: to a Store, and to a Database of the
+// caller's own.
+Status job_rows_add(void *store, const void *const *rows, size_t count, Problem *problem);
+Status job_rows_put(void *database, const void *const *rows, size_t count, Problem *problem);
 
 // Within a transaction: all that changes of a job, or the whole where it is_unsaved.
 // STATUS_NOT_FOUND.

@@ -20,7 +20,7 @@
 #include "server/store/pack.h"
 
 enum {
-    HALF_BYTES = 2 << 20,
+    HALF_BYTES = LATE_BYTES / 2,
     ROWS_MOST = 8192, // of a half
     BUCKETS = 4096,
     BATCH = 512, // rows of one transaction: others wait for no more than these
@@ -42,7 +42,7 @@ typedef struct Half {
 } Half;
 
 struct Late {
-    Store *store;
+    void *target;
     const RowColumn *columns;
     size_t row_size;
     LateWrite *write;
@@ -142,7 +142,7 @@ static Status write_half(const Late *late, const Half *half, Problem *problem) {
             if (read_row(late, half, i, row))
                 at[count++] = row;
         }
-        status = late->write(late->store, at, count, problem);
+        status = late->write(late->target, at, count, problem);
     }
     free(rows);
     return status;
@@ -216,18 +216,17 @@ static Status replay(Late *late, Problem *problem) {
         recover(late, half);
         if (half->count > 0)
             TRY(write_half(late, half, problem));
-        empty(half);
     }
     return STATUS_OK;
 }
 
-Status late_open(const char *path, Store *store, const RowColumn *columns, size_t row_size,
+Status late_open(const char *path, void *target, const RowColumn *columns, size_t row_size,
                  LateWrite *write, Late **opened, Problem *problem) {
     Late *late = calloc(1, sizeof *late);
     *opened = NULL;
     if (late == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the jobs' late rows");
-    *late = (Late){.store = store, .columns = columns, .row_size = row_size, .write = write};
+    *late = (Late){.target = target, .columns = columns, .row_size = row_size, .write = write};
     late->layout = pack_layout(columns);
     pthread_condattr_t monotonic;
     pthread_condattr_init(&monotonic);
@@ -241,6 +240,8 @@ Status late_open(const char *path, Store *store, const RowColumn *columns, size_
     if (late->file == NULL)
         return STATUS_OK;
     TRY(replay(late, problem));
+    for (size_t i = 0; i < 2; i++)
+        empty(&late->halves[i]);
     late->is_started = pthread_create(&late->thread, NULL, work, late) == 0;
     return late->is_started ? STATUS_OK
                             : problem_set(problem, STATUS_INTERNAL,
@@ -314,4 +315,22 @@ void late_flush(Late *late) {
         pthread_cond_wait(&late->done, &late->lock);
     }
     pthread_mutex_unlock(&late->lock);
+}
+
+// Rows are added at the end and a half is emptied by its epoch alone, once its rows are in the
+// database. So what was read of a half while it was emptied and filled anew is its old rows as far
+// as they go, or its new ones.
+Status late_replay(char *bytes, size_t size, void *target, const RowColumn *columns,
+                   size_t row_size, LateWrite *write, Problem *problem) {
+    if (size < LATE_BYTES)
+        return STATUS_OK;
+    Late *late = calloc(1, sizeof *late);
+    if (late == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the jobs' late rows");
+    *late = (Late){.target = target, .columns = columns, .row_size = row_size, .write = write};
+    late->layout = pack_layout(columns);
+    late->file = bytes;
+    const Status status = replay(late, problem);
+    free(late);
+    return status;
 }

@@ -53,6 +53,20 @@ static Status refuse_slug(const char *slug, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
 }
 
+Status store_material_state(Store *store, const char *slug, MaterialState *state,
+                            Problem *problem) {
+    MaterialKey key;
+    *state = (MaterialState){0};
+    Database *database = store_take(store);
+    const Status status = material_key_find(database, slug, 0, &key, problem);
+    store_put(store, database);
+    TRY(status);
+    if (key.number == 0)
+        return refuse_slug(slug, problem);
+    *state = (MaterialState){key.latest, key.version, key.measurements};
+    return STATUS_OK;
+}
+
 Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
                       Problem *problem) {
     const Key key = key_of(slug, revision);

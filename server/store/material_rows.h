@@ -32,6 +32,13 @@ void material_revision_clear(MaterialRevision *revision);
 // STATUS_NO_MEMORY, and then it is clear. `copy` may be uninitialised.
 Status material_revision_copy(const MaterialRevision *revision, MaterialRevision *copy);
 
+// How far a material has come.
+typedef struct MaterialState {
+    uint64_t latest, version, measurements; // the newest of each; measurements 0: none
+} MaterialState;
+// As it is in the database now. STATUS_NOT_FOUND.
+Status store_material_state(Store *store, const char *slug, MaterialState *state, Problem *problem);
+
 // revision 0: the head, which is the newest approved one, else the newest draft. STATUS_NOT_FOUND,
 // also where all are deprecated.
 Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
@@ -93,6 +100,16 @@ typedef struct MaterialDeeds {
 // The trail of one material, oldest first.
 Status store_material_trail(Store *store, const char *slug, MaterialDeeds *deeds, Problem *problem);
 void material_deeds_clear(MaterialDeeds *deeds);
+
+// How many results were made with each revision that any was made with, by revision; pairs of a
+// revision and its count.
+typedef struct MaterialUses {
+    struct MaterialUse {
+        uint64_t revision, results;
+    } * at; // freed by free
+    size_t count;
+} MaterialUses;
+Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem);
 
 // Results made with `name` ("sponge@1", "record:elcentro"), newest first, at most `most` of them,
 // those before the one numbered `before` (0: from the newest); *total counts all.

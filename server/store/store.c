@@ -17,6 +17,7 @@
 #include "server/store/job_rows.h"
 #include "server/store/late.h"
 #include "server/store/material_memory.h"
+#include "server/store/record_memory.h"
 #include "server/store/result_filter.h"
 #include "server/store/writer.h"
 
@@ -28,6 +29,7 @@ struct Store {
     Writer *writer;
     Late *late;
     MaterialMemory *materials;
+    RecordMemory *records;
     ResultFilter *results;
     atomic_uint_fast64_t generation; // of the catalogue
     atomic_uint_fast64_t evictions;  // of series
@@ -76,8 +78,9 @@ static Status open_store(const char *directory, bool is_beside, Store **store, P
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->some, NULL);
     made->materials = material_memory_new();
+    made->records = record_memory_new();
     made->results = result_filter_new();
-    Status status = made->materials == NULL || made->results == NULL
+    Status status = made->materials == NULL || made->records == NULL || made->results == NULL
                         ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the store")
                     : directory != NULL ? open_files(made, directory, is_beside, problem)
                                         : open_memory(made, problem);
@@ -120,6 +123,7 @@ void store_close(Store *store) {
     database_close(store->own);
     folder_unlock(store->lock_file);
     material_memory_free(store->materials);
+    record_memory_free(store->records);
     result_filter_free(store->results);
     pthread_cond_destroy(&store->some);
     pthread_mutex_destroy(&store->lock);
@@ -163,6 +167,14 @@ Late *store_late(Store *store) {
 
 MaterialMemory *store_material_memory(Store *store) {
     return store->materials;
+}
+
+RecordMemory *store_record_memory(Store *store) {
+    return store->records;
+}
+
+bool store_is_private(const Store *store) {
+    return store->own == NULL;
 }
 
 ResultFilter *store_result_filter(Store *store) {

@@ -22,6 +22,7 @@ Status store_open(const char *directory, Store **store, Problem *problem);
 // the folder only where the database has to be made or migrated.
 Status store_open_beside(const char *directory, Store **store, Problem *problem);
 void store_close(Store *store);
+bool store_is_private(const Store *store); // in memory, gone with the program
 
 // Writes are called "posted" where nobody waits for them. They are done in the order in which they
 // were posted, some at a time, as far as they are of the same turn. `call` comes once, from the

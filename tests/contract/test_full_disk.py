@@ -1,37 +1,15 @@
 #!/usr/bin/env python3
 """A full disk: writes are answered 507, reads go on, and all goes on without a restart when there is room."""
 
-import contextlib
 import os
-import shutil
-import subprocess
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from disk import fill, small_disk  # noqa: E402
 
 ASYNC = {"Prefer": "respond-async"}
-SIZE = 24  # [MiB] of the disk
-
-
-@contextlib.contextmanager
-def small_disk():
-    """A folder on a disk of its own."""
-    folder = tempfile.mkdtemp(prefix="impactd-disk-")
-    try:
-        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={SIZE}m", "tmpfs", folder],
-                              capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            raise program.Skipped(f"no disk of its own can be mounted here: {done.stderr.strip()}")
-        try:
-            yield folder
-        finally:
-            subprocess.run(["umount", "-l", folder], check=False)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
 
 def scene(number, psd=True):
     """A scene whose spectrum alone takes some 100 KB."""
@@ -48,16 +26,6 @@ def long_scene(number, duration):
                 accuracy={"solver": "rk4", "step": 1e-5})
     made["dampers"][0]["clearance"] = 0.012 + 1e-6 * number
     return made
-
-
-def fill(folder):
-    """Takes all that is free but for a few pages."""
-    ballast = os.path.join(folder, "ballast")
-    with open(ballast, "wb", buffering=0) as file:
-        with contextlib.suppress(OSError):
-            while True:
-                file.write(b"0" * 4096)
-    return ballast
 
 
 def until(condition, seconds=60):

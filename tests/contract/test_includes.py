@@ -13,7 +13,7 @@ import program  # noqa: E402
 # Floors from the ground up. A room may include itself, every floor below, and on its own floor the rooms
 # named before it: the order is total, so circles cannot be built. The server may include all of the core.
 FLOORS = {
-    "core": [["base", "math"], ["contact", "excite", "result"], ["scene"], ["measure", "plan"], ["solve"],
+    "core": [["base", "math"], ["contact", "excite", "result"], ["scene"], ["plan", "measure"], ["solve"],
              ["simulation"], ["study"]],
     "server": [["base", "store"], ["codec", "materials", "auth", "jobs"], ["encode", "http"], ["api"],
                ["options", "options_show", "client", "command", "main", "install"]],

@@ -126,6 +126,7 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/results/{id}/impacts/{number}/force.{format}": {"number": "1"},
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/jobs/{id}/events": {"id": job["id"]},
+                  **{f"/v1/records/{{name}}{rest}": {"name": "shake"} for rest in ("", "/samples", "/samples.{format}")},
                   "/v1/materials/{slug}": {"slug": "sponge"},
                   "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
@@ -144,6 +145,9 @@ def test_real_answers_have_the_promised_shapes():
                 assert not found, (method, target, found)
             promised = responses[str(reply.status)].get("headers", {})
             return {name for name in promised if name.lower() in reply.headers}
+
+        shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 1, 0]}
+        assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
 
         for (method, path), operation in operations().items():
             if method != "GET":
@@ -166,6 +170,20 @@ def test_real_answers_have_the_promised_shapes():
                               (target, {"Accept": "application/x-npy"}))
                 call(method, path, part, headers={**kind, "Range": "bytes=0-9"})
                 call(method, path, part, headers={**kind, "Range": "bytes=99999999-"})
+
+        text = {"Content-Type": "text/plain"}
+        assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
+        call("POST", "/v1/records", "/v1/records", json={**shake, "unit": "g"})
+        call("POST", "/v1/records", "/v1/records", json={"name": "."})
+        call("POST", "/v1/records", "/v1/records?name=file&interval=0.01&unit=g", body="0.1\n-0.2\n", headers=text)
+        call("POST", "/v1/records", "/v1/records?name=file&interval=0.01&unit=g", body="0.1\nx\n", headers=text)
+        call("POST", "/v1/records", "/v1/records?name=file", body="0.1\n", headers={"Content-Type": "image/png"})
+        call("POST", "/v1/records", "/v1/records", body=b" " * (1 << 24) + b"x", headers=text)
+        assert call("GET", "/v1/records", "/v1/records?limit=1") == {"Link"}
+        for _ in range(2):
+            call("DELETE", "/v1/records/{name}", "/v1/records/file")
+        program.finished(daemon, {**program.scene("paper_free_sponge"), "excitation": {"kind": "record", "name": "shake"}})
+        call("DELETE", "/v1/records/{name}", "/v1/records/shake")
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
@@ -235,7 +253,7 @@ def test_real_answers_have_the_promised_shapes():
         call("GET", "/v1/jobs/{id}", f"/v1/jobs/{gone['id']}")
         assert call("GET", "/v1/jobs", "/v1/jobs?limit=1") == {"Link"}
     assert called == set(operations()), set(operations()) - called
-    assert statuses >= {200, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
+    assert statuses >= {200, 201, 202, 206, 304, 400, 404, 406, 409, 413, 415, 416, 422}, statuses
 
 
 if __name__ == "__main__":

@@ -151,11 +151,12 @@ static void a_record_is_scaled_and_copied(void **state) {
 static void a_record_needs_samples_that_stay_finite(void **state) {
     (void)state;
     Excitation *excitation = excitation_new("record");
-    assert_int_equal(fields_check(excitation->variant.kind->fields, excitation, "", &problem),
-                     STATUS_INVALID);
-    assert_string_equal(detail_at(&problem, "/samples"),
+    assert_int_equal(excitation_record.check(excitation, "/excitation", &problem), STATUS_INVALID);
+    assert_string_equal(detail_at(&problem, "/excitation/samples"),
                         "is required, with at least one: base acceleration from the start on "
-                        "[m/s^2]");
+                        "[m/s^2]; or the name of an uploaded record");
+    assert_string_equal(detail_at(&problem, "/excitation/interval"),
+                        "is required: time between samples [s]");
     problem_clear(&problem);
     *(Reals *)variant_member(&excitation->variant, "samples") =
         reals_of(2, (const double[]){1, 1e200});

@@ -1,0 +1,188 @@
+#include "core/measure/evaluation.h"
+
+#include <stdlib.h>
+
+#include "core/measure/evaluation_rows.h"
+#include "core/measure/evaluation_statistics.h"
+#include "core/measure/evaluation_warn.h"
+
+const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
+const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
+const char *const trend_verdict_names[] = {"constant", "not_constant", NULL};
+
+// clang-format off
+static const Field row_fields[] = {
+    FIELD_COUNT(EvaluationRow, measurement, NULL, AT_LEAST(1), OPTIONAL, "number of the measurement"),
+    FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "which drop, or which contact of which trace, from 1"),
+    FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as read, else sqrt(2 g h)"),
+    FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
+    FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from the instrument's or the fit's"),
+    FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "what told it"),
+    FIELD_REAL(EvaluationRow, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair"),
+    FIELD_REAL(EvaluationRow, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_CHOICE(EvaluationRow, contact_time_by, contact_time_by_names, OPTIONAL, "what told it"),
+    FIELD_REAL(EvaluationRow, least_contact_time, "s", ANY, OPTIONAL, "of a trace: within which T_c lies, 95 %, also where there is no figure"),
+    FIELD_REAL(EvaluationRow, most_contact_time, "s", ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(EvaluationRow, read_restitution, NULL, ANY, OPTIONAL, "e before gravity was taken out; null: it was not"),
+    FIELD_REAL(EvaluationRow, read_contact_time, "s", ANY, OPTIONAL, "T_c before gravity was taken out; null: it was not"),
+    FIELD_FLAG(EvaluationRow, restitution_counts, 0, "e is in the mean"),
+    FIELD_FLAG(EvaluationRow, contact_time_counts, 0, "T_c is in the mean"),
+    FIELD_REAL(EvaluationRow, restitution_score, NULL, ANY, OPTIONAL, "robust deviations of e from the median, or from the line where a trend is shown"),
+    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "so far away that one good sample in twenty has such a reading; it counts all the same"),
+    FIELD_REAL(EvaluationRow, contact_time_score, NULL, ANY, OPTIONAL, "the same of T_c"),
+    FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
+    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, in the words of who measured"),
+    FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "what else there is to know of it"),
+    FIELD_END
+};
+
+static const Field trend_fields[] = {
+    FIELD_COUNT(Trend, count, NULL, AT_LEAST(0), OPTIONAL, "readings with a speed"),
+    FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
+    FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "per m/s, by least squares"),
+    FIELD_REAL(Trend, standard_error, NULL, ANY, OPTIONAL, "of the slope"),
+    FIELD_REAL(Trend, low, NULL, ANY, OPTIONAL, "95 % interval of the slope"),
+    FIELD_REAL(Trend, high, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(Trend, t, NULL, ANY, OPTIONAL, "slope over standard error"),
+    FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "chance of at least such a slope where there is none"),
+    FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "that the line makes from the slowest to the fastest"),
+    FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "the largest such change that the data do not rule out, 95 %"),
+    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "whether a slope is shown, p < 0.05; null: cannot be told"),
+    FIELD_TEXT(Trend, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
+    FIELD_END
+};
+
+static const Field quantity_fields[] = {
+    FIELD_COUNT(Quantity, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
+    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count"),
+    FIELD_REAL(Quantity, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
+    FIELD_REAL(Quantity, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
+    FIELD_REAL(Quantity, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
+    FIELD_REAL(Quantity, high, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(Quantity, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
+    FIELD_REAL(Quantity, median, NULL, ANY, OPTIONAL, "the middle one"),
+    FIELD_REAL(Quantity, maximum, NULL, ANY, OPTIONAL, "the largest one"),
+    FIELD_COUNT(Quantity, outliers, NULL, AT_LEAST(0), OPTIONAL, "readings that lie far off; they are in the mean"),
+    FIELD_REAL(Quantity, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
+    FIELD_TEXT(Quantity, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
+    FIELD_ITEM(Quantity, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
+    FIELD_END
+};
+
+const Field evaluation_fields[] = {
+    FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "the rule by which traces were read and gravity was taken out"),
+    FIELD_REAL(Evaluation, confidence, NULL, ANY, OPTIONAL, "of the intervals"),
+    FIELD_REAL(Evaluation, least_speed, "m/s", ANY, OPTIONAL, "the slowest approach that counts"),
+    FIELD_REAL(Evaluation, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Evaluation, least_temperature, "degC", ANY, OPTIONAL, "the coldest test"),
+    FIELD_REAL(Evaluation, most_temperature, "degC", ANY, OPTIONAL, "the warmest"),
+    FIELD_ITEM(Evaluation, restitution, quantity_fields, NULL, PRESENCE_DEFAULT, "e [-]"),
+    FIELD_ITEM(Evaluation, contact_time, quantity_fields, NULL, PRESENCE_DEFAULT, "T_c [s]"),
+    FIELD_LIST(Evaluation, rows, row_fields, 0, PRESENCE_DEFAULT, "every reading"),
+    FIELD_END
+};
+// clang-format on
+
+void evaluation_clear(Evaluation *evaluation) {
+    fields_clear(evaluation_fields, evaluation);
+    warnings_clear(&evaluation->warnings);
+}
+
+// Heights and speeds are surer than the shape of pulses, which count only where there is nothing
+// else.
+static void choose_restitutions(Evaluation *evaluation) {
+    bool has_sure = false;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        has_sure =
+            has_sure || (row->restitution_counts && row->restitution_by != RESTITUTION_BY_PULSE);
+    }
+    for (size_t i = 0; has_sure && i < evaluation->rows.count; i++)
+        if (evaluation->rows.at[i].restitution_by == RESTITUTION_BY_PULSE)
+            evaluation->rows.at[i].restitution_counts = false;
+}
+
+static double wider(double bound, double value, bool is_least) {
+    return isnan(value)                                                 ? bound
+           : isnan(bound) || (is_least ? value < bound : value > bound) ? value
+                                                                        : bound;
+}
+
+static void find_ranges(const Measurement *tests, size_t count, Evaluation *evaluation) {
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        if (!row->restitution_counts && !row->contact_time_counts)
+            continue;
+        evaluation->least_speed = wider(evaluation->least_speed, row->approach_speed, true);
+        evaluation->most_speed = wider(evaluation->most_speed, row->approach_speed, false);
+    }
+    for (size_t i = 0; i < count; i++) {
+        const double temperature = tests[i].test->temperature;
+        evaluation->least_temperature = wider(evaluation->least_temperature, temperature, true);
+        evaluation->most_temperature = wider(evaluation->most_temperature, temperature, false);
+    }
+}
+
+static Status make_restitution(Reading *readings, Evaluation *evaluation, Problem *problem) {
+    EvaluationRow *rows = evaluation->rows.at;
+    size_t count = 0;
+    for (size_t i = 0; i < evaluation->rows.count; i++)
+        if (rows[i].restitution_counts)
+            readings[count++] = (Reading){.value = rows[i].restitution,
+                                          .uncertainty = rows[i].restitution_uncertainty,
+                                          .speed = rows[i].approach_speed,
+                                          .row = i};
+    TRY(quantity_make(readings, count, "restitution", "1", &evaluation->restitution, problem));
+    for (size_t i = 0; i < count; i++) {
+        rows[readings[i].row].restitution_score = readings[i].score;
+        rows[readings[i].row].restitution_is_outlier = readings[i].is_outlier;
+    }
+    return STATUS_OK;
+}
+
+static Status make_contact_time(Reading *readings, Evaluation *evaluation, Problem *problem) {
+    EvaluationRow *rows = evaluation->rows.at;
+    size_t count = 0;
+    for (size_t i = 0; i < evaluation->rows.count; i++)
+        if (rows[i].contact_time_counts)
+            readings[count++] = (Reading){.value = rows[i].contact_time,
+                                          .uncertainty = rows[i].contact_time_uncertainty,
+                                          .speed = rows[i].approach_speed,
+                                          .row = i};
+    TRY(quantity_make(readings, count, "contact time", "s", &evaluation->contact_time, problem));
+    for (size_t i = 0; i < count; i++) {
+        rows[readings[i].row].contact_time_score = readings[i].score;
+        rows[readings[i].row].contact_time_is_outlier = readings[i].is_outlier;
+    }
+    return STATUS_OK;
+}
+
+Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
+                       Evaluation *evaluation, Problem *problem) {
+    const double none = (double)NAN;
+    *evaluation = (Evaluation){.separation = (int)separation,
+                               .confidence = EVALUATION_CONFIDENCE,
+                               .least_speed = none,
+                               .most_speed = none,
+                               .least_temperature = none,
+                               .most_temperature = none};
+    for (size_t i = 0; i < count; i++)
+        TRY(rows_add(&tests[i], i, evaluation, problem));
+    TRY(rows_unpull(tests, count, evaluation, problem));
+    choose_restitutions(evaluation);
+    find_ranges(tests, count, evaluation);
+    Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);
+    if (readings == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+    Status status = make_restitution(readings, evaluation, problem);
+    if (status == STATUS_OK)
+        status = make_contact_time(readings, evaluation, problem);
+    free(readings);
+    if (status != STATUS_OK)
+        return status;
+    return evaluation_warn(tests, count, evaluation) == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+}

@@ -1,0 +1,286 @@
+// Mean and deviation are of two passes, the interval is Student's. Outliers are told by the
+// distance from the median over the median of all such distances, which a few wild readings do not
+// move, in units that are standard deviations of normal readings (Iglewicz and Hoaglin 1993). Their
+// common cut of 3.5 would mark every fifth sample of three to ten good readings, hence the table.
+//
+// The trend is a straight line by least squares. Where it is shown, outliers are told from the
+// line.
+#include "core/measure/evaluation_statistics.h"
+
+#include <stdlib.h>
+
+#include "core/math/student.h"
+#include "core/measure/sentence.h"
+
+static const double significance = 0.05;
+static const double speeds_alike = 0.1;  // of their mean: a span that shows no trend
+static const double rounding = 1e-12;    // of a mean: no spread at all
+static const double implausible = 0.001; // the chance of so little spread
+
+// 95 % quantiles of the largest score among so many normal readings, of 30,000 to 400,000 samples.
+static const struct {
+    size_t count;
+    double cut;
+} cuts[] = {{3, 22},    {4, 6.9},    {5, 7.9},   {6, 5.5},   {7, 5.9},    {8, 4.9},
+            {9, 5.1},   {10, 4.6},   {12, 4.4},  {15, 4.3},  {20, 4.0},   {30, 3.85},
+            {50, 3.75}, {100, 3.75}, {200, 3.8}, {300, 3.9}, {1000, 4.1}, {3000, 4.3}};
+
+double outlier_cut(size_t count) {
+    size_t i = 0;
+    while (i < COUNT(cuts) && cuts[i].count < count)
+        i++;
+    if (i == COUNT(cuts))
+        return cuts[i - 1].cut + log10((double)count / 3000) / 2;
+    if (i == 0 || cuts[i].count == count)
+        return cuts[i].cut;
+    const double from = (double)cuts[i - 1].count, to = (double)cuts[i].count;
+    const double share = ((double)count - from) / (to - from);
+    return cuts[i - 1].cut + share * (cuts[i].cut - cuts[i - 1].cut);
+}
+
+static int by_size(const void *a, const void *b) {
+    const double left = *(const double *)a, right = *(const double *)b;
+    return left < right ? -1 : left > right ? 1 : 0;
+}
+
+// Sorts them.
+static double median_of(double *values, size_t count) {
+    qsort(values, count, sizeof *values, by_size);
+    return count % 2 == 1 ? values[count / 2] : values[count / 2 - 1] / 2 + values[count / 2] / 2;
+}
+
+static double mean_of(const Reading *readings, size_t count, bool with_outliers) {
+    double sum = 0, rest = 0, n = 0;
+    for (size_t i = 0; i < count; i++)
+        if (with_outliers || !readings[i].is_outlier) {
+            sum += readings[i].value;
+            n++;
+        }
+    for (size_t i = 0; i < count; i++)
+        if (with_outliers || !readings[i].is_outlier)
+            rest += readings[i].value - sum / n;
+    return sum / n + rest / n;
+}
+
+// The root of the mean square of the stated uncertainties; NAN unless all have one above 0.
+static double stated(const Reading *readings, size_t count) {
+    double squares = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!(readings[i].uncertainty > 0))
+            return (double)NAN;
+        squares += readings[i].uncertainty * readings[i].uncertainty;
+    }
+    return sqrt(squares / (double)count);
+}
+
+// Whether normal readings of that uncertainty have so little spread at most once in a thousand
+// times, by Chernoff's bound of chi square: P(s^2 <= x u^2) <= (x exp(1 - x))^(n / 2).
+static bool is_too_small(double deviation, double uncertainty, size_t freedom) {
+    const double x = deviation * deviation / (uncertainty * uncertainty);
+    return x < 1 && (double)freedom / 2 * (log(x) + 1 - x) < log(implausible);
+}
+
+static bool make_interval(const Reading *readings, size_t count, Quantity *quantity) {
+    const double n = (double)count, u = stated(readings, count);
+    double t = student_quantile(EVALUATION_CONFIDENCE, 0);
+    const bool is_alike = count > 1 && !(quantity->deviation > rounding * fabs(quantity->mean));
+    bool is_said;
+    if (count > 1 && !is_alike && !(u > 0 && is_too_small(quantity->deviation, u, count - 1))) {
+        t = student_quantile(EVALUATION_CONFIDENCE, count - 1);
+        quantity->standard_error = quantity->deviation / sqrt(n);
+        is_said = sentence(&quantity->why,
+                           "mean +- %.4g standard errors, Student's t for %zu readings", t, count);
+    } else if (u > 0) {
+        quantity->standard_error = u / sqrt(n);
+        is_said =
+            count == 1
+                ? sentence(&quantity->why,
+                           "one reading: the interval is what its uncertainty alone leaves, "
+                           "nothing is known of the spread")
+                : sentence(&quantity->why,
+                           "the %zu readings lie closer together than their stated uncertainty "
+                           "would have it: the interval is made of that",
+                           count);
+    } else {
+        return sentence(&quantity->why,
+                        count == 1 ? "one reading without a stated uncertainty: no interval"
+                                   : "all readings are the same, to what the instrument resolves, "
+                                     "whose uncertainty is not stated: no interval");
+    }
+    quantity->low = quantity->mean - t * quantity->standard_error;
+    quantity->high = quantity->mean + t * quantity->standard_error;
+    return is_said;
+}
+
+// Slope and intercept of those readings that have a speed.
+typedef struct Line {
+    size_t count;
+    double speed, value; // means
+    double squares;      // of speeds about their mean
+    double slope, left;  // what remains of the squares of the values
+    double least, most;
+} Line;
+
+static Line fit_line(const Reading *readings, size_t count) {
+    Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        line.count++;
+        line.speed += readings[i].speed;
+        line.value += readings[i].value;
+        line.least = fmin(line.least, readings[i].speed);
+        line.most = fmax(line.most, readings[i].speed);
+    }
+    line.speed /= (double)line.count;
+    line.value /= (double)line.count;
+    double products = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].speed - line.speed;
+        line.squares += off * off;
+        products += off * (readings[i].value - line.value);
+    }
+    line.slope = line.squares > 0 ? products / line.squares : 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off =
+            readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
+        line.left += off * off;
+    }
+    return line;
+}
+
+static bool say_trend(const char *name, const char *unit, double mean, Trend *trend) {
+    const double percent = 100 / fabs(mean);
+    if (trend->verdict == TREND_CONSTANT)
+        return sentence(&trend->detail,
+                        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g %s per m/s, "
+                        "p = %.2g) and may be taken as constant there; a change of up to %.2g%s%s "
+                        "(%.2g %%) over these speeds would not have been seen",
+                        name, trend->least_speed, trend->most_speed, trend->slope,
+                        trend->standard_error, unit, trend->p, trend->missed_change,
+                        unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
+                        trend->missed_change * percent);
+    return sentence(&trend->detail,
+                    "%s %s by %.2g%s%s (%.2g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
+                    "constant over speed, and a table over speed says more than a mean",
+                    name, trend->change < 0 ? "falls" : "rises", fabs(trend->change),
+                    unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
+                    fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
+}
+
+static bool make_trend(const Reading *readings, size_t count, const char *name, const char *unit,
+                       Quantity *quantity) {
+    const Line line = fit_line(readings, count);
+    Trend *trend = &quantity->trend;
+    trend->count = line.count;
+    if (line.count > 0) {
+        trend->least_speed = line.least;
+        trend->most_speed = line.most;
+    }
+    if (line.count < 3)
+        return sentence(&trend->detail,
+                        "whether %s is constant over speed cannot be told: %zu reading%s with a "
+                        "speed, at least three are needed",
+                        name, line.count, line.count == 1 ? "" : "s");
+    const double span = line.most - line.least;
+    if (!(span > speeds_alike * line.speed))
+        return sentence(&trend->detail,
+                        "whether %s is constant over speed cannot be told: all readings were made "
+                        "at about %.3g m/s",
+                        name, line.speed);
+    const double least = rounding * fabs(quantity->mean);
+    const size_t freedom = line.count - 2;
+    const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
+    trend->slope = line.slope;
+    trend->standard_error = sqrt(fmax(line.left / (double)freedom, least * least) / line.squares);
+    trend->low = line.slope - t * trend->standard_error;
+    trend->high = line.slope + t * trend->standard_error;
+    trend->t = line.slope / trend->standard_error;
+    trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
+    trend->change = line.slope * span;
+    trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
+    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT : TREND_CONSTANT;
+    return say_trend(name, unit, quantity->mean, trend);
+}
+
+// Distances from the median, or where a trend is shown from its line.
+static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
+    double *values = calloc(2 * count, sizeof *values);
+    if (values == NULL)
+        return false;
+    const bool has_line = quantity->trend.verdict == TREND_NOT_CONSTANT;
+    const Line line = fit_line(readings, count);
+    for (size_t i = 0; i < count; i++) {
+        values[i] = readings[i].value;
+        if (has_line && !isnan(readings[i].speed))
+            values[i] -= line.slope * (readings[i].speed - line.speed);
+    }
+    double *sorted = values + count, mean = 0;
+    for (size_t i = 0; i < count; i++)
+        sorted[i] = values[i];
+    const double middle = median_of(sorted, count);
+    for (size_t i = 0; i < count; i++) {
+        sorted[i] = fabs(values[i] - middle);
+        mean += sorted[i] / (double)count;
+    }
+    // Where most are the same, their mean distance stands for the median one.
+    const double median = median_of(sorted, count);
+    const double spread = median > rounding * fabs(middle) ? 1.482602 * median : 1.253314 * mean;
+    for (size_t i = 0; i < count; i++) {
+        const double own = readings[i].uncertainty > 0 ? readings[i].uncertainty : 0;
+        const double scale = fmax(fmax(spread, own), rounding * fabs(middle));
+        readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
+        readings[i].is_outlier = fabs(readings[i].score) > outlier_cut(count);
+        quantity->outliers += readings[i].is_outlier ? 1 : 0;
+    }
+    if (quantity->outliers > 0 && quantity->outliers < count)
+        quantity->mean_without_outliers = mean_of(readings, count, false);
+    free(values);
+    return true;
+}
+
+static bool make_spread(const Reading *readings, size_t count, Quantity *quantity) {
+    double *sorted = calloc(count, sizeof *sorted), squares = 0;
+    if (sorted == NULL)
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        sorted[i] = readings[i].value;
+        squares += (sorted[i] - quantity->mean) * (sorted[i] - quantity->mean);
+    }
+    quantity->median = median_of(sorted, count);
+    quantity->minimum = sorted[0];
+    quantity->maximum = sorted[count - 1];
+    if (count > 1)
+        quantity->deviation = sqrt(squares / (double)(count - 1));
+    free(sorted);
+    return true;
+}
+
+Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
+                     Quantity *quantity, Problem *problem) {
+    const double none = (double)NAN;
+    const Trend trend = {0,    none, none, none, none,          none, none,
+                         none, none, none, none, CHOICE_ABSENT, NULL};
+    *quantity =
+        (Quantity){count, none, none, none, none, none, none, none, none, 0, none, NULL, trend};
+    bool is_made;
+    if (count == 0) {
+        is_made = sentence(&quantity->why, "no reading that counts tells the %s", name) &&
+                  make_trend(readings, count, name, unit, quantity);
+    } else {
+        quantity->mean = mean_of(readings, count, true);
+        is_made = make_spread(readings, count, quantity) &&
+                  make_interval(readings, count, quantity) &&
+                  make_trend(readings, count, name, unit, quantity);
+    }
+    for (size_t i = 0; i < count; i++)
+        readings[i].score = none;
+    if (is_made && count > 2)
+        is_made = find_outliers(readings, count, quantity);
+    return is_made ? STATUS_OK
+                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+}

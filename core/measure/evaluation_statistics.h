@@ -1,0 +1,25 @@
+// The statistics of readings of one quantity: mean, interval, outliers, trend over speed. Not where
+// the readings come from (evaluation_rows.h). Used by evaluation.c and the tests.
+#ifndef CORE_MEASURE_EVALUATION_STATISTICS_H
+#define CORE_MEASURE_EVALUATION_STATISTICS_H
+
+#include "core/measure/evaluation.h"
+
+// One reading that counts. What is not known is NAN.
+typedef struct Reading {
+    double value, uncertainty, speed;
+    size_t row; // of the evaluation
+    double score;
+    bool is_outlier;
+} Reading;
+
+// Fills `quantity`, which is all zero or cleared, and scores and marks the readings. `name` and
+// `unit` stand in sentences ("restitution", "1"). STATUS_NO_MEMORY.
+Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
+                     Quantity *quantity, Problem *problem);
+
+// How many robust deviations from the middle a reading may be among so many: one sample of normal
+// readings in twenty has one beyond it.
+double outlier_cut(size_t count);
+
+#endif

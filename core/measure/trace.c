@@ -1,0 +1,326 @@
+// From a trace to its contacts. Each is set into a window of its own, with as much baseline on both
+// sides as there is, in which the pulse is fitted. A figure of T_c is given only where five samples
+// or more are in contact and the pulse that fits them is one of a kind; else an interval, and why.
+#include "core/measure/trace.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/measure/trace_find.h"
+#include "core/measure/trace_interval.h"
+
+enum { SAMPLES_LEAST = 5, TRACE_LEAST = 8 };
+
+static const double widest = 0.5; // interval over T_c that still is a figure
+
+// clang-format off
+const Field trace_contact_fields[] = {
+    FIELD_REAL(TraceContact, start, "s", ANY, OPTIONAL, "when the fitted contact begins, after the first sample"),
+    FIELD_REAL(TraceContact, end, "s", ANY, OPTIONAL, "when the fitted contact ends"),
+    FIELD_REAL(TraceContact, first, "s", ANY, OPTIONAL, "the first sample in contact, or above the threshold where nothing is fitted"),
+    FIELD_REAL(TraceContact, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceContact, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceContact, peak, "N", ANY, OPTIONAL, "largest force above the baseline, with its sign"),
+    FIELD_REAL(TraceContact, impulse, "N s", ANY, OPTIONAL, "of the fitted pulse"),
+    FIELD_REAL(TraceContact, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceContact, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceContact, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceContact, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair, by the fit"),
+    FIELD_REAL(TraceContact, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(TraceContact, least_contact_time, "s", ANY, OPTIONAL, "T_c is at least this, with most_contact_time in 95 of 100 cases"),
+    FIELD_REAL(TraceContact, most_contact_time, "s", ANY, OPTIONAL, "T_c is at most this"),
+    FIELD_REAL(TraceContact, restitution, NULL, ANY, OPTIONAL, "e by the pulse's shape"),
+    FIELD_REAL(TraceContact, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(TraceContact, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceContact, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
+    FIELD_FLAG(TraceContact, is_doubtful, false, "a figure is given, but the trace is hardly the model's: see why"),
+    FIELD_TEXT(TraceContact, why, TRACE_WHY_MOST, PRESENCE_OPTIONAL, 0, "why there is no figure of T_c, or why it is doubtful"),
+    FIELD_END
+};
+// clang-format on
+
+__attribute__((format(printf, 2, 3))) static Status tell(char **why, const char *format, ...) {
+    char text[TRACE_WHY_MOST];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    free(*why);
+    *why = strdup(text);
+    return *why == NULL ? STATUS_NO_MEMORY : STATUS_OK;
+}
+
+// How much longer a contact may be than what is seen of it above that share of its peak, and how
+// much of that may be before, in what is seen.
+static double hidden(double level, int separation, double *before) {
+    double most = 0;
+    *before = 0;
+    for (int i = 0; i <= 12; i++) {
+        const TraceShape shape = trace_shape(i / 4.0, 0, separation);
+        const TraceVisible visible = trace_shape_visible(&shape, fmin(level, 0.95));
+        const double seen = fmax(visible.to - visible.from, 0.02);
+        most = fmax(most, (1 - seen) / seen);
+        *before = fmax(*before, visible.from / seen);
+    }
+    return most;
+}
+
+// What of the trace one contact has for itself.
+typedef struct Stretch {
+    size_t from, to;             // samples from .. to - 1
+    bool is_at_begin, is_at_end; // of the trace
+} Stretch;
+
+static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) {
+    const TraceRun *run = &found->runs[number];
+    const size_t length = run->last - run->first + 1;
+    const double level = found->threshold / fabs(run->peak);
+    double before;
+    const double after = hidden(level, SEPARATION_ZERO_PENETRATION, &before);
+    const size_t about = (size_t)((double)length * (4 + 2 * after)) + 24;
+    Stretch stretch = {.from = run->first > about ? run->first - about : 0,
+                       .to = count - run->last > about ? run->last + about : count};
+    // Behind a contact there may be an end below the threshold.
+    if (number > 0) {
+        const size_t end = found->runs[number - 1].last;
+        const size_t wall = run->first - (run->first - end) / 3;
+        stretch.from = stretch.from > wall ? stretch.from : wall;
+    }
+    if (number + 1 < found->count) {
+        const size_t wall = run->last + (found->runs[number + 1].first - run->last) * 2 / 3;
+        stretch.to = stretch.to < wall ? stretch.to : wall;
+    }
+    stretch.is_at_begin = stretch.from == 0;
+    stretch.is_at_end = stretch.to == count;
+    return stretch;
+}
+
+static void fill_window(const TraceFound *found, const TraceRun *run, const Stretch *stretch,
+                        int separation, TraceWindow *window) {
+    const size_t samples = stretch->to - stretch->from;
+    const size_t m = (samples + TRACE_BLOCKS_MOST - 1) / TRACE_BLOCKS_MOST;
+    *window = (TraceWindow){
+        .blocks = samples / m,
+        .per_block = m,
+        .separation = separation,
+        .first = (long)(run->first - stretch->from),
+        .last = (long)(run->last - stretch->from),
+    };
+    for (size_t k = 0; k < window->blocks; k++) {
+        const double *force = found->force + stretch->from + k * m;
+        double sum = 0;
+        for (size_t i = 0; i < m; i++)
+            sum += force[i] / run->peak;
+        const double mean = sum / (double)m;
+        for (size_t i = 0; i < m; i++)
+            window->scatter += (force[i] / run->peak - mean) * (force[i] / run->peak - mean);
+        window->mean[k] = mean;
+        window->sum += mean;
+        window->square += mean * mean;
+    }
+    const double noise = found->noise / run->peak;
+    window->noise_freedom = fmax(found->noise_count - (double)samples, 0);
+    window->noise_square = noise * noise * window->noise_freedom;
+    double before;
+    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    const double length = (double)(window->last - window->first + 1);
+    const long end = (long)(window->blocks * m) - 1;
+    window->least_start = window->first - (long)ceil(1.5 * before * length) - 2 - (long)length / 8;
+    window->most_end = window->last + (long)ceil(1.5 * after * length) + 2 + (long)length / 8;
+    // A sample on either side must be out of contact.
+    window->least_start = window->least_start > 1 ? window->least_start : 1;
+    window->most_end = window->most_end < end - 1 ? window->most_end : end - 1;
+}
+
+// Without a fit: from what is seen above the threshold.
+static void count_samples(const TraceFound *found, const TraceRun *run, int separation,
+                          double interval, TraceContact *contact) {
+    const double seen = (double)(run->last - run->first);
+    double before;
+    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    contact->least_contact_time = seen * interval;
+    contact->most_contact_time = (seen + 2) * (1 + after) * interval;
+}
+
+// rms of what the fit leaves during contact [peak].
+static double left_over(const TraceWindow *window, const TraceFit *fit) {
+    TraceShape shape;
+    double T, sum = 0;
+    trace_point_shape(window, &fit->at, &shape, &T);
+    const long m = (long)window->per_block;
+    size_t count = 0;
+    for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++, count++) {
+        const double at = (double)(k * m) + (double)(m - 1) / 2;
+        const double force = trace_shape_force(&shape, (at - fit->at.part[0]) / T);
+        const double left =
+            window->mean[k] - fit->residue.amplitude * force - fit->residue.baseline;
+        sum += left * left * (double)m;
+    }
+    return sqrt(sum / fmax((double)count - 4, 1));
+}
+
+static Status judge(const TraceWindow *window, const TraceFit *fit, double noise, double interval,
+                    TraceContact *contact) {
+    const double width = contact->most_contact_time - contact->least_contact_time;
+    if (contact->samples < SAMPLES_LEAST || !(width < widest * contact->contact_time)) {
+        contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
+        contact->restitution = contact->restitution_uncertainty = (double)NAN;
+        if (contact->samples < SAMPLES_LEAST)
+            return tell(&contact->why,
+                        "only %d samples are in contact, and pulses of very different length fit "
+                        "so few: sample "
+                        "at least %.0f times as fast, so that 5 or better 20 are",
+                        (int)contact->samples, ceil(20.0 / (double)contact->samples));
+        return tell(&contact->why,
+                    "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
+                    "more samples "
+                    "in contact would tell them apart",
+                    contact->least_contact_time, contact->most_contact_time);
+    }
+    // So much is seldom left by chance.
+    const double freedom = fmax((double)(contact->samples) - 4, 1);
+    if (contact->misfit_share > 0.01 &&
+        contact->misfit_share > noise * (1 + 3.7 / sqrt(2 * freedom))) {
+        contact->is_doubtful = true;
+        return tell(&contact->why,
+                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                    "best one leaves "
+                    "%.2g %% of the peak, the noise is %.2g %% of it",
+                    separation_names[window->separation], 100 * contact->misfit_share, 100 * noise);
+    }
+    (void)fit;
+    (void)interval;
+    return STATUS_OK;
+}
+
+static Status fit_contact(TraceWindow *window, const TraceFound *found, const TraceRun *run,
+                          const Stretch *stretch, double interval, TraceContact *contact) {
+    TraceFit fits[TRACE_FITS_MOST];
+    const size_t count = trace_fit(window, fits);
+    if (count == 0)
+        return tell(&contact->why, "no pulse of the model's fits");
+    const TraceFit *fit = &fits[0];
+    const bool is_short = fit->last - fit->first + 1 < SAMPLES_LEAST;
+    contact->samples = (uint64_t)(fit->last - fit->first + 1);
+    const double origin = (double)stretch->from;
+    contact->first = (origin + (double)fit->first) * interval;
+    contact->last = (origin + (double)fit->last) * interval;
+    TraceShape shape;
+    double T;
+    trace_point_shape(window, &fit->at, &shape, &T);
+    const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
+    contact->crossing_shortfall = 1 - (visible.pressed - visible.from);
+    contact->impulse =
+        fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
+    contact->misfit_share = left_over(window, fit);
+    const double noise = found->noise / fabs(run->peak);
+    contact->misfit = contact->misfit_share / noise;
+    if (!is_short) {
+        TraceInterval likely;
+        TRY(trace_interval(window, fits, count, &likely));
+        contact->start = (origin + likely.start.mean) * interval;
+        contact->end = (origin + likely.end.mean) * interval;
+        contact->contact_time = likely.contact_time.mean * interval;
+        contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
+        contact->least_contact_time = likely.least * interval;
+        contact->most_contact_time = likely.most * interval;
+        contact->restitution = fmin(exp(-likely.decay.mean), 1);
+        contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
+    }
+    return judge(window, fit, noise, interval, contact);
+}
+
+static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
+                           size_t samples, size_t number, TraceWindow *window,
+                           TraceContact *contact) {
+    const TraceRun *run = &found->runs[number];
+    const Stretch stretch = stretch_of(found, samples, number);
+    fields_clear(trace_contact_fields, contact);
+    contact->peak = run->peak;
+    contact->samples = run->last - run->first + 1;
+    contact->first = (double)run->first * interval;
+    contact->last = (double)run->last * interval;
+    contact->crossing_time = (double)(run->pressed - run->first + 1) * interval;
+    contact->crossing_uncertainty = interval / sqrt(6);
+    count_samples(found, run, way->separation, interval, contact);
+    if (run->first == 0 || run->last == samples - 1) {
+        contact->most_contact_time = (double)NAN;
+        return tell(&contact->why, "the trace %s during the contact",
+                    run->first == 0 ? "begins" : "ends");
+    }
+    fill_window(found, run, &stretch, way->separation, window);
+    if (way->gravity > 0 && number < way->approach_speed_count && way->approach_speeds[number] > 0)
+        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+    return fit_contact(window, found, run, &stretch, interval, contact);
+}
+
+Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
+                  TraceReading *reading, Problem *problem) {
+    *reading = (TraceReading){.baseline = (double)NAN};
+    if (!(interval > 0) || !isfinite(interval))
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "its interval must be above 0 s, is %g", interval);
+    if (force->count < TRACE_LEAST)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "must have at least %d samples, has %zu", TRACE_LEAST, force->count);
+    for (size_t i = 0; i < force->count; i++)
+        if (!(fabs(force->at[i]) < 1e150))
+            return problem_add(problem, STATUS_INVALID, pointer,
+                               "its sample %zu must be a force below 1e150 N", i);
+    TraceFound found;
+    TraceWindow *window = malloc(sizeof *window);
+    Status status = trace_find(force, way->threshold, &found);
+    if (status == STATUS_OK && window != NULL && found.count > 0) {
+        reading->contacts.at = calloc(found.count, sizeof *reading->contacts.at);
+        if (reading->contacts.at == NULL)
+            status = STATUS_NO_MEMORY;
+    }
+    if (window == NULL)
+        status = STATUS_NO_MEMORY;
+    if (status == STATUS_OK) {
+        reading->baseline = found.baseline;
+        reading->noise = found.noise;
+        reading->threshold = found.threshold;
+        for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
+            reading->contacts.count++;
+            status = read_contact(interval, way, &found, force->count, i, window,
+                                  &reading->contacts.at[i]);
+        }
+        if (status == STATUS_OK && found.count == 0)
+            status =
+                tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
+        if (status == STATUS_OK && found.is_full)
+            status =
+                tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MOST);
+    }
+    trace_found_clear(&found);
+    free(window);
+    return status;
+}
+
+void trace_reading_clear(TraceReading *reading) {
+    for (size_t i = 0; i < reading->contacts.count; i++)
+        fields_clear(trace_contact_fields, &reading->contacts.at[i]);
+    free(reading->contacts.at);
+    free(reading->why);
+    *reading = (TraceReading){.why = NULL};
+}
+
+void trace_pulse(const TraceContact *contact, const TraceWay *way, double approach_speed,
+                 double start, double interval, size_t count, double *force) {
+    const bool is_known = contact->contact_time > 0;
+    const double pull = way->gravity > 0 && approach_speed > 0 && is_known
+                            ? way->gravity * contact->contact_time / approach_speed
+                            : 0;
+    const double decay = is_known ? fabs(log(contact->restitution)) : 0;
+    const TraceShape shape = trace_shape(decay, pull, way->separation);
+    const double size = contact->impulse / (trace_shape_impulse(&shape) * contact->contact_time);
+    for (size_t i = 0; i < count; i++) {
+        const double s = (start + (double)i * interval - contact->start) / contact->contact_time;
+        force[i] =
+            is_known && s >= 0 && s <= shape.length ? size * trace_shape_force(&shape, s) : 0;
+    }
+}

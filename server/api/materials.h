@@ -1,0 +1,30 @@
+// What the handlers of materials share: entity tags and the conditions that writers bring. Not
+// routes and not rows. Used by the files of api/ that show or write what a material is.
+#ifndef SERVER_API_MATERIALS_H
+#define SERVER_API_MATERIALS_H
+
+#include "server/api/app.h"
+#include "server/base/bytes.h"
+#include "server/store/material_rows.h"
+
+enum { MATERIAL_TAG = 110 };
+
+// "SLUG@REVISION-VERSION", without quotes. What is said of a revision may still change (a draft is
+// approved): the version tells.
+void material_tag(const char *slug, uint64_t revision, uint64_t version, char tag[MATERIAL_TAG]);
+
+// The state that a writer has seen, as If-Match tells it: any tag of the material of its present
+// version, or "*". *version is what the store is to find (ANY_VERSION: whatever it is); *state the
+// material's present one. STATUS_NOT_FOUND, STATUS_UNCONDITIONAL where it is required and missing,
+// STATUS_STALE.
+Status material_condition(App *app, const Request *request, const char *slug, bool is_required,
+                          uint64_t *version, MaterialState *state, Problem *problem);
+
+// The number of a revision as a path has it. STATUS_NOT_FOUND.
+Status material_revision_number(const char *text, uint64_t *revision, Problem *problem);
+
+// A text and a time as members behind others: NULL and 0 are null.
+void material_put_text(Bytes *bytes, const char *name, const char *text);
+void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
+
+#endif

@@ -1,0 +1,225 @@
+// Ground-motion records: upload, list, one with what uses it, its samples, deletion.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/api/records_upload.h"
+#include "server/api/tables.h"
+#include "server/base/clock.h"
+#include "server/base/link.h"
+#include "server/codec/write.h"
+#include "server/http/doorman.h"
+#include "server/http/reply.h"
+#include "server/jobs/documents.h"
+
+enum { LIST_INITIAL = 50, LIST_MOST = 500, TEXT_MOST = 200 };
+
+// clang-format off
+static const Field row_fields[] = {
+    FIELD_TEXT(RecordRow, name, 0, PRESENCE_OPTIONAL, 0, "what scenes call it"),
+    FIELD_TEXT(RecordRow, earthquake, 0, PRESENCE_OPTIONAL, 0, "which one"),
+    FIELD_TEXT(RecordRow, station, 0, PRESENCE_OPTIONAL, 0, "where it was measured"),
+    FIELD_TEXT(RecordRow, source, 0, PRESENCE_OPTIONAL, 0, "where the file comes from"),
+    FIELD_TEXT(RecordRow, processing, 0, PRESENCE_OPTIONAL, 0, "what was done to it"),
+    FIELD_TEXT(RecordRow, notes, 0, PRESENCE_OPTIONAL, 0, "what else one should know"),
+    FIELD_TEXT(RecordRow, layout, 0, PRESENCE_OPTIONAL, 0, "of the file"),
+    FIELD_TEXT(RecordRow, header, 0, PRESENCE_OPTIONAL, 0, "what stands before its numbers"),
+    FIELD_TEXT(RecordRow, unit, 0, PRESENCE_OPTIONAL, 0, "of the file's numbers, as it was taken"),
+    FIELD_TEXT(RecordRow, stated_unit, 0, PRESENCE_OPTIONAL, 0, "as the file tells it"),
+    FIELD_REAL(RecordRow, interval, "s", ANY, OPTIONAL, "time between samples"),
+    FIELD_COUNT(RecordRow, count, NULL, AT_LEAST(1), OPTIONAL, "samples"),
+    FIELD_REAL(RecordRow, peak, "m/s^2", ANY, OPTIONAL, "the largest magnitude"),
+    FIELD_REAL(RecordRow, peak_time, "s", ANY, OPTIONAL, "when"),
+    FIELD_REAL(RecordRow, peak_velocity, "m/s", ANY, OPTIONAL, "of the base, from rest"),
+    FIELD_REAL(RecordRow, end_velocity, "m/s", ANY, OPTIONAL, "likewise, at the end"),
+    FIELD_TEXT(RecordRow, digest, 0, PRESENCE_OPTIONAL, 0, "SHA-256 of interval and samples"),
+    FIELD_TEXT(RecordRow, author, 0, PRESENCE_OPTIONAL, 0, "the token's name it came with"),
+    FIELD_END
+};
+// clang-format on
+
+// Without the closing brace.
+static void put_record(Bytes *bytes, const RecordRow *row) {
+    char created[32];
+    clock_rfc3339(row->created_unix_ms, created);
+    bytes_text(bytes, "{");
+    (void)write_members(bytes, row_fields, row, WRITE_REPORT);
+    bytes_text(bytes, ", \"duration\": ");
+    bytes_real(bytes, (double)(row->count - 1) / (1 / row->interval));
+    bytes_format(bytes,
+                 ", \"created\": \"%s\", \"links\": {\"self\": \"%s/v1/records/%s\", \"samples\": "
+                 "\"%s/v1/records/%s/samples\"}",
+                 created, link_base(), row->name, link_base(), row->name);
+}
+
+static void put_uses(Bytes *bytes, const RecordUses *uses) {
+    bytes_format(bytes, ", \"used_by\": {\"results\": %llu, \"unfinished_jobs\": %llu}",
+                 (unsigned long long)uses->results, (unsigned long long)uses->jobs);
+}
+
+// Others with the same samples may be meant.
+static Status warn_twins(App *app, RecordUpload *upload, Problem *problem) {
+    RecordRows twins;
+    char list[RECORD_TWINS * (RECORD_NAME_SIZE + 2) + 8] = "";
+    TRY(store_record_twins(app->store, &upload->row, &twins, problem));
+    for (size_t i = 0; i < twins.count; i++)
+        text_list(list, sizeof list, twins.at[i].name);
+    const size_t count = twins.count;
+    record_rows_clear(&twins);
+    if (count > 0 &&
+        warnings_add(&upload->warnings, "/samples",
+                     "are to the bit those of %s, under another name", list) != STATUS_OK)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for warnings");
+    return STATUS_OK;
+}
+
+static Status answer(App *app, RecordUpload *upload, bool is_there, Reply *reply,
+                     Problem *problem) {
+    RecordRow row;
+    RecordUses uses;
+    Bytes bytes = {.most = app->reply_most};
+    TRY(warn_twins(app, upload, problem));
+    TRY(store_record(app->store, upload->row.name, &row, problem));
+    const Status status = store_record_uses(app->store, row.name, &uses, problem);
+    if (status == STATUS_OK) {
+        put_record(&bytes, &row);
+        put_uses(&bytes, &uses);
+        bytes_text(&bytes, ", \"warnings\": ");
+        document_warnings(&bytes, &upload->warnings);
+        bytes_text(&bytes, "}\n");
+        snprintf(reply->location, sizeof reply->location, "/v1/records/%.64s", row.name);
+    }
+    record_row_clear(&row);
+    return status == STATUS_OK
+               ? reply_bytes(reply, is_there ? 200 : 201, type_json, &bytes, problem)
+               : status;
+}
+
+Status records_create(App *app, const Request *request, Reply *reply, Problem *problem) {
+    RecordUpload upload;
+    bool is_there = false;
+    Status status = record_upload_read(request, &upload, problem);
+    if (status == STATUS_OK && request->client != NULL &&
+        (upload.row.author = strdup(request->client)) == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
+    if (status == STATUS_OK)
+        status = store_record_add(app->store, &upload.row, &upload.samples, &is_there, problem);
+    if (status == STATUS_OK)
+        status = answer(app, &upload, is_there, reply, problem);
+    record_upload_clear(&upload);
+    return status;
+}
+
+static void link_next(const Request *request, Reply *reply, const char *last) {
+    Bytes bytes = {.most = sizeof reply->link - 1};
+    bytes_text(&bytes, "</v1/records?");
+    for (size_t i = 0; i < request->query_count; i++)
+        if (strcmp(request->queries[i].name, "after") != 0) {
+            bytes_format(&bytes, "%s=", request->queries[i].name);
+            bytes_percent(&bytes, request->queries[i].value);
+            bytes_text(&bytes, "&");
+        }
+    bytes_format(&bytes, "after=%s>; rel=\"next\"", last);
+    if (!bytes.is_failed)
+        snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
+    bytes_clear(&bytes);
+}
+
+static Status read_text(const Request *request, const char *name, const char **text,
+                        Problem *problem) {
+    *text = request_query(request, name);
+    if (*text != NULL && strlen(*text) > TEXT_MOST)
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"%s\" may have %d bytes, has %zu", name, TEXT_MOST,
+                           strlen(*text));
+    if (*text != NULL && **text == '\0')
+        *text = NULL;
+    return STATUS_OK;
+}
+
+Status records_list(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *words, *after;
+    size_t limit;
+    RecordRows rows;
+    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    TRY(read_text(request, "q", &words, problem));
+    TRY(read_text(request, "after", &after, problem));
+    // One more than asked for tells whether there is a next page.
+    TRY(store_records(app->store, words, after != NULL ? after : "", limit + 1, &rows, problem));
+    Bytes bytes = {.most = app->reply_most};
+    bytes_text(&bytes, "{\"records\": [");
+    for (size_t i = 0; i < rows.count && i < limit; i++) {
+        bytes_text(&bytes, i > 0 ? ",\n " : "");
+        put_record(&bytes, &rows.at[i]);
+        bytes_text(&bytes, "}");
+    }
+    bytes_text(&bytes, "]}\n");
+    if (rows.count > limit)
+        link_next(request, reply, rows.at[limit - 1].name);
+    record_rows_clear(&rows);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
+Status records_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    RecordRow row;
+    RecordUses uses;
+    char tag[112];
+    TRY(store_record(app->store, request->parameters[0], &row, problem));
+    store_settle(app->store); // whoever was told of a job finds it counted
+    Status status = store_record_uses(app->store, row.name, &uses, problem);
+    if (status != STATUS_OK) {
+        record_row_clear(&row);
+        return status;
+    }
+    snprintf(tag, sizeof tag, "%.32s-%lld-%llu-%llu", row.digest, (long long)row.number,
+             (unsigned long long)uses.results, (unsigned long long)uses.jobs);
+    const bool is_known = reply_tagged(reply, request, tag);
+    Bytes bytes = {.most = app->reply_most};
+    if (!is_known) {
+        put_record(&bytes, &row);
+        put_uses(&bytes, &uses);
+        bytes_text(&bytes, "}\n");
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    record_row_clear(&row);
+    return status;
+}
+
+static Status fill(Sheet *sheet, const NamedRecord *named, Problem *problem) {
+    TRY(columns_make(&sheet->own, 1, named->samples.count, 0, problem));
+    columns_name(&sheet->own, 0, "acceleration", "m/s^2");
+    memcpy(sheet->own.at[0].values, named->samples.at, named->samples.count * sizeof(double));
+    sheet->table = (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
+    return sheet_own(sheet, problem);
+}
+
+Status records_samples(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const Encoder *encoder = NULL;
+    NamedRecord *named;
+    Sheet sheet = {.encoding = NULL};
+    char tag[96];
+    TRY(tables_encoder(request, 1, reply, &encoder, problem));
+    TRY(store_record_named(app->store, request->parameters[0], &named, problem));
+    snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
+    const bool is_known = reply_tagged(reply, request, tag);
+    const Status status = is_known ? STATUS_OK : fill(&sheet, named, problem);
+    shared_drop(&named->shared);
+    if (!is_known && status == STATUS_OK)
+        return tables_reply(app, reply, encoder, &sheet, problem);
+    sheet_clear(&sheet);
+    return status;
+}
+
+Status records_delete(App *app, const Request *request, Reply *reply, Problem *problem) {
+    RecordRow row;
+    char what[96];
+    TRY(store_record(app->store, request->parameters[0], &row, problem));
+    snprintf(what, sizeof what, "the record %.64s", row.name);
+    Status status = doorman_owns(request, row.author, what, problem);
+    if (status == STATUS_OK)
+        status = intake_record_delete(app->intake, row.name, problem);
+    record_row_clear(&row);
+    if (status == STATUS_OK)
+        reply_borrow(reply, 204, NULL, NULL, 0);
+    return status;
+}

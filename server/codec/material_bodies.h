@@ -1,0 +1,29 @@
+// What people send to write materials: a new one, a revision, a revert, a review. Not what is
+// stored (store/material_rows.h). Read by api/, described by describe.c.
+#ifndef SERVER_CODEC_MATERIAL_BODIES_H
+#define SERVER_CODEC_MATERIAL_BODIES_H
+
+#include "core/scene/material.h"
+
+// A new material, or a new revision of one: then the slug is the address's.
+typedef struct MaterialBody {
+    char *slug;    // new_material_fields alone
+    char *comment; // why; NULL: a new material says nothing
+    Material material;
+} MaterialBody;
+extern const Field new_material_fields[], material_revision_fields[];
+
+typedef struct MaterialRevertBody {
+    uint64_t to; // the revision that is to be said again
+    char *comment;
+} MaterialRevertBody;
+extern const Field material_revert_fields[];
+
+extern const char *const material_verdicts[]; // "approved", "deprecated"; NULL-terminated
+typedef struct MaterialReviewBody {
+    int status; // of material_verdicts
+    char *reason;
+} MaterialReviewBody;
+extern const Field material_review_fields[];
+
+#endif

@@ -1,0 +1,13 @@
+// A record is deleted while no scene is being accepted: those that were are in the store by then,
+// and count.
+#include "server/jobs/intake_state.h"
+#include "server/store/record_rows.h"
+
+Status intake_record_delete(Intake *intake, const char *name, Problem *problem) {
+    RecordUses uses;
+    naming_close(&intake->naming);
+    store_settle(intake->store);
+    const Status status = store_record_delete(intake->store, name, &uses, problem);
+    naming_open(&intake->naming);
+    return status;
+}

@@ -1,0 +1,110 @@
+// y'' + 2 Z w y' + w^2 y = 0 solved by the textbook, with k_b and c_b from e and T_c by the
+// identification: F = k_b y + c_b y' until T_c.
+#include "traces.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/base/noise.h"
+#include "core/contact/identify.h"
+#include "core/measure/trace.h"
+
+double traces_force(double restitution, double contact_time, int separation, double time) {
+    if (time < 0 || time > contact_time)
+        return 0;
+    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
+    const double w = sqrt(pair.stiffness), Z = pair.damping_ratio;
+    const double root = w * sqrt(fabs(1 - Z * Z)), fall = exp(-Z * w * time);
+    const double sine = Z < 1 ? sin(root * time) : sinh(root * time);
+    const double cosine = Z < 1 ? cos(root * time) : cosh(root * time);
+    const double y = fall * sine / root, speed = fall * (cosine - Z * w / root * sine);
+    return pair.stiffness * y + pair.damping * speed;
+}
+
+double traces_peak(double restitution, double contact_time, int separation) {
+    double peak = 0;
+    for (int i = 0; i <= 2000; i++)
+        peak = fmax(peak,
+                    traces_force(restitution, contact_time, separation, contact_time * i / 2000));
+    return peak;
+}
+
+static double uniform(uint64_t seed, uint64_t trial, uint32_t which) {
+    const uint32_t counter[4] = {(uint32_t)trial, (uint32_t)(trial >> 32), which, 0x7ace};
+    const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
+    uint32_t out[4];
+    noise_philox(counter, key, out);
+    return (out[0] + 0.5) / 4294967296.0;
+}
+
+double *traces_draw(const TraceCell *cell, uint64_t seed, uint64_t trial, size_t *count) {
+    const double interval = cell->contact_time / cell->samples;
+    const double before = fmax(cell->before * cell->samples, 4);
+    *count = (size_t)ceil(2 * before + cell->samples) + 2;
+    const size_t pairs = (*count + 1) / 2;
+    double *force = calloc(2 * pairs, sizeof *force);
+    if (force == NULL)
+        return NULL;
+    noise_normal_pairs(seed, trial, 0, pairs, force);
+    const double start = (ceil(before) + uniform(seed, trial, 1)) * interval;
+    const double peak = traces_peak(cell->restitution, cell->contact_time, cell->separation);
+    const double scale = cell->scale != 0 ? cell->scale : 1;
+    for (size_t i = 0; i < *count; i++) {
+        const double pulse = traces_force(cell->restitution, cell->contact_time, cell->separation,
+                                          (double)i * interval - start);
+        force[i] = scale * (cell->noise * force[i] + pulse / peak + cell->offset +
+                            cell->drift * (double)i / (double)*count);
+    }
+    return force;
+}
+
+TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials) {
+    TraceScore score = {.trials = trials};
+    const double T = cell->contact_time, interval = T / cell->samples;
+    double error = 0, square = 0, stated = 0;
+    for (uint64_t trial = 0; trial < trials; trial++) {
+        Reals force;
+        force.at = traces_draw(cell, seed, trial, &force.count);
+        const TraceWay way = {.separation = cell->separation, .threshold = (double)NAN};
+        TraceReading reading;
+        if (force.at != NULL &&
+            trace_read(interval, &force, &way, "", &reading, NULL) == STATUS_OK) {
+            score.found += reading.contacts.count == 1;
+            const TraceContact *contact = NULL;
+            for (size_t i = 0; i < reading.contacts.count; i++)
+                if (contact == NULL || fabs(reading.contacts.at[i].peak) > fabs(contact->peak))
+                    contact = &reading.contacts.at[i];
+            if (contact != NULL) {
+                const bool is_figure = !isnan(contact->contact_time);
+                const bool is_covered =
+                    contact->least_contact_time <= T && T <= contact->most_contact_time;
+                score.covered_all += is_covered;
+                score.below += contact->most_contact_time < T;
+                score.above += contact->least_contact_time > T;
+                score.figures += is_figure;
+                score.doubtful += contact->is_doubtful;
+                if (is_figure) {
+                    const double off = contact->contact_time / T - 1;
+                    score.covered += is_covered;
+                    error += off;
+                    square += off * off;
+                    stated += pow(contact->contact_time_uncertainty / T, 2);
+                    score.worst = fmax(score.worst, fabs(off));
+                    score.worst_restitution = fmax(score.worst_restitution,
+                                                   fabs(contact->restitution - cell->restitution));
+                }
+            }
+            trace_reading_clear(&reading);
+        }
+        free(force.at);
+    }
+    const double n = (double)trials, figures = (double)score.figures;
+    score.covered /= figures;
+    score.covered_all /= n;
+    score.below /= n;
+    score.above /= n;
+    score.bias = error / figures;
+    score.rms = sqrt(square / figures);
+    score.stated = sqrt(stated / figures);
+    return score;
+}
