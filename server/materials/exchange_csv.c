@@ -294,6 +294,7 @@ Status exchange_read_csv(const char *text, size_t size, Exchange *exchange, Prob
     Status status = STATUS_OK;
     exchange->import.revision_name = exchange->import.measurement_name = "number";
     const bool goes_on = read_header(&table);
+    exchange->import.is_partial = table.lacks_name || table.lacks_source || table.lacks_restitution;
     while (goes_on && status == STATUS_OK && csv_scan_next(&table.scan))
         status = read_row(&table, exchange);
     if (table.scan.is_failed && table.scan.count >= CSV_CELLS_MOST)

@@ -15,7 +15,7 @@ enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 static Status load_revision(Database *database, const char *slug, uint64_t number,
                             MaterialRevision *revision, Problem *problem) {
     static const char sql[] =
-        "SELECT r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
+        "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
         "WHERE m.slug = :slug AND r.revision = :number";
     return import_load(database, sql, slug, number, material_revision_columns, revision, problem);
 }
@@ -24,7 +24,8 @@ static void compare_revision(const Walk *walk, const ImportRevision *ours,
                              const MaterialRevision *there, Group *group) {
     const ImportMark *mark = &ours->mark;
     const size_t faults = walk->faults->count;
-    (void)walk->import->says_same(&ours->said, there, mark->place, walk->faults);
+    if (!walk->import->is_partial)
+        (void)walk->import->says_same(&ours->said, there, mark->place, walk->faults);
     const ImportOrigin is = {ours->said.author, ours->said.comment, ours->said.created_unix_ms},
                        was = {there->author, there->comment, there->created_unix_ms};
     import_compare_origin(walk, mark, "revision", &is, &was);

@@ -40,8 +40,9 @@ typedef struct MaterialImport {
     ImportMeasurement *measurements;
     size_t measurement_count;
     const char *revision_name, *measurement_name; // of the number below a row's place
-    const char *who;                              // imports; NULL: the local user
-    bool may_all; // bring what is by others, and reviews, which else is STATUS_FORBIDDEN
+    bool is_partial; // columns that it needs are missing, and told: what is there is not compared
+    const char *who; // imports; NULL: the local user
+    bool may_all;    // bring what is by others, and reviews, which else is STATUS_FORBIDDEN
     int64_t now_unix_ms;
     // Whether both say the same of the material. What `ours` says otherwise is told below `place`;
     // NULL: nothing is told.
