@@ -166,8 +166,8 @@ static uint64_t number_of(const ExchangeRow *row) {
     return row->number != COUNT_ABSENT ? row->number : 0;
 }
 
-static Status take_revision(MaterialImport *import, ImportRevision *revision, char *slug,
-                            ExchangeRow *row, size_t faults, Problem *problem) {
+static Status take_revision(ImportRevision *revision, char *slug, ExchangeRow *row, size_t faults,
+                            Problem *problem) {
     ImportMark *mark = &revision->mark;
     MaterialRevision *said = &revision->said;
     said->slug = slug;
@@ -180,14 +180,13 @@ static Status take_revision(MaterialImport *import, ImportRevision *revision, ch
     said->comment = take_text(&row->comment);
     said->material = row->material;
     memset(&row->material, 0, sizeof row->material);
-    import->revision_count++;
     const bool is_taken = take_reviews(revision, &row->reviews, problem);
     mark->is_faulty = problem->count > faults;
     return is_taken ? catalogue_write_lists(said, problem) : no_memory(problem);
 }
 
-static Status take_measurement(MaterialImport *import, ImportMeasurement *measurement, char *slug,
-                               ExchangeRow *row, size_t faults, Problem *problem) {
+static Status take_measurement(ImportMeasurement *measurement, char *slug, ExchangeRow *row,
+                               size_t faults, Problem *problem) {
     ImportMark *mark = &measurement->mark;
     MaterialMeasurement *made = &measurement->made;
     char test[POINTER_SIZE];
@@ -200,7 +199,6 @@ static Status take_measurement(MaterialImport *import, ImportMeasurement *measur
     mark->has_created = mark->has_created && made->created_unix_ms > 0;
     made->author = take_name(&row->author);
     made->comment = take_text(&row->comment);
-    import->measurement_count++;
     mark->is_faulty = problem->count > faults;
     if (mark->is_faulty)
         return STATUS_OK;
@@ -210,53 +208,102 @@ static Status take_measurement(MaterialImport *import, ImportMeasurement *measur
     return made->document != NULL ? STATUS_OK : no_memory(problem);
 }
 
+// Room for one more of a kind, all zero.
+static void *add(Exchange *exchange, ExchangeKind kind) {
+    MaterialImport *import = &exchange->import;
+    const bool is_revision = kind == EXCHANGE_REVISION;
+    const size_t size = is_revision ? sizeof *import->revisions : sizeof *import->measurements;
+    size_t *room = is_revision ? &exchange->revision_room : &exchange->measurement_room,
+           *count = is_revision ? &import->revision_count : &import->measurement_count;
+    void *at = is_revision ? (void *)import->revisions : (void *)import->measurements;
+    if (!grow(&at, room, *count, size))
+        return NULL;
+    if (is_revision)
+        import->revisions = at;
+    else
+        import->measurements = at;
+    return memset((char *)at + (*count)++ * size, 0, size);
+}
+
 static Status take(Exchange *exchange, char *slug, ExchangeKind kind, ExchangeRow *row,
                    const char *place, size_t faults, Problem *problem) {
-    MaterialImport *import = &exchange->import;
+    const MaterialImport *import = &exchange->import;
     const size_t order = import->revision_count + import->measurement_count;
-    void *revisions = import->revisions, *measurements = import->measurements;
-    const bool has_room = kind == EXCHANGE_REVISION
-                              ? grow(&revisions, &exchange->revision_room, import->revision_count,
-                                     sizeof *import->revisions)
-                              : grow(&measurements, &exchange->measurement_room,
-                                     import->measurement_count, sizeof *import->measurements);
-    import->revisions = revisions;
-    import->measurements = measurements;
-    if (!has_room || slug == NULL) {
+    void *added = add(exchange, kind);
+    if (added == NULL || slug == NULL) {
         free(slug);
         return no_memory(problem);
     }
-    if (kind == EXCHANGE_MEASUREMENT) {
-        ImportMeasurement *measurement = &import->measurements[import->measurement_count];
-        *measurement = (ImportMeasurement){.made = {0}};
-        mark_row(&measurement->mark, row, place, import->measurement_name, order, problem);
-        return take_measurement(import, measurement, slug, row, faults, problem);
+    if (kind == EXCHANGE_REVISION) {
+        mark_row(&((ImportRevision *)added)->mark, row, place, import->revision_name, order,
+                 problem);
+        return take_revision(added, slug, row, faults, problem);
     }
-    ImportRevision *revision = &import->revisions[import->revision_count];
-    *revision = (ImportRevision){.reviews = NULL};
-    mark_row(&revision->mark, row, place, import->revision_name, order, problem);
-    return take_revision(import, revision, slug, row, faults, problem);
+    mark_row(&((ImportMeasurement *)added)->mark, row, place, import->measurement_name, order,
+             problem);
+    return take_measurement(added, slug, row, faults, problem);
+}
+
+// Of which material it is cannot be known: it is judged and given up.
+static Status pass(const MaterialImport *import, ExchangeKind kind, ExchangeRow *row,
+                   const char *place, size_t faults, Problem *problem) {
+    ImportRevision revision = {.reviews = NULL};
+    ImportMeasurement measurement = {.made = {0}};
+    Status status;
+    if (kind == EXCHANGE_REVISION) {
+        mark_row(&revision.mark, row, place, import->revision_name, 0, problem);
+        status = take_revision(&revision, NULL, row, faults, problem);
+    } else {
+        mark_row(&measurement.mark, row, place, import->measurement_name, 0, problem);
+        status = take_measurement(&measurement, NULL, row, faults, problem);
+    }
+    import_revision_clear(&revision);
+    import_measurement_clear(&measurement);
+    return status;
+}
+
+Status exchange_refuse_many(Problem *problem) {
+    return problem_set(problem, STATUS_LIMIT,
+                       "there are more than %d revisions and measurements; bring them in several "
+                       "files",
+                       EXCHANGE_ROWS_MOST);
+}
+
+static bool is_full(const Exchange *exchange) {
+    return exchange->import.revision_count + exchange->import.measurement_count >=
+           EXCHANGE_ROWS_MOST;
 }
 
 Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, ExchangeRow *row,
                      const char *place, const char *slug_place, size_t faults, Problem *problem) {
-    const MaterialImport *import = &exchange->import;
+    const bool is_known = slug_check(slug != NULL ? slug : "", slug_place, problem) == STATUS_OK;
     Status status;
-    if (slug_check(slug != NULL ? slug : "", slug_place, problem) != STATUS_OK)
-        slug = NULL;
-    if (import->revision_count + import->measurement_count == EXCHANGE_ROWS_MOST)
-        status = problem_set(problem, STATUS_LIMIT,
-                             "there are more than %d revisions and measurements; bring them in "
-                             "several files",
-                             EXCHANGE_ROWS_MOST);
-    else if (slug == NULL && kind == EXCHANGE_REVISION)
-        status = material_check(&row->material, place, problem) == STATUS_NO_MEMORY
-                     ? STATUS_NO_MEMORY
-                     : STATUS_OK;
-    else if (slug == NULL)
-        status = STATUS_OK;
-    else
+    if (is_full(exchange))
+        status = exchange_refuse_many(problem);
+    else if (is_known)
         status = take(exchange, strdup(slug), kind, row, place, faults, problem);
+    else
+        status = pass(&exchange->import, kind, row, place, faults, problem);
     fields_clear(exchange_row_fields, row);
     return status;
+}
+
+Status exchange_drift(Exchange *exchange, const char *slug, const char *place, Problem *problem) {
+    if (is_full(exchange))
+        return exchange_refuse_many(problem);
+    if (slug == NULL || !material_slug_is_good(slug))
+        return STATUS_OK;
+    ImportRevision *revision = add(exchange, EXCHANGE_REVISION);
+    ImportMeasurement *measurement = add(exchange, EXCHANGE_MEASUREMENT);
+    if (revision != NULL)
+        revision->said.slug = strdup(slug);
+    if (measurement != NULL)
+        measurement->made.slug = strdup(slug);
+    if (revision == NULL || measurement == NULL || revision->said.slug == NULL ||
+        measurement->made.slug == NULL)
+        return no_memory(problem);
+    revision->mark.is_faulty = revision->mark.is_adrift = true;
+    text_fit(revision->mark.place, sizeof revision->mark.place, place);
+    measurement->mark = revision->mark;
+    return STATUS_OK;
 }

@@ -9,7 +9,7 @@
 #include "core/scene/material.h"
 #include "server/store/material_import.h"
 
-enum { EXCHANGE_VERSION = 1, EXCHANGE_ROWS_MOST = 200000 };
+enum { EXCHANGE_VERSION = 1, EXCHANGE_ROWS_MOST = 100000 };
 extern const char exchange_format[]; // "impactd-materials"
 
 typedef enum ExchangeKind { EXCHANGE_REVISION, EXCHANGE_MEASUREMENT } ExchangeKind;
@@ -50,10 +50,16 @@ typedef struct Exchange {
 void exchange_clear(Exchange *exchange);
 
 // Takes over what a row says, which is left clear. Adds the faults that are found below `place`;
-// `faults` is how many there were before the row was read: with more the row is faulty. A row of a
-// slug that is none is told at `slug_place` and given up. STATUS_NO_MEMORY, STATUS_LIMIT.
+// `faults` is how many there were before the row was read: with more the row is faulty. A slug that
+// is none is told at `slug_place`, and the row given up. STATUS_NO_MEMORY, STATUS_LIMIT.
 Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, ExchangeRow *row,
                      const char *place, const char *slug_place, size_t faults, Problem *problem);
+
+// A row of that slug of which nothing more is known: other numbers need not continue then.
+Status exchange_drift(Exchange *exchange, const char *slug, const char *place, Problem *problem);
+
+// STATUS_LIMIT: more than EXCHANGE_ROWS_MOST rows.
+Status exchange_refuse_many(Problem *problem);
 
 // Sorts what was taken, tells what cannot stand beside each other, and imports it for `who` (NULL:
 // the local user): store_material_import.

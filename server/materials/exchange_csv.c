@@ -276,6 +276,8 @@ static Status read_row(Table *table, Exchange *exchange) {
     Status status = read_cells(table, &row);
     // What kind of row it is has to be known, for the rest to be judged.
     if (status != STATUS_OK || problem_concerns(table->problem, kind)) {
+        if (status == STATUS_OK)
+            status = exchange_drift(exchange, row.slug, place, table->problem);
         fields_clear(exchange_row_fields, &row);
         return status;
     }
@@ -296,7 +298,8 @@ Status exchange_read_csv(const char *text, size_t size, Exchange *exchange, Prob
     const bool goes_on = read_header(&table);
     exchange->import.is_partial = table.lacks_name || table.lacks_source || table.lacks_restitution;
     while (goes_on && status == STATUS_OK && csv_scan_next(&table.scan))
-        status = read_row(&table, exchange);
+        status = table.scan.row > EXCHANGE_ROWS_MOST + 1 ? exchange_refuse_many(problem)
+                                                         : read_row(&table, exchange);
     if (table.scan.is_failed && table.scan.count >= CSV_CELLS_MOST)
         refuse(&table, "", "there are more than 1000 cells in a row");
     else if (table.scan.is_failed || status == STATUS_NO_MEMORY)

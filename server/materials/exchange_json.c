@@ -122,6 +122,7 @@ Status exchange_read_json(const char *text, size_t size, Exchange *exchange, Pro
     const bool has_list = scan_list(text, size, "materials", &list);
     TRY(read_envelope(text, size, &list, has_list, problem));
     for (size_t i = 0; has_list && scan_element(&list); i++)
-        TRY(read_one(exchange, text, size, &list, i, problem));
+        TRY(i >= EXCHANGE_ROWS_MOST ? exchange_refuse_many(problem)
+                                    : read_one(exchange, text, size, &list, i, problem));
     return problem->count > 0 ? STATUS_INVALID : STATUS_OK;
 }

@@ -46,11 +46,15 @@ static void tell(const Field *field, const Bytes *ours, const Bytes *there,
         fault.value[0] = '\0';
     text_fit(fault.unit, sizeof fault.unit, field->unit != NULL ? field->unit : "");
     char detail[2 * sizeof fault.detail];
-    snprintf(detail, sizeof detail,
-             "is not what %.64s@%llu says, which is there%s%.60s: revisions never change; bring it "
-             "under the next number",
-             revision->slug != NULL ? revision->slug : "the revision",
-             (unsigned long long)revision->revision, is[0] != '\0' ? ", " : "", is);
+    snprintf(
+        detail, sizeof detail,
+        "%.64s@%llu is there and says %s%.60s; revisions never change: bring it under the next "
+        "number",
+        revision->slug, (unsigned long long)revision->revision,
+        is[0] != '\0'                        ? ""
+        : is_list(field) && there->count > 2 ? "something else"
+                                             : "nothing here",
+        is);
     text_fit(fault.detail, sizeof fault.detail, detail);
     (void)problem_put(problem, STATUS_INVALID, &fault);
 }

@@ -54,7 +54,8 @@ static Status judge_reverts(const Walk *walk, Database *database, const ImportRe
     for (size_t i = 0; said == NULL && i < group->revision_count; i++)
         if (group->revisions[i].said.revision == again && !group->revisions[i].mark.is_faulty)
             said = &group->revisions[i].said;
-    if (said != NULL && !walk->import->says_same(&ours->said, said, "", NULL))
+    if (said != NULL && !ours->mark.is_faulty &&
+        !walk->import->says_same(&ours->said, said, "", NULL))
         (void)import_fault(
             walk, ours->mark.place, "reverts",
             "revision %llu says something else; a revision that reverts says the same",
@@ -67,7 +68,7 @@ static void judge_measurements(const Walk *walk, const ImportRevision *ours, con
     const Reals *named = &ours->said.material.measurements;
     char list[POINTER_SIZE], place[POINTER_SIZE];
     pointer_join(list, sizeof list, ours->mark.place, "measurements");
-    for (size_t i = 0; i < named->count && !group->is_adrift; i++) {
+    for (size_t i = 0; i < named->count && !group->measurements_drift; i++) {
         if (named->at[i] <= (double)group->last_measurement)
             continue;
         pointer_index(place, sizeof place, list, i);
@@ -99,8 +100,6 @@ static Status import_next(Walk *walk, Database *database, const ImportRevision *
                           Problem *problem) {
     MaterialRevision newest = {0};
     Status status = STATUS_OK;
-    if (ours->mark.is_faulty)
-        return STATUS_OK;
     if (group->key.latest > 0)
         status = load_revision(database, group->slug, group->key.latest, &newest, problem);
     if (status == STATUS_OK && newest.revision > 0 &&
@@ -129,23 +128,24 @@ static Status import_known(Walk *walk, Database *database, const ImportRevision 
 static Status import_revisions(Walk *walk, Database *database, Group *group, Problem *problem) {
     const char *name = walk->import->revision_name;
     uint64_t before = 0, last = group->key.latest;
-    bool is_adrift = false;
+    for (size_t i = 0; i < group->revision_count; i++)
+        group->revisions_drift = group->revisions_drift || group->revisions[i].mark.is_adrift;
     for (size_t i = 0; i < group->revision_count; i++) {
         const ImportRevision *ours = &group->revisions[i];
         const uint64_t number = ours->said.revision;
-        is_adrift = is_adrift || ours->mark.is_adrift;
-        if (is_adrift)
+        if (ours->mark.is_adrift)
             continue;
         if (number == 0) {
             TRY(import_next(walk, database, ours, group, problem));
             continue;
         }
-        if (import_judge_number(walk, &ours->mark, name, number, before, &last) != STATUS_OK)
+        if (import_judge_number(walk, &ours->mark, name, number, before, group->revisions_drift,
+                                &last) != STATUS_OK)
             continue;
         before = number;
         if (number <= group->key.latest)
             TRY(import_known(walk, database, ours, group, problem));
-        else if (!ours->mark.is_faulty)
+        else
             TRY(add_revision(walk, database, ours, number, group, problem));
     }
     return STATUS_OK;

@@ -93,6 +93,8 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
     for (size_t i = 0; i < ours->review_count; i++) {
         const ImportReview *review = &ours->reviews[i];
         pointer_index(place, sizeof place, list, i);
+        if (problem_concerns(walk->faults, place))
+            continue; // it could not be read
         if (i < there->count) {
             if (is_review(review, &there->at[i]))
                 group->reviews_done.same++;
@@ -119,7 +121,7 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
 Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours, uint64_t number,
                       const char *author, Group *group, Problem *problem) {
     Reviews there = {0};
-    if (ours->review_count == 0 || ours->mark.is_faulty)
+    if (ours->review_count == 0)
         return STATUS_OK;
     Status status = STATUS_OK;
     if (number <= group->key.latest)

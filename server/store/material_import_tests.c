@@ -42,21 +42,24 @@ Status import_measurements(Walk *walk, Database *database, Group *group, Problem
     const char *name = walk->import->measurement_name;
     uint64_t before = 0;
     group->last_measurement = group->key.measurements;
+    for (size_t i = 0; i < group->measurement_count; i++)
+        group->measurements_drift =
+            group->measurements_drift || group->measurements[i].mark.is_adrift;
     for (size_t i = 0; i < group->measurement_count; i++) {
         const ImportMeasurement *ours = &group->measurements[i];
         const uint64_t number = ours->made.measurement;
-        group->is_adrift = group->is_adrift || ours->mark.is_adrift;
-        if (group->is_adrift)
+        if (ours->mark.is_adrift)
             continue;
         if (number == 0)
             group->last_measurement++;
         else if (import_judge_number(walk, &ours->mark, name, number, before,
+                                     group->measurements_drift,
                                      &group->last_measurement) != STATUS_OK)
             continue;
         before = number;
         if (number > 0 && number <= group->key.measurements)
             TRY(compare_measurement(walk, database, ours, group, problem));
-        else if (!ours->mark.is_faulty)
+        else
             TRY(add_measurement(walk, database, ours, group, problem));
     }
     return STATUS_OK;

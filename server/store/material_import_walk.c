@@ -60,7 +60,7 @@ void import_compare_origin(const Walk *walk, const ImportMark *mark, const char 
 }
 
 Status import_judge_number(const Walk *walk, const ImportMark *mark, const char *name,
-                           uint64_t number, uint64_t before, uint64_t *last) {
+                           uint64_t number, uint64_t before, bool drifts, uint64_t *last) {
     if (number == before)
         return import_fault(walk, mark->place, name, "stands in the file twice, %llu",
                             (unsigned long long)number);
@@ -68,7 +68,7 @@ Status import_judge_number(const Walk *walk, const ImportMark *mark, const char 
         return STATUS_OK;
     const uint64_t next = *last + 1;
     *last = number;
-    if (number == next)
+    if (number == next || drifts)
         return STATUS_OK;
     return import_fault(walk, mark->place, name,
                         "must be %llu, the next, is %llu: numbers continue without a gap",

@@ -24,8 +24,8 @@ typedef struct Group {
     size_t revision_count;
     const ImportMeasurement *measurements;
     size_t measurement_count;
-    uint64_t last_measurement; // there, or in the file before
-    bool is_adrift;            // a measurement has a number that could not be read
+    uint64_t last_measurement;                // there, or in the file before
+    bool revisions_drift, measurements_drift; // one has a number that could not be read
     ImportCount revisions_done, measurements_done, reviews_done;
 } Group;
 
@@ -45,9 +45,10 @@ typedef struct ImportOrigin {
 } ImportOrigin;
 void import_compare_origin(const Walk *walk, const ImportMark *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there);
-// A number that is not there must be the one behind `last`, which it becomes.
+// A number that is not there must be the one behind `last`, which it becomes; where numbers drift
+// it may be any.
 Status import_judge_number(const Walk *walk, const ImportMark *mark, const char *name,
-                           uint64_t number, uint64_t before, uint64_t *last);
+                           uint64_t number, uint64_t before, bool drifts, uint64_t *last);
 
 typedef struct ImportKey {
     char *slug;
