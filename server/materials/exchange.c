@@ -50,7 +50,8 @@ const Field exchange_measurement_fields[] = {
 };
 
 // What is not the material's own and not its number.
-static const Field mark_fields[] = {REVERTS, AUTHOR, COMMENT, CREATED, REVIEWS, FIELD_END};
+static const Field mark_fields[] = {AUTHOR, COMMENT, CREATED, FIELD_END};
+static const Field revision_mark_fields[] = {REVERTS, REVIEWS, FIELD_END};
 
 const Field exchange_row_fields[] = {
     FIELD_CHOICE(ExchangeRow, row, kind_names, EXCHANGE_REVISION, "what stands in the row"),
@@ -172,6 +173,7 @@ static Status take_revision(ImportRevision *revision, char *slug, ExchangeRow *r
     MaterialRevision *said = &revision->said;
     said->slug = slug;
     (void)material_check(&row->material, mark->place, problem);
+    (void)fields_check(revision_mark_fields, row, mark->place, problem);
     said->revision = number_of(row);
     said->reverts = row->reverts != COUNT_ABSENT ? row->reverts : 0;
     said->created_unix_ms = read_time(row->created, mark->place, problem);

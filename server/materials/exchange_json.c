@@ -112,17 +112,28 @@ static Status read_one(Exchange *exchange, const char *text, size_t size, const 
     return status;
 }
 
-Status exchange_read_json(const char *text, size_t size, Exchange *exchange, Problem *problem) {
+static Status read_all(const char *text, size_t size, Exchange *exchange, Problem *problem) {
     ScanList list;
-    const size_t mark = scan_mark(text, size);
-    text += mark;
-    size -= mark;
-    exchange->import.revision_name = "revision";
-    exchange->import.measurement_name = "measurement";
     const bool has_list = scan_list(text, size, "materials", &list);
-    TRY(read_envelope(text, size, &list, has_list, problem));
+    // Of a document that is cut off the last material tells where.
+    const bool is_whole = !has_list || list.end < size;
+    if (is_whole)
+        TRY(read_envelope(text, size, &list, has_list, problem));
     for (size_t i = 0; has_list && scan_element(&list); i++)
         TRY(i >= EXCHANGE_ROWS_MOST ? exchange_refuse_many(problem)
                                     : read_one(exchange, text, size, &list, i, problem));
+    if (!is_whole)
+        TRY(read_envelope(text, size, &list, has_list, problem));
     return problem->count > 0 ? STATUS_INVALID : STATUS_OK;
+}
+
+Status exchange_read_json(const char *text, size_t size, Exchange *exchange, Problem *problem) {
+    const size_t mark = scan_mark(text, size);
+    exchange->import.revision_name = "revision";
+    exchange->import.measurement_name = "measurement";
+    const Status status = read_all(text + mark, size - mark, exchange, problem);
+    // Whatever was found before it was met: the text is no document.
+    if (status == STATUS_UNREADABLE)
+        problem->status = status;
+    return status;
 }
