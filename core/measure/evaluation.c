@@ -8,7 +8,7 @@
 
 const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
 const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
-const char *const trend_verdict_names[] = {"constant", "not_constant", NULL};
+const char *const trend_verdict_names[] = {"constant", "not_constant", "undecided", NULL};
 
 // clang-format off
 static const Field row_fields[] = {
@@ -41,6 +41,8 @@ static const Field trend_fields[] = {
     FIELD_COUNT(Trend, count, NULL, AT_LEAST(0), OPTIONAL, "readings with a speed"),
     FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
     FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "which the line goes through"),
+    FIELD_REAL(Trend, mean_value, NULL, ANY, OPTIONAL, "there"),
     FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "per m/s, by least squares"),
     FIELD_REAL(Trend, standard_error, NULL, ANY, OPTIONAL, "of the slope"),
     FIELD_REAL(Trend, low, NULL, ANY, OPTIONAL, "95 % interval of the slope"),
@@ -49,15 +51,17 @@ static const Field trend_fields[] = {
     FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "chance of at least such a slope where there is none"),
     FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "that the line makes from the slowest to the fastest"),
     FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "the largest such change that the data do not rule out, 95 %"),
-    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "whether a slope is shown, p < 0.05; null: cannot be told"),
+    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "not_constant: a slope is shown, p < 0.05; constant: none is, and a change of 20 % would have been seen; undecided: it would not; null: no test can be made"),
     FIELD_TEXT(Trend, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
     FIELD_END
 };
 
 static const Field quantity_fields[] = {
     FIELD_COUNT(Quantity, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
-    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count"),
+    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
+    FIELD_REAL(Quantity, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
     FIELD_REAL(Quantity, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
+    FIELD_REAL(Quantity, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
     FIELD_REAL(Quantity, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
     FIELD_REAL(Quantity, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
     FIELD_REAL(Quantity, high, NULL, ANY, OPTIONAL, "likewise"),
@@ -134,7 +138,7 @@ static Status make_restitution(Reading *readings, Evaluation *evaluation, Proble
                                           .uncertainty = rows[i].restitution_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "restitution", "1", &evaluation->restitution, problem));
+    TRY(quantity_make(readings, count, "restitution", "", &evaluation->restitution, problem));
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].restitution_score = readings[i].score;
         rows[readings[i].row].restitution_is_outlier = readings[i].is_outlier;
@@ -151,7 +155,7 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
                                           .uncertainty = rows[i].contact_time_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "contact time", "s", &evaluation->contact_time, problem));
+    TRY(quantity_make(readings, count, "contact time", " s", &evaluation->contact_time, problem));
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].contact_time_score = readings[i].score;
         rows[readings[i].row].contact_time_is_outlier = readings[i].is_outlier;

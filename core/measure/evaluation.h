@@ -52,28 +52,33 @@ typedef struct EvaluationRows {
     size_t count;
 } EvaluationRows;
 
-typedef enum TrendVerdict { TREND_CONSTANT, TREND_NOT_CONSTANT } TrendVerdict;
-extern const char *const trend_verdict_names[]; // "constant", "not_constant"; NULL-terminated
+// Constant: no slope is shown, and a change of more than TREND_MATTERS of the mean would have been.
+typedef enum TrendVerdict { TREND_CONSTANT, TREND_NOT_CONSTANT, TREND_UNDECIDED } TrendVerdict;
+extern const char *const trend_verdict_names[]; // "constant" ...; NULL-terminated
+#define TREND_MATTERS 0.2
 
 // A straight line over approach speed by least squares: whether "constant over speed" holds.
 typedef struct Trend {
     uint64_t count;                          // of readings with a speed
     double least_speed, most_speed;          // [m/s]
+    double mean_speed, mean_value;           // which the line goes through
     double slope, standard_error, low, high; // per m/s; 95 %
     double t, p;                             // of no slope at all
     double change;                           // that the line makes over the measured speeds
     double missed_change; // the largest over them that the data do not rule out, 95 %
-    int verdict;          // TrendVerdict; CHOICE_ABSENT: cannot be told
+    int verdict;          // TrendVerdict; CHOICE_ABSENT: no test can be made
     char *detail;         // the verdict for people
 } Trend;
 
 // e or T_c over all readings that count.
 typedef struct Quantity {
     uint64_t count;
-    double mean;
-    double deviation;      // standard deviation of the readings
-    double standard_error; // of the mean
-    double low, high;      // 95 % interval of the mean
+    double mean;            // weighted where the readings state their uncertainties
+    double unweighted_mean; // of the readings as they are
+    double deviation;       // standard deviation of the readings
+    double scatter;         // of them beyond their stated uncertainties; NAN: not weighted
+    double standard_error;  // of the mean
+    double low, high;       // 95 % interval of the mean
     double minimum, median, maximum;
     uint64_t outliers;
     double mean_without_outliers; // NAN: there are none

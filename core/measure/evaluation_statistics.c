@@ -1,10 +1,17 @@
-// Mean and deviation are of two passes, the interval is Student's. Outliers are told by the
-// distance from the median over the median of all such distances, which a few wild readings do not
-// move, in units that are standard deviations of normal readings (Iglewicz and Hoaglin 1993). Their
-// common cut of 3.5 would mark every fifth sample of three to ten good readings, hence the table.
+// Where all readings state their uncertainty u and at least four do, each weighs 1 / (u^2 + tau^2).
+// tau is the scatter that the uncertainties do not explain: with it the weighted squares of the
+// distances from the mean come to n - 1 (Paule and Mandel 1982); 0 where they come to less. The
+// error of the mean is then scaled by those squares and takes Student's t (Hartung and Knapp 2001),
+// so that uncertainties that are wrong in size, or beside the point, do little harm. Without that a
+// ruler's reading of a low drop, ten times as uncertain as that of a high one, would count as much.
 //
-// The trend is a straight line by least squares. Where it is shown, outliers are told from the
-// line.
+// Outliers are told by the distance from the median over the median of all such distances, which a
+// few wild readings do not move, in units that are standard deviations of normal readings (Iglewicz
+// and Hoaglin 1993). Their common cut of 3.5 would mark every fifth sample of three to ten good
+// readings, hence the table.
+//
+// The trend is a straight line by least squares, with the same weights. Where it is shown, outliers
+// are told from the line.
 #include "core/measure/evaluation_statistics.h"
 
 #include <stdlib.h>
@@ -15,7 +22,9 @@
 static const double significance = 0.05;
 static const double speeds_alike = 0.1;  // of their mean: a span that shows no trend
 static const double rounding = 1e-12;    // of a mean: no spread at all
+static const double resolved = 1e-6;     // of a value: less is no outlier and no trend
 static const double implausible = 0.001; // the chance of so little spread
+enum { WEIGHTED_LEAST = 4, HALVINGS = 100 };
 
 // 95 % quantiles of the largest score among so many normal readings, of 30,000 to 400,000 samples.
 static const struct {
@@ -53,45 +62,107 @@ static double mean_of(const Reading *readings, size_t count, bool with_outliers)
     double sum = 0, rest = 0, n = 0;
     for (size_t i = 0; i < count; i++)
         if (with_outliers || !readings[i].is_outlier) {
-            sum += readings[i].value;
-            n++;
+            sum += readings[i].weight * readings[i].value;
+            n += readings[i].weight;
         }
     for (size_t i = 0; i < count; i++)
         if (with_outliers || !readings[i].is_outlier)
-            rest += readings[i].value - sum / n;
+            rest += readings[i].weight * (readings[i].value - sum / n);
     return sum / n + rest / n;
 }
 
-// The root of the mean square of the stated uncertainties; NAN unless all have one above 0.
-static double stated(const Reading *readings, size_t count) {
+// The weighted squares of the distances from the mean.
+static double squares_of(const Reading *readings, size_t count, double mean) {
+    double squares = 0;
+    for (size_t i = 0; i < count; i++)
+        squares += readings[i].weight * (readings[i].value - mean) * (readings[i].value - mean);
+    return squares;
+}
+
+static double weigh(Reading *readings, size_t count, double scatter) {
+    for (size_t i = 0; i < count; i++)
+        readings[i].weight =
+            1 / (readings[i].uncertainty * readings[i].uncertainty + scatter * scatter);
+    return squares_of(readings, count, mean_of(readings, count, true));
+}
+
+// Fills the weights where there are any.
+static void make_weights(Reading *readings, size_t count, Quantity *quantity) {
+    bool is_weighted = count >= WEIGHTED_LEAST;
+    for (size_t i = 0; i < count; i++)
+        is_weighted = is_weighted && readings[i].uncertainty > 0;
+    if (!is_weighted)
+        return;
+    double least = 0, most = 2 * sqrt((double)count) * quantity->deviation;
+    const double freedom = (double)(count - 1);
+    if (weigh(readings, count, 0) <= freedom)
+        most = 0;
+    for (int i = 0; i < HALVINGS && most > 0; i++) {
+        const double middle = (least + most) / 2;
+        if (weigh(readings, count, middle) > freedom)
+            least = middle;
+        else
+            most = middle;
+    }
+    quantity->scatter = most;
+    (void)weigh(readings, count, most);
+}
+
+// The squares that are left over those that the stated uncertainties would leave; NAN unless all
+// are stated.
+static double excess(const Reading *readings, size_t count, double mean) {
     double squares = 0;
     for (size_t i = 0; i < count; i++) {
         if (!(readings[i].uncertainty > 0))
             return (double)NAN;
-        squares += readings[i].uncertainty * readings[i].uncertainty;
+        const double off = (readings[i].value - mean) / readings[i].uncertainty;
+        squares += off * off;
     }
-    return sqrt(squares / (double)count);
+    return squares / (double)(count - 1);
 }
 
-// Whether normal readings of that uncertainty have so little spread at most once in a thousand
-// times, by Chernoff's bound of chi square: P(s^2 <= x u^2) <= (x exp(1 - x))^(n / 2).
-static bool is_too_small(double deviation, double uncertainty, size_t freedom) {
-    const double x = deviation * deviation / (uncertainty * uncertainty);
+// Whether normal readings have so little spread at most once in a thousand times, by Chernoff's
+// bound of chi square: P(s^2 <= x u^2) <= (x exp(1 - x))^(n / 2).
+static bool is_too_small(double x, size_t freedom) {
     return x < 1 && (double)freedom / 2 * (log(x) + 1 - x) < log(implausible);
 }
 
+// Of the mean, by the stated uncertainties alone; NAN unless all are stated.
+static double stated_error(const Reading *readings, size_t count) {
+    double squares = 0, sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double part = readings[i].weight * readings[i].uncertainty;
+        squares += part * part;
+        sum += readings[i].weight;
+    }
+    return sqrt(squares) / sum > 0 ? sqrt(squares) / sum : (double)NAN;
+}
+
 static bool make_interval(const Reading *readings, size_t count, Quantity *quantity) {
-    const double n = (double)count, u = stated(readings, count);
-    double t = student_quantile(EVALUATION_CONFIDENCE, 0);
-    const bool is_alike = count > 1 && !(quantity->deviation > rounding * fabs(quantity->mean));
+    const double stated = stated_error(readings, count);
+    const double mean = quantity->mean;
+    double t = student_quantile(EVALUATION_CONFIDENCE, 0), sum = 0;
+    bool has_spread = count > 1 && quantity->deviation > rounding * fabs(mean);
+    if (has_spread && stated > 0)
+        has_spread = !is_too_small(excess(readings, count, mean), count - 1);
     bool is_said;
-    if (count > 1 && !is_alike && !(u > 0 && is_too_small(quantity->deviation, u, count - 1))) {
+    if (has_spread) {
         t = student_quantile(EVALUATION_CONFIDENCE, count - 1);
-        quantity->standard_error = quantity->deviation / sqrt(n);
-        is_said = sentence(&quantity->why,
-                           "mean +- %.4g standard errors, Student's t for %zu readings", t, count);
-    } else if (u > 0) {
-        quantity->standard_error = u / sqrt(n);
+        for (size_t i = 0; i < count; i++)
+            sum += readings[i].weight;
+        quantity->standard_error =
+            sqrt(squares_of(readings, count, mean) / (double)(count - 1) / sum);
+        is_said =
+            isnan(quantity->scatter)
+                ? sentence(&quantity->why,
+                           "mean +- %.4g standard errors, Student's t for %zu readings", t, count)
+                : sentence(&quantity->why,
+                           "mean weighted by the stated uncertainties and a scatter of %.3g "
+                           "beyond them, +- %.4g standard errors, Student's t for %zu "
+                           "readings",
+                           quantity->scatter, t, count);
+    } else if (stated > 0) {
+        quantity->standard_error = stated;
         is_said =
             count == 1
                 ? sentence(&quantity->why,
@@ -107,8 +178,8 @@ static bool make_interval(const Reading *readings, size_t count, Quantity *quant
                                    : "all readings are the same, to what the instrument resolves, "
                                      "whose uncertainty is not stated: no interval");
     }
-    quantity->low = quantity->mean - t * quantity->standard_error;
-    quantity->high = quantity->mean + t * quantity->standard_error;
+    quantity->low = mean - t * quantity->standard_error;
+    quantity->high = mean + t * quantity->standard_error;
     return is_said;
 }
 
@@ -123,24 +194,25 @@ typedef struct Line {
 
 static Line fit_line(const Reading *readings, size_t count) {
     Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
+    double weights = 0, products = 0;
     for (size_t i = 0; i < count; i++) {
         if (isnan(readings[i].speed))
             continue;
         line.count++;
-        line.speed += readings[i].speed;
-        line.value += readings[i].value;
+        weights += readings[i].weight;
+        line.speed += readings[i].weight * readings[i].speed;
+        line.value += readings[i].weight * readings[i].value;
         line.least = fmin(line.least, readings[i].speed);
         line.most = fmax(line.most, readings[i].speed);
     }
-    line.speed /= (double)line.count;
-    line.value /= (double)line.count;
-    double products = 0;
+    line.speed /= weights;
+    line.value /= weights;
     for (size_t i = 0; i < count; i++) {
         if (isnan(readings[i].speed))
             continue;
         const double off = readings[i].speed - line.speed;
-        line.squares += off * off;
-        products += off * (readings[i].value - line.value);
+        line.squares += readings[i].weight * off * off;
+        products += readings[i].weight * off * (readings[i].value - line.value);
     }
     line.slope = line.squares > 0 ? products / line.squares : 0;
     for (size_t i = 0; i < count; i++) {
@@ -148,28 +220,33 @@ static Line fit_line(const Reading *readings, size_t count) {
             continue;
         const double off =
             readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
-        line.left += off * off;
+        line.left += readings[i].weight * off * off;
     }
+    // In units of an average weight.
+    line.left *= (double)line.count / weights;
+    line.squares *= (double)line.count / weights;
     return line;
 }
 
 static bool say_trend(const char *name, const char *unit, double mean, Trend *trend) {
-    const double percent = 100 / fabs(mean);
-    if (trend->verdict == TREND_CONSTANT)
+    const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
+    if (trend->verdict == TREND_NOT_CONSTANT)
         return sentence(&trend->detail,
-                        "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g %s per m/s, "
-                        "p = %.2g) and may be taken as constant there; a change of up to %.2g%s%s "
-                        "(%.2g %%) over these speeds would not have been seen",
-                        name, trend->least_speed, trend->most_speed, trend->slope,
-                        trend->standard_error, unit, trend->p, trend->missed_change,
-                        unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
-                        trend->missed_change * percent);
+                        "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
+                        "constant over speed, and a table over speed says more than a mean",
+                        name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
+                        fabs(trend->change) * percent, trend->least_speed, trend->most_speed,
+                        trend->p);
+    const bool is_constant = trend->verdict == TREND_CONSTANT;
     return sentence(&trend->detail,
-                    "%s %s by %.2g%s%s (%.2g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
-                    "constant over speed, and a table over speed says more than a mean",
-                    name, trend->change < 0 ? "falls" : "rises", fabs(trend->change),
-                    unit[0] == '1' ? "" : " ", unit[0] == '1' ? "" : unit,
-                    fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
+                    "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
+                    "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
+                    "been seen",
+                    name, trend->least_speed, trend->most_speed, trend->slope,
+                    trend->standard_error, unit, trend->p,
+                    is_constant ? " and may be taken as constant there;"
+                                : ", but the readings are too few or too scattered to tell:",
+                    trend->missed_change, unit, missed);
 }
 
 static bool make_trend(const Reading *readings, size_t count, const char *name, const char *unit,
@@ -192,9 +269,11 @@ static bool make_trend(const Reading *readings, size_t count, const char *name, 
                         "whether %s is constant over speed cannot be told: all readings were made "
                         "at about %.3g m/s",
                         name, line.speed);
-    const double least = rounding * fabs(quantity->mean);
+    const double least = resolved * fabs(quantity->mean);
     const size_t freedom = line.count - 2;
     const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
+    trend->mean_speed = line.speed;
+    trend->mean_value = line.value;
     trend->slope = line.slope;
     trend->standard_error = sqrt(fmax(line.left / (double)freedom, least * least) / line.squares);
     trend->low = line.slope - t * trend->standard_error;
@@ -203,7 +282,10 @@ static bool make_trend(const Reading *readings, size_t count, const char *name, 
     trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
     trend->change = line.slope * span;
     trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
-    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT : TREND_CONSTANT;
+    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
+                     : trend->missed_change <= TREND_MATTERS * fabs(quantity->mean)
+                         ? TREND_CONSTANT
+                         : TREND_UNDECIDED;
     return say_trend(name, unit, quantity->mean, trend);
 }
 
@@ -232,7 +314,7 @@ static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
     const double spread = median > rounding * fabs(middle) ? 1.482602 * median : 1.253314 * mean;
     for (size_t i = 0; i < count; i++) {
         const double own = readings[i].uncertainty > 0 ? readings[i].uncertainty : 0;
-        const double scale = fmax(fmax(spread, own), rounding * fabs(middle));
+        const double scale = fmax(fmax(spread, own), resolved * fabs(middle));
         readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
         readings[i].is_outlier = fabs(readings[i].score) > outlier_cut(count);
         quantity->outliers += readings[i].is_outlier ? 1 : 0;
@@ -249,7 +331,8 @@ static bool make_spread(const Reading *readings, size_t count, Quantity *quantit
         return false;
     for (size_t i = 0; i < count; i++) {
         sorted[i] = readings[i].value;
-        squares += (sorted[i] - quantity->mean) * (sorted[i] - quantity->mean);
+        squares +=
+            (sorted[i] - quantity->unweighted_mean) * (sorted[i] - quantity->unweighted_mean);
     }
     quantity->median = median_of(sorted, count);
     quantity->minimum = sorted[0];
@@ -260,25 +343,60 @@ static bool make_spread(const Reading *readings, size_t count, Quantity *quantit
     return true;
 }
 
+void quantity_clear(Quantity *quantity) {
+    free(quantity->why);
+    free(quantity->trend.detail);
+    *quantity = (Quantity){.why = NULL};
+}
+
 Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
                      Quantity *quantity, Problem *problem) {
     const double none = (double)NAN;
-    const Trend trend = {0,    none, none, none, none,          none, none,
-                         none, none, none, none, CHOICE_ABSENT, NULL};
-    *quantity =
-        (Quantity){count, none, none, none, none, none, none, none, none, 0, none, NULL, trend};
-    bool is_made;
-    if (count == 0) {
-        is_made = sentence(&quantity->why, "no reading that counts tells the %s", name) &&
-                  make_trend(readings, count, name, unit, quantity);
-    } else {
-        quantity->mean = mean_of(readings, count, true);
-        is_made = make_spread(readings, count, quantity) &&
-                  make_interval(readings, count, quantity) &&
-                  make_trend(readings, count, name, unit, quantity);
+    *quantity = (Quantity){
+        .count = count,
+        .mean = none,
+        .unweighted_mean = none,
+        .deviation = none,
+        .scatter = none,
+        .standard_error = none,
+        .low = none,
+        .high = none,
+        .minimum = none,
+        .median = none,
+        .maximum = none,
+        .mean_without_outliers = none,
+        .trend = {.least_speed = none,
+                  .most_speed = none,
+                  .mean_speed = none,
+                  .mean_value = none,
+                  .slope = none,
+                  .standard_error = none,
+                  .low = none,
+                  .high = none,
+                  .t = none,
+                  .p = none,
+                  .change = none,
+                  .missed_change = none,
+                  .verdict = CHOICE_ABSENT},
+    };
+    for (size_t i = 0; i < count; i++) {
+        Reading *reading = &readings[i];
+        reading->weight = 1;
+        reading->score = none;
+        if (!(reading->uncertainty > rounding * fabs(reading->value)))
+            reading->uncertainty = none;
     }
-    for (size_t i = 0; i < count; i++)
-        readings[i].score = none;
+    bool is_made = true;
+    if (count == 0) {
+        is_made = sentence(&quantity->why, "no reading that counts tells the %s", name);
+    } else {
+        quantity->unweighted_mean = mean_of(readings, count, true);
+        is_made = make_spread(readings, count, quantity);
+        make_weights(readings, count, quantity);
+        quantity->mean = mean_of(readings, count, true);
+        is_made = is_made && make_interval(readings, count, quantity);
+    }
+    is_made = is_made && make_trend(readings, count, name, unit, quantity);
     if (is_made && count > 2)
         is_made = find_outliers(readings, count, quantity);
     return is_made ? STATUS_OK

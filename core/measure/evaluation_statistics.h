@@ -9,14 +9,16 @@
 typedef struct Reading {
     double value, uncertainty, speed;
     size_t row; // of the evaluation
-    double score;
+    double weight, score;
     bool is_outlier;
 } Reading;
 
-// Fills `quantity`, which is all zero or cleared, and scores and marks the readings. `name` and
-// `unit` stand in sentences ("restitution", "1"). STATUS_NO_MEMORY.
+// Fills `quantity`, which may be uninitialised, and weighs, scores and marks the readings. `name`
+// and `unit` stand in sentences ("contact time", " s"). STATUS_NO_MEMORY.
 Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
                      Quantity *quantity, Problem *problem);
+
+void quantity_clear(Quantity *quantity);
 
 // How many robust deviations from the middle a reading may be among so many: one sample of normal
 // readings in twenty has one beyond it.

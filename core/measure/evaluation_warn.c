@@ -124,8 +124,8 @@ static Status warn_of_outlier(const EvaluationRow *row, const char *name, double
     row_pointer(row, pointer, sizeof pointer);
     return warnings_add(&evaluation->warnings, pointer,
                         "%s %.4g of %s lies %.1f robust deviations from the middle; it counts all "
-                        "the same: the mean is %.4g with and %.4g without the %llu such readings; "
-                        "one that was seen to go wrong takes \"excluded\" with the reason",
+                        "the same: the mean is %.4g with all readings and %.4g without outliers "
+                        "(%llu); one that was seen to go wrong takes \"excluded\" with the reason",
                         name, value, row->from, fabs(score), of->mean, of->mean_without_outliers,
                         (unsigned long long)of->outliers);
 }

@@ -174,13 +174,21 @@ static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
     return true;
 }
 
-// Whether `next` belongs to the contact `run`: noise that dips below the threshold, or the tensile
-// end, which is smaller and follows at once.
-static bool belongs(const TraceRun *run, const TraceRun *next) {
-    const size_t length = run->last - run->first + 1, gap = next->first - run->last - 1;
-    if ((run->peak > 0) == (next->peak > 0))
-        return run->pressed == run->last && gap <= 1 + length / 16;
-    return gap <= 1 + length / 3 && fabs(next->peak) < fabs(run->peak);
+// Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though not
+// to the baseline, or as the tensile end, which is smaller and follows soon.
+static bool belongs(const TraceFound *found, const TraceRun *run, const TraceRun *next) {
+    const size_t length = run->last - run->first + 1, other = next->last - next->first + 1;
+    const size_t longer = length > other ? length : other, gap = next->first - run->last - 1;
+    if (gap > 2 + longer)
+        return false;
+    if ((run->peak > 0) != (next->peak > 0))
+        return fabs(next->peak) < fabs(run->peak);
+    if (run->pressed != run->last)
+        return false;
+    double sum = 0;
+    for (size_t i = run->last + 1; i < next->first; i++)
+        sum += found->force[i];
+    return fabs(sum) > found->threshold / 2 * (double)gap && (sum > 0) == (run->peak > 0);
 }
 
 static Status find_runs(size_t count, TraceFound *found) {
@@ -199,7 +207,7 @@ static Status find_runs(size_t count, TraceFound *found) {
         run.pressed = run.last;
         i = run.last;
         TraceRun *before = found->count > 0 ? &found->runs[found->count - 1] : NULL;
-        if (before == NULL || found->is_full || !belongs(before, &run)) {
+        if (before == NULL || found->is_full || !belongs(found, before, &run)) {
             if (!add_run(found, &run, &most))
                 return STATUS_NO_MEMORY;
             continue;

@@ -15,6 +15,9 @@
 enum { START, END, DECAY };
 enum { REACH = 24, SIDE = 2 * REACH + 1, POINTS_LEAST = 6, POINTS_MOST = 14 };
 
+// Beyond which a width of L is that of what is asked at all.
+#define WIDTH_MOST 1.0
+
 typedef struct Point {
     double weight; // its log, first
     double contact_time, half_width, start, end, decay, decay_variance;
@@ -50,13 +53,14 @@ static bool invert(double a[3][3], double inverse[3][3]) {
     return det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
-// The best L given start and end; *curvature is that of minus the log likelihood.
+// The log likelihood at the best L given start and end, and the residue there; *width is that of the
+// normal distribution that L has about it.
 static double profile(const TraceWindow *window, const TraceBox *box, TracePoint *point,
-                      double step, double *curvature, TraceResidue *best) {
+                      double step, double *width, TraceResidue *best) {
     double value = -(double)INFINITY;
-    for (int round = 0; round < 4; round++) {
-        double at[3];
+    for (int round = 0; round < 6; round++) {
         const double centre = point->part[DECAY];
+        double at[3];
         for (int i = 0; i < 3; i++) {
             point->part[DECAY] = centre + (i - 1) * step;
             const TraceResidue left = trace_residue(window, point, box);
@@ -64,20 +68,22 @@ static double profile(const TraceWindow *window, const TraceBox *box, TracePoint
             if (i == 1)
                 *best = left;
         }
-        const double slope = (at[2] - at[0]) / 2, bend = 2 * at[1] - at[0] - at[2];
         point->part[DECAY] = centre;
         if (!isfinite(at[0] + at[1] + at[2]))
             return -(double)INFINITY;
-        const double shift = bend > 0 ? slope / bend : slope > 0 ? 2 : -2;
-        value = at[1] + (bend > 0 ? slope * shift / 2 : 0);
-        *curvature = bend / (step * step);
-        point->part[DECAY] = fmin(fmax(centre + step * fmin(fmax(shift, -4), 4), box->least[DECAY]),
-                                  box->most[DECAY]);
-        if (fabs(shift) < 1 && bend > 0)
+        const double slope = (at[2] - at[0]) / 2, bend = 2 * at[1] - at[0] - at[2];
+        const double shift = bend > 0 ? fmin(fmax(slope / bend, -4), 4) : slope > 0 ? 4 : -4;
+        const double next = fmin(fmax(centre + step * shift, box->least[DECAY]), box->most[DECAY]);
+        *width = bend > 0 ? fmin(step / sqrt(bend), WIDTH_MOST) : WIDTH_MOST;
+        value = at[1];
+        if (fabs(next - centre) < step) {
+            const double part = (next - centre) / step;
+            value += part * (slope - bend * part / 2);
+            point->part[DECAY] = next;
             break;
+        }
+        point->part[DECAY] = next;
     }
-    if (!(*curvature > 0))
-        *curvature = 1 / (step * step);
     return value;
 }
 
@@ -122,22 +128,22 @@ static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit 
                 centre[DECAY] - (curvature[DECAY][START] * away + curvature[DECAY][END] * beyond) /
                                     curvature[DECAY][DECAY];
             point.part[DECAY] = fmin(fmax(point.part[DECAY], box->least[DECAY]), box->most[DECAY]);
-            double bend;
+            double width;
             TraceResidue best = {0};
-            const double value = profile(window, box, &point, step, &bend, &best);
+            const double value = profile(window, box, &point, step, &width, &best);
             TraceShape shape;
             Point *target = &points->at[points->count];
             if (points->count == points->most || !isfinite(value) ||
                 !trace_point_shape(window, &point, &shape, &target->contact_time))
                 continue;
             *target = (Point){
-                .weight = value - log(bend * best.model_square) / 2 + log(start_step * end_step),
+                .weight = value + log(width) - log(best.model_square) / 2 + log(start_step * end_step),
                 .contact_time = target->contact_time,
                 .half_width = (fabs(1 - share) * start_step + end_step) / 4 / shape.length,
                 .start = point.part[START],
                 .end = point.part[END],
                 .decay = point.part[DECAY],
-                .decay_variance = 1 / bend,
+                .decay_variance = width * width,
             };
             *height = fmax(*height, target->weight);
             points->count++;

@@ -35,13 +35,13 @@ typedef struct Impacts {
     size_t count;
 } Impacts;
 
-// How fast impacts met one stop whose buffer is a table over approach speed. A rest has no
-// approach, and what is resumed keeps the parameters with which it began: neither counts.
+// How fast impacts met one stop whose buffer was measured in a range of approach speeds. A rest has
+// no approach, and what is resumed keeps the parameters with which it began: neither counts.
 typedef struct Approaches {
-    bool has_table;
-    double from, to;         // the table's speeds [m/s]
-    uint64_t count, outside; // impacts, and those of them beyond the table
-    double least, most;      // speeds met [m/s]
+    bool is_ranged;
+    double from, to;              // that range; NAN: no such end [m/s]
+    uint64_t count, below, above; // impacts, and those of them outside
+    double least, most;           // speeds met [m/s]
 } Approaches;
 
 // Energies relative to the base [J]; `residual` is the largest |balance| over the largest energy.

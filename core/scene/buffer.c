@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/contact/identify.h"
 #include "core/contact/power.h"
 
 // clang-format off
@@ -12,6 +13,16 @@ static const Field row_fields[] = {
     FIELD_REAL(ContactRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
     FIELD_REAL(ContactRow, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
     FIELD_REAL(ContactRow, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
+    FIELD_END
+};
+
+static const Field test_fields[] = {
+    FIELD_HIDDEN_REAL(BufferTest, least_speed),
+    FIELD_HIDDEN_REAL(BufferTest, most_speed),
+    FIELD_HIDDEN_REAL(BufferTest, impactor_mass),
+    FIELD_HIDDEN_REAL(BufferTest, base_mass),
+    FIELD_HIDDEN_REAL(BufferTest, restitution_deviation),
+    FIELD_HIDDEN_REAL(BufferTest, contact_time_deviation),
     FIELD_END
 };
 
@@ -23,6 +34,7 @@ const Field buffer_fields[] = {
     FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b; k in N/m^n beside a restitution under a power law"),
     FIELD_REAL(Buffer, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Buffer, exponent, NULL, WITHIN(1, 10), OPTIONAL, "exponent n of a power law, 1.5 if not given"),
+    FIELD_BASE(Buffer, test, test_fields),
     FIELD_END
 };
 // clang-format on
@@ -73,6 +85,25 @@ bool buffer_equals(const Buffer *a, const Buffer *b) {
            is_same(a->contact_time, b->contact_time) && is_same(a->stiffness, b->stiffness) &&
            is_same(a->damping, b->damping) && is_same(a->exponent, b->exponent) &&
            is_same_table(&a->table, &b->table);
+}
+
+void buffer_speeds(const Buffer *buffer, double *least, double *most) {
+    const ContactRows *rows = &buffer->table;
+    *least = *most = (double)NAN;
+    if (buffer->material != NULL) {
+        *least = buffer->test.least_speed;
+        *most = buffer->test.most_speed;
+    } else if (rows->count > 0) {
+        *least = rows->at[0].approach_speed;
+        *most = rows->at[rows->count - 1].approach_speed;
+    }
+}
+
+double buffer_test_mass(const Buffer *buffer) {
+    const BufferTest *test = &buffer->test;
+    if (buffer->material == NULL || isnan(test->impactor_mass) || isnan(test->base_mass))
+        return (double)NAN;
+    return effective_mass(test->impactor_mass, test->base_mass);
 }
 
 void buffer_move(Buffer *target, Buffer *source) {

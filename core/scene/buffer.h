@@ -9,6 +9,16 @@
 
 enum { BUFFER_ROWS = 1000 };
 
+// What is known of the test behind a material's numbers: what of them may be said in a scene. NAN:
+// not known.
+typedef struct BufferTest {
+    double least_speed, most_speed; // approach speeds that were measured [m/s]
+    double impactor_mass;           // [kg]
+    double base_mass;               // INFINITY: a fixed base [kg]
+    // Standard deviations over their values; of a table the root mean square of its rows'.
+    double restitution_deviation, contact_time_deviation;
+} BufferTest;
+
 // What is not given is NAN. `material` alone is a name yet to be resolved; beside numbers
 // ("sponge@1") it says where they come from.
 typedef struct Buffer {
@@ -19,6 +29,7 @@ typedef struct Buffer {
     double damping;      // c_b [N s/m]
     double exponent;     // n of a power law
     ContactRows table;   // e and T_c by strictly rising approach speed
+    BufferTest test;     // of a resolved material; in no document: the revision stands for it
 } Buffer;
 
 extern const Field buffer_fields[];
@@ -35,6 +46,13 @@ bool buffer_is_measured(const Buffer *buffer);
 bool buffer_has_contact(const Buffer *buffer);
 
 bool buffer_equals(const Buffer *a, const Buffer *b);
+
+// The approach speeds for which its numbers were measured: those of its material, or its table's
+// ends; NAN: not known [m/s].
+void buffer_speeds(const Buffer *buffer, double *least, double *most);
+
+// The effective mass of the pair that its material was tested with; NAN: not known [kg].
+double buffer_test_mass(const Buffer *buffer);
 
 // Moves `source` into `target` and leaves it absent.
 void buffer_move(Buffer *target, Buffer *source);

@@ -27,7 +27,7 @@ const Field damper_fields[] = {
     FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
     FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
     FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
-    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured them, required by identified_for rig: what they come to there is carried over"),
+    FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured them, for identified_for rig: what they come to there is carried over; if absent those that the material's revision tells"),
     FIELD_END
 };
 // clang-format on
@@ -149,11 +149,70 @@ static bool is_carried(const Damper *damper, const ContactLaw *law) {
             buffer_is_measured(damper_buffer(damper, SIDE_RIGHT)));
 }
 
+static bool is_rig_given(const Damper *damper) {
+    return !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
+}
+
+// The first side whose material does not tell all of the masses that it was tested with; NULL: all
+// that were measured tell the same ones, *test.
+static const Buffer *find_untold(const Damper *damper, const BufferTest **test, bool *is_same) {
+    *test = NULL;
+    *is_same = true;
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        if (!buffer_is_measured(buffer))
+            continue;
+        if (isnan(buffer_test_mass(buffer)))
+            return buffer;
+        if (*test == NULL)
+            *test = &buffer->test;
+        *is_same = *is_same && buffer->test.impactor_mass == (*test)->impactor_mass &&
+                   buffer->test.base_mass == (*test)->base_mass;
+    }
+    return NULL;
+}
+
+// A rig that is not given is that of the materials' tests.
+static void fill_rig(Damper *damper, const ContactLaw *law) {
+    const BufferTest *test;
+    bool is_same;
+    if (damper->identified_for != IDENTIFIED_FOR_RIG || is_rig_given(damper) ||
+        !is_carried(damper, law) || find_untold(damper, &test, &is_same) != NULL || !is_same)
+        return;
+    damper->rig.impactor_mass = test->impactor_mass;
+    damper->rig.base_mass = isinf(test->base_mass) ? (double)NAN : test->base_mass;
+}
+
+// Why the materials could not stand for it.
+static Status refuse_rig(const Damper *damper, const char *place, Problem *problem) {
+    const BufferTest *test;
+    bool is_same;
+    const Buffer *untold = find_untold(damper, &test, &is_same);
+    if (untold == NULL)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "is required by identified_for \"rig\": %.64s and %.64s were measured "
+                           "with other masses, and a damper has one rig",
+                           damper_buffer(damper, SIDE_LEFT)->material,
+                           damper_buffer(damper, SIDE_RIGHT)->material);
+    if (untold->material == NULL)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "is required by identified_for \"rig\": the impactor_mass [kg] and, "
+                           "unless it was fixed, the base_mass of the test that measured "
+                           "restitution and contact time");
+    return problem_add(problem, STATUS_INVALID, place,
+                       "is required by identified_for \"rig\": %.64s does not tell %s; give the "
+                       "impactor_mass [kg] and, unless it was fixed, the base_mass of its test",
+                       untold->material,
+                       !isnan(untold->test.base_mass)       ? "the mass of the impactor"
+                       : !isnan(untold->test.impactor_mass) ? "what base it lay on"
+                                                            : "the masses that it was tested with");
+}
+
 static Status check_rig(const Damper *damper, const ContactLaw *law, const char *pointer,
                         Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
     pointer_join(place, sizeof place, pointer, "rig");
-    const bool is_given = !isnan(damper->rig.impactor_mass) || !isnan(damper->rig.base_mass);
+    const bool is_given = is_rig_given(damper);
     if (!is_carried(damper, law) || problem_concerns(problem, place) ||
         is_given == (damper->identified_for == IDENTIFIED_FOR_RIG))
         return STATUS_OK;
@@ -161,10 +220,7 @@ static Status check_rig(const Damper *damper, const ContactLaw *law, const char 
         return problem_add(problem, STATUS_INVALID, place,
                            "is used only with identified_for \"rig\": give that, or leave out the "
                            "rig");
-    return problem_add(problem, STATUS_INVALID, place,
-                       "is required by identified_for \"rig\": the impactor_mass [kg] and, unless "
-                       "it was fixed, the base_mass of the test that measured restitution and "
-                       "contact time");
+    return refuse_rig(damper, place, problem);
 }
 
 static void normalise_rig(Damper *damper, const ContactLaw *law) {
@@ -197,6 +253,7 @@ Status damper_complete(Damper *damper, const ContactLaw *law, size_t storeys, co
         damper->storey = storeys;
     if (damper->identified_for == CHOICE_ABSENT)
         damper->identified_for = IDENTIFIED_FOR_SCENE;
+    fill_rig(damper, law);
     const Status faults[] = {
         check_position(damper, pointer, problem),
         check_stops(damper, pointer, problem),

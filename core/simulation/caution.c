@@ -1,13 +1,14 @@
 // What a run can leave: the error of modes that it left out; the time to which rounding, or the
-// solver's steps, let its trajectory be the scene's own, and the approach speeds at which its
-// buffers were measured. The second is counted by the ledger, of every impact of a run that
-// succeeds.
+// solver's steps, let its trajectory be the scene's own; and how far its impacts and its masses are
+// from those with which its buffers were measured. Speeds are counted by the ledger, of every
+// impact of a run that succeeds.
 #include "core/simulation/caution.h"
 
 #include <math.h>
 #include <stdio.h>
 
 #include "core/base/side.h"
+#include "core/contact/contact.h"
 
 // The scene asked for it; the number is foretold, and dampers can make more of it.
 static Status warn_of_modes(Outcome *outcome) {
@@ -47,33 +48,129 @@ static Status warn_of_steps(Outcome *outcome) {
                         error, error > 0.1 ? ", and only statistics hold" : "");
 }
 
-static Status warn_of_stop(const Scene *scene, size_t damper, Side side, const Approaches *met,
-                           Warnings *warnings) {
-    const Damper *at = &scene->dampers.at[damper];
-    const Buffer *buffer = damper_buffer(at, side);
-    char pointer[64], from[32], to[32];
-    if (met->outside == 0)
-        return STATUS_OK;
-    snprintf(pointer, sizeof pointer, "/dampers/%zu/%s/table", damper,
-             buffer == &at->buffer        ? "buffer"
-             : buffer == &at->left_buffer ? "left_buffer"
-                                          : "right_buffer");
-    return warnings_add(
-        warnings, pointer,
-        "%llu of %llu impacts at the %s stop of damper %zu met it at approach speeds outside the "
-        "table's, %s to %s m/s, where the nearest row holds: their speeds were %.6g to %.6g m/s",
-        (unsigned long long)met->outside, (unsigned long long)met->count, side_names[side],
-        damper + 1, text_real(from, met->from), text_real(to, met->to), met->least, met->most);
+// A buffer of a damper, and where it stands.
+typedef struct Stops {
+    const Buffer *buffer;
+    const char *name;  // as the scene calls it
+    const char *where; // in words
+    int first, count;  // sides
+} Stops;
+
+// One for both sides, or one for each.
+static size_t find_stops(const Damper *damper, Stops stops[2]) {
+    static const char *const names[] = {"left_buffer", "right_buffer"};
+    static const char *const wheres[] = {"left stop", "right stop"};
+    const Buffer *left = damper_buffer(damper, SIDE_LEFT);
+    if (left == damper_buffer(damper, SIDE_RIGHT)) {
+        stops[0] = (Stops){left, "buffer", "stops", SIDE_LEFT, 2};
+        return 1;
+    }
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        const bool is_common = buffer == &damper->buffer;
+        stops[side] = (Stops){buffer, is_common ? "buffer" : names[side], wheres[side], side, 1};
+    }
+    return 2;
 }
 
-static Status warn_of_tables(const Scene *scene, const Approaches *met, Warnings *warnings) {
-    for (size_t i = 0; met != NULL && i < 2 * scene->dampers.count; i++)
-        TRY(warn_of_stop(scene, i / 2, (Side)(i % 2), &met[i], warnings));
+// What met several stops with one range.
+static Approaches add_up(const Approaches *met, int count) {
+    Approaches sum = met[0];
+    for (int i = 1; i < count; i++) {
+        if (met[i].count == 0)
+            continue;
+        sum.least = sum.count == 0 ? met[i].least : fmin(sum.least, met[i].least);
+        sum.most = sum.count == 0 ? met[i].most : fmax(sum.most, met[i].most);
+        sum.count += met[i].count;
+        sum.below += met[i].below;
+        sum.above += met[i].above;
+    }
+    return sum;
+}
+
+// "0.15 to 1 m/s", "0.15 m/s and more", "1 m/s and less".
+static void tell_range(double from, double to, char *text, size_t size) {
+    char low[32], high[32];
+    text_real(low, from);
+    text_real(high, to);
+    if (isnan(to))
+        snprintf(text, size, "%s m/s and more", low);
+    else if (isnan(from))
+        snprintf(text, size, "%s m/s and less", high);
+    else
+        snprintf(text, size, "%s to %s m/s", low, high);
+}
+
+static Status warn_of_stops(const Stops *stops, size_t damper, const Approaches *all,
+                            Warnings *warnings) {
+    const Approaches met = add_up(&all[stops->first], stops->count);
+    const bool is_named = stops->buffer->material != NULL;
+    char pointer[64], range[96], below[96] = "", above[96] = "";
+    if (met.below + met.above == 0)
+        return STATUS_OK;
+    snprintf(pointer, sizeof pointer, "/dampers/%zu/%s%s", damper, stops->name,
+             is_named ? "" : "/table");
+    tell_range(met.from, met.to, range, sizeof range);
+    if (met.below > 0)
+        snprintf(below, sizeof below, "%llu were slower, down to %.3g m/s",
+                 (unsigned long long)met.below, met.least);
+    if (met.above > 0)
+        snprintf(above, sizeof above, "%s%llu were faster, up to %.3g m/s",
+                 met.below > 0 ? " and " : "", (unsigned long long)met.above, met.most);
+    return warnings_add(
+        warnings, pointer,
+        "%.80s %s approach speeds of %s: of %llu impacts at the %s of damper %zu %s%s; there %s",
+        is_named ? stops->buffer->material : "the table",
+        is_named ? "was measured at" : "is one over", range, (unsigned long long)met.count,
+        stops->where, damper + 1, below, above,
+        stops->buffer->table.count > 0 ? "the nearest row holds"
+                                       : "its numbers are used without a measurement");
+}
+
+static Status warn_of_speeds(const Scene *scene, const Approaches *met, Warnings *warnings) {
+    for (size_t i = 0; met != NULL && i < scene->dampers.count; i++) {
+        Stops stops[2];
+        const size_t count = find_stops(&scene->dampers.at[i], stops);
+        for (size_t k = 0; k < count; k++)
+            TRY(warn_of_stops(&stops[k], i, &met[2 * i], warnings));
+    }
     return STATUS_OK;
 }
 
-Status caution_warn(const Scene *scene, Outcome *outcome) {
+// By how much the effective masses may differ of the test and of the scene.
+static const double pair_part = 0.2;
+
+static Status warn_of_pair(const Derived *derived, const Stops *stops, Warnings *warnings) {
+    const double tested = buffer_test_mass(stops->buffer), own = derived->effective_mass;
+    char pointer[64];
+    if (!buffer_is_measured(stops->buffer) || !(fabs(own - tested) > pair_part * tested))
+        return STATUS_OK;
+    snprintf(pointer, sizeof pointer, "/dampers/%llu/identified_for",
+             (unsigned long long)derived->damper - 1);
+    return warnings_add(warnings, pointer,
+                        "%.80s was measured with an effective mass of %.3g kg, that of this pair "
+                        "is %.3g kg: restitution and contact time belong to a pair of masses; "
+                        "\"rig\" carries over the stiffness and damping instead",
+                        stops->buffer->material, tested, own);
+}
+
+Status caution_warn_of_pairs(const Scene *scene, const DerivedList *derived, Warnings *warnings) {
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    for (size_t i = 0; i < derived->count && law->form != CONTACT_IMPULSIVE; i++) {
+        const Derived *at = &derived->at[i];
+        const Damper *damper = &scene->dampers.at[at->damper - 1];
+        Stops stops[2];
+        const size_t count = find_stops(damper, stops);
+        for (size_t k = 0; k < count && damper->identified_for == IDENTIFIED_FOR_SCENE; k++)
+            if (stops[k].first == at->side)
+                TRY(warn_of_pair(at, &stops[k], warnings));
+    }
+    return STATUS_OK;
+}
+
+Status caution_warn(const Scene *scene, const DerivedList *derived, Outcome *outcome) {
     TRY(warn_of_modes(outcome));
     TRY(outcome->response.is_stepped ? warn_of_steps(outcome) : warn_of_horizon(outcome));
-    return warn_of_tables(scene, outcome->response.approaches, &outcome->warnings);
+    TRY(caution_warn_of_pairs(scene, derived, &outcome->warnings));
+    return warn_of_speeds(scene, outcome->response.approaches, &outcome->warnings);
 }

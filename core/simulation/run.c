@@ -206,23 +206,19 @@ static Status check_finite(const Outcome *outcome, Problem *problem) {
                        "precision can hold");
 }
 
-// Where the speeds that meet a table's stops are counted.
+// Where the speeds are counted that meet stops with a range of them.
 static Status make_approaches(const Scene *scene, Response *response, Problem *problem) {
-    bool has_table = false;
-    for (size_t i = 0; i < 2 * scene->dampers.count; i++)
-        has_table =
-            has_table || damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table.count > 0;
-    if (!has_table)
-        return STATUS_OK;
-    response->approaches = calloc(2 * scene->dampers.count, sizeof *response->approaches);
-    if (response->approaches == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
-    for (size_t i = 0; i < 2 * scene->dampers.count; i++) {
-        const ContactRows *rows = &damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2))->table;
-        if (rows->count > 0)
-            response->approaches[i] = (Approaches){.has_table = true,
-                                                   .from = rows->at[0].approach_speed,
-                                                   .to = rows->at[rows->count - 1].approach_speed};
+    const size_t stops = 2 * scene->dampers.count;
+    for (size_t i = 0; i < stops; i++) {
+        double from, to;
+        buffer_speeds(damper_buffer(&scene->dampers.at[i / 2], (Side)(i % 2)), &from, &to);
+        if (isnan(from) && isnan(to))
+            continue;
+        if (response->approaches == NULL)
+            response->approaches = calloc(stops, sizeof *response->approaches);
+        if (response->approaches == NULL)
+            return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
+        response->approaches[i] = (Approaches){.is_ranged = true, .from = from, .to = to};
     }
     return STATUS_OK;
 }
@@ -283,7 +279,7 @@ static Status travel(Journey *journey, Problem *problem) {
     add_given_up(journey->plan, &outcome->response);
     summarize(outcome);
     TRY(check_finite(outcome, problem));
-    if (caution_warn(scene, outcome) != STATUS_OK)
+    if (caution_warn(scene, &journey->plan->report.derived, outcome) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(make_spectrum(journey, problem));
     outcome->work.spectrum_segments =

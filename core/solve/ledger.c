@@ -12,7 +12,8 @@ static void meet(Approaches *met, double speed) {
     met->least = met->count == 0 ? speed : fmin(met->least, speed);
     met->most = met->count == 0 ? speed : fmax(met->most, speed);
     met->count++;
-    met->outside += speed < met->from || speed > met->to;
+    met->below += speed < met->from;
+    met->above += speed > met->to;
 }
 
 // What is told of an impact whether or not it is listed.
@@ -24,7 +25,7 @@ static void count(Ledger *ledger, const Impact *impact) {
     } else {
         response->impact_count++;
         if (response->approaches != NULL && !impact->is_resumed &&
-            response->approaches[2 * damper + (size_t)impact->side].has_table)
+            response->approaches[2 * damper + (size_t)impact->side].is_ranged)
             meet(&response->approaches[2 * damper + (size_t)impact->side], impact->approach_speed);
     }
     ledger->impulse[damper] = ledger_larger(ledger->impulse[damper], impact->impulse);

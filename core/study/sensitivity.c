@@ -9,15 +9,29 @@
 #include "core/study/sensitivity_band.h"
 #include "core/study/sensitivity_change.h"
 #include "core/study/sensitivity_run.h"
+#include "core/study/sensitivity_spread.h"
 
-enum { RUNS = 2000, RUNS_USUAL = 200 };
+enum { RUNS = 2000, RUNS_USUAL = 200, SPREADS = 1000 };
 
 // clang-format off
+static const char *const buffer_names[] = {
+    [SENSITIVITY_BOTH] = "buffer", [SENSITIVITY_LEFT] = "left_buffer", [SENSITIVITY_RIGHT] = "right_buffer", NULL};
+
+const Field sensitivity_spread_fields[] = {
+    FIELD_COUNT(SensitivitySpread, damper, NULL, AT_LEAST(1), REQUIRED, "number of the damper, from 1"),
+    FIELD_CHOICE(SensitivitySpread, buffer, buffer_names, 0, "which of its buffers"),
+    FIELD_TEXT(SensitivitySpread, source, 160, PRESENCE_OPTIONAL, 0, "the material and revision that tells it"),
+    FIELD_REAL(SensitivitySpread, restitution, NULL, WITHIN(0, 1), OPTIONAL, "relative standard deviation of its restitution; sure if absent"),
+    FIELD_REAL(SensitivitySpread, contact_time, NULL, WITHIN(0, 1), OPTIONAL, "likewise of its contact time; of a table all rows are changed by one factor"),
+    FIELD_END
+};
+
 static const Field study_fields[] = {
     FIELD_TEXTS(SensitivityStudy, parameters, sensitivity_parameter_names, NULL, SENSITIVITY_PARAMETERS, PRESENCE_OPTIONAL, 0, "by what the response is differentiated, of all dampers and sides at once; if absent by all of restitution, contact_time, stiffness, damping, mass (the free masses') and clearance that the scene has"),
     FIELD_REAL(SensitivityStudy, step, NULL, WITHIN(1e-6, 0.2), 0.01, "relative, of the central differences; half and a quarter of it are tried too"),
-    FIELD_REAL(SensitivityStudy, restitution_deviation, NULL, WITHIN(0, 0.5), 0, "relative standard deviation of each buffer's restitution; 0: it is sure"),
-    FIELD_REAL(SensitivityStudy, contact_time_deviation, NULL, WITHIN(0, 0.5), 0, "likewise of its contact time"),
+    FIELD_REAL(SensitivityStudy, restitution_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "relative standard deviation of every buffer's restitution, 0: it is sure; if absent that of spread"),
+    FIELD_REAL(SensitivityStudy, contact_time_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "likewise of its contact time"),
+    FIELD_LIST(SensitivityStudy, spread, sensitivity_spread_fields, SPREADS, PRESENCE_OPTIONAL, "buffer by buffer; if absent what the revisions of the buffers' materials tell of the deviations of restitution and contact_time, of a table the root mean square of its rows"),
     FIELD_COUNT(SensitivityStudy, runs, NULL, WITHIN(0, RUNS), OPTIONAL, "runs with restitution and contact time drawn; 200 if absent, none without a deviation"),
     FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "of the draws"),
     FIELD_END
@@ -116,8 +130,9 @@ static const Field answer_fields[] = {
     FIELD_COUNT(Sensitivity, made, NULL, AT_LEAST(0), 0, "of those, made"),
     FIELD_COUNT(Sensitivity, failed, NULL, AT_LEAST(0), 0, "of those, failed; the others alone are counted in what follows"),
     FIELD_COUNT(Sensitivity, seed, NULL, AT_LEAST(0), OPTIONAL, "of the draws"),
-    FIELD_REAL(Sensitivity, restitution_deviation, NULL, ANY, OPTIONAL, "relative, stated"),
-    FIELD_REAL(Sensitivity, contact_time_deviation, NULL, ANY, OPTIONAL, "relative, stated"),
+    FIELD_REAL(Sensitivity, restitution_deviation, NULL, ANY, OPTIONAL, "relative, stated for all buffers; where it is unknown that of spread was taken"),
+    FIELD_REAL(Sensitivity, contact_time_deviation, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_LIST(Sensitivity, spread, sensitivity_spread_fields, 0, PRESENCE_DEFAULT, "the deviations of each buffer, and whose they are"),
     FIELD_TEXT(Sensitivity, distribution, 0, PRESENCE_OPTIONAL, 0, "of the draws, in words"),
     FIELD_REAL(Sensitivity, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
     FIELD_LIST(Sensitivity, statistics, band_fields, 0, PRESENCE_DEFAULT, "over the drawn runs"),
@@ -138,13 +153,14 @@ static Status check_deviation(const Simulation *simulation, double deviation, in
 }
 
 static Status check_runs(SensitivityStudy *study, const Simulation *simulation, Problem *problem) {
-    const bool has_spread = study->restitution_deviation > 0 || study->contact_time_deviation > 0;
+    const bool has_spread = spread_is_there(study);
     if (study->runs == COUNT_ABSENT)
         study->runs = has_spread ? RUNS_USUAL : 0;
     if (study->runs > 0 && !has_spread)
         return problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
                                 "must be 0 or left out without a spread to draw from: give "
-                                "restitution_deviation or contact_time_deviation");
+                                "restitution_deviation or contact_time_deviation, or materials "
+                                "whose revisions tell theirs");
     const SpectrumRequest *psd = &simulation->output.psd;
     if (psd->channels.count == 0 || study->runs == 0)
         return STATUS_OK;
@@ -189,6 +205,7 @@ static Status study_complete(Study *asked, const Simulation *simulation,
     if (simulation->scene.dampers.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/kind",
                            "sensitivity is of a damper's numbers: the scene has no damper");
+    TRY(spread_complete(study, simulation, problem));
     const Status restitution =
         check_deviation(simulation, study->restitution_deviation, SENSITIVITY_RESTITUTION,
                         "/study/restitution_deviation", problem);

@@ -21,13 +21,34 @@ extern const char *const sensitivity_parameter_names[]; // NULL-terminated
 
 enum { SENSITIVITY_STEPS = 3 }; // each half of the one before
 
+// How sure one buffer's numbers are.
+typedef struct SensitivitySpread {
+    uint64_t damper;                  // from 1
+    int buffer;                       // SensitivityBuffer
+    char *source;                     // "sponge@1"; NULL: somebody said so
+    double restitution, contact_time; // relative standard deviations; NAN: not known, taken as sure
+} SensitivitySpread;
+typedef enum SensitivityBuffer {
+    SENSITIVITY_BOTH,
+    SENSITIVITY_LEFT,
+    SENSITIVITY_RIGHT
+} SensitivityBuffer;
+
+typedef struct SensitivitySpreads {
+    SensitivitySpread *at;
+    size_t count;
+} SensitivitySpreads;
+extern const Field sensitivity_spread_fields[];
+
 // What is asked.
 typedef struct SensitivityStudy {
     Study study;
     Texts parameters; // none until completed: those that the scene has
     double step;      // relative, the largest of SENSITIVITY_STEPS
-    double restitution_deviation, contact_time_deviation; // relative; 0: sure
-    uint64_t runs; // COUNT_ABSENT until completed: none without a deviation
+    // Relative, of all buffers; 0: sure. NAN: as `spread` says, buffer by buffer.
+    double restitution_deviation, contact_time_deviation;
+    SensitivitySpreads spread; // none until completed: what the materials' revisions tell
+    uint64_t runs;             // COUNT_ABSENT until completed: none without a deviation
     uint64_t seed;
 } SensitivityStudy;
 
@@ -124,6 +145,7 @@ typedef struct Sensitivity {
     char *why;       // what that means for the slopes
     uint64_t runs, made, failed, seed;
     double restitution_deviation, contact_time_deviation;
+    SensitivitySpreads spread;
     char *distribution;
     double confidence;
     SensitivityBands statistics;

@@ -2,6 +2,7 @@
 #include "core/study/sensitivity_change.h"
 
 #include "core/base/noise.h"
+#include "core/study/sensitivity_spread.h"
 
 enum { DRAWS = 64, STREAM = 0x53454e53 };
 
@@ -128,15 +129,20 @@ static double factor_of(double normal, double s) {
     return exp(sqrt(variance) * normal - variance / 2);
 }
 
-static void draw(const SensitivityStudy *study, const Buffer *from, uint64_t run, size_t buffer,
-                 double *restitution, double *contact_time) {
+// Of one buffer: e and T_c.
+typedef struct Spread {
+    double restitution, contact_time;
+} Spread;
+
+static void draw(uint64_t seed, const Spread *spread, const Buffer *from, uint64_t run,
+                 size_t buffer, double *restitution, double *contact_time) {
     const double most = largest_of(from, SENSITIVITY_RESTITUTION);
     for (uint64_t again = 0; again < DRAWS; again++) {
         double normal[2];
-        noise_normal_pair(study->seed, STREAM + buffer, DRAWS * run + again, normal);
-        *restitution = factor_of(normal[0], study->restitution_deviation);
+        noise_normal_pair(seed, STREAM + buffer, DRAWS * run + again, normal);
+        *restitution = factor_of(normal[0], spread->restitution);
         if (again == 0)
-            *contact_time = factor_of(normal[1], study->contact_time_deviation);
+            *contact_time = factor_of(normal[1], spread->contact_time);
         if (!(most * *restitution > 1))
             return;
     }
@@ -152,10 +158,14 @@ void change_draw(const SensitivityStudy *study, const Simulation *simulation, ui
             Buffer *to = own_buffer(&member->scene.dampers.at[i], k);
             if (!buffer_is_given(from))
                 continue;
-            draw(study, from, run, buffer, &restitution[buffer], &contact_time[buffer]);
-            if (study->restitution_deviation > 0)
+            const Spread spread = {
+                spread_of(study, i, (SensitivityBuffer)k, SENSITIVITY_RESTITUTION),
+                spread_of(study, i, (SensitivityBuffer)k, SENSITIVITY_CONTACT_TIME)};
+            draw(study->seed, &spread, from, run, buffer, &restitution[buffer],
+                 &contact_time[buffer]);
+            if (spread.restitution > 0)
                 scale_buffer(from, SENSITIVITY_RESTITUTION, restitution[buffer], to);
-            if (study->contact_time_deviation > 0)
+            if (spread.contact_time > 0)
                 scale_buffer(from, SENSITIVITY_CONTACT_TIME, contact_time[buffer], to);
             buffer++;
         }

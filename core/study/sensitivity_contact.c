@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/contact/propagate.h"
+#include "core/study/sensitivity_spread.h"
 
 // Why there are no closed forms; NULL: there are.
 static const char *refuse(const ContactLaw *law, const Buffer *buffer) {
@@ -21,10 +22,19 @@ static const char *refuse(const ContactLaw *law, const Buffer *buffer) {
     return NULL;
 }
 
+static SensitivityBuffer place_of(const Damper *damper, Side side) {
+    if (damper_buffer(damper, side) == &damper->buffer)
+        return SENSITIVITY_BOTH;
+    return side == SIDE_LEFT ? SENSITIVITY_LEFT : SENSITIVITY_RIGHT;
+}
+
 static void tell(const SensitivityStudy *study, const Damper *damper, Separation separation,
                  SensitivityStop *stop) {
     const Propagation by = propagate(stop->restitution, separation);
-    const double e = study->restitution_deviation, T = study->contact_time_deviation;
+    const SensitivityBuffer place = place_of(damper, (Side)stop->side);
+    const size_t number = (size_t)stop->damper - 1;
+    const double e = spread_of(study, number, place, SENSITIVITY_RESTITUTION);
+    const double T = spread_of(study, number, place, SENSITIVITY_CONTACT_TIME);
     const bool is_rig = damper->identified_for == IDENTIFIED_FOR_RIG;
     stop->stiffness_by_restitution = by.stiffness_by_restitution;
     stop->stiffness_by_contact_time = by.stiffness_by_contact_time;

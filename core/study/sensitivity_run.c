@@ -308,6 +308,17 @@ static void free_runs(StudyWork *of) {
     free(work);
 }
 
+static bool copy_spread(const SensitivityStudy *study, Sensitivity *answer) {
+    static const Field rows[] = {
+        FIELD_LIST(Sensitivity, spread, sensitivity_spread_fields, 0, PRESENCE_DEFAULT, NULL),
+        FIELD_END};
+    Sensitivity source = {.spread = study->spread}, copy; // of both that list alone
+    const bool is_copied = fields_copy(rows, &source, &copy) == STATUS_OK;
+    if (is_copied)
+        answer->spread = copy.spread;
+    return is_copied;
+}
+
 static Status begin_runs(const Study *asked, const Simulation *simulation, const StudyTools *tools,
                          Variant *told, StudyWork **made, Problem *problem) {
     const SensitivityStudy *study = (const SensitivityStudy *)(const void *)asked;
@@ -319,9 +330,13 @@ static Status begin_runs(const Study *asked, const Simulation *simulation, const
     answer->contact_time_deviation = study->contact_time_deviation;
     answer->confidence = ENSEMBLE_INTERVAL;
     answer->distribution = strdup(
-        "log-normal factors of mean 1 and the stated relative deviation, each buffer's "
-        "restitution and contact time for themselves; a restitution beyond 1 is drawn again");
-    if (work == NULL || answer->distribution == NULL) {
+        study->spread.count == 0
+            ? "log-normal factors of mean 1 and the stated relative deviation, each buffer's "
+              "restitution and contact time for themselves; a restitution beyond 1 is drawn again"
+            : "log-normal factors of mean 1 and the relative deviations of spread, each buffer's "
+              "restitution and contact time for themselves, all rows of a table by one factor; a "
+              "restitution beyond 1 is drawn again");
+    if (work == NULL || answer->distribution == NULL || !copy_spread(study, answer)) {
         free(work);
         return no_memory(problem);
     }

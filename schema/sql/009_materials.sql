@@ -67,11 +67,12 @@ CREATE TABLE material_measurements (
     UNIQUE (material, measurement)
 ) STRICT;
 
--- What was done, to what (a revision or a measurement, where it is about one), by whom, why. The count of a material's
--- entries is its version.
+-- What was done, to what (a revision or a measurement, where it is about one), by whom, why. A material's entries count
+-- from 1: the last one's number is the material's version.
 CREATE TABLE material_trail (
     number           INTEGER PRIMARY KEY,
     material         INTEGER NOT NULL REFERENCES materials (number),
+    version          INTEGER NOT NULL CHECK (version >= 1),
     action           TEXT    NOT NULL CHECK (action IN ('create', 'revise', 'revert', 'approve', 'deprecate', 'measure', 'import')),
     revision         INTEGER,
     measurement      INTEGER,
@@ -79,7 +80,7 @@ CREATE TABLE material_trail (
     why              TEXT    NOT NULL,
     created_unix_ms  INTEGER NOT NULL
 ) STRICT;
-CREATE INDEX material_trail_of ON material_trail (material, number);
+CREATE UNIQUE INDEX material_trail_of ON material_trail (material, version);
 
 -- The paper's five, with what it says of their tests; what it does not say stays unknown. They are of no user's hand, so
 -- their time is that of this step, the same everywhere.
@@ -92,10 +93,15 @@ SELECT b.number, b.material, b.revision, b.name,
 FROM revisions_before b JOIN materials m ON m.number = b.material ORDER BY b.number;
 INSERT INTO material_reviews (number, material, revision, status, reason, created_unix_ms)
 SELECT number, material, revision, status, reason, 1795219200000 FROM reviews_before ORDER BY number;
-INSERT INTO material_trail (material, action, revision, why, created_unix_ms)
-SELECT material, 'create', revision, comment, created_unix_ms FROM material_revisions ORDER BY number;
-INSERT INTO material_trail (material, action, revision, why, created_unix_ms)
-SELECT material, 'approve', revision, reason, created_unix_ms FROM material_reviews ORDER BY number;
+INSERT INTO material_trail (material, version, action, revision, why, created_unix_ms)
+SELECT material, row_number() OVER (PARTITION BY material ORDER BY is_review, number),
+       CASE action WHEN 'approved' THEN 'approve' WHEN 'deprecated' THEN 'deprecate' ELSE action END, revision, why,
+       created_unix_ms
+FROM (SELECT 0 AS is_review, number, material, revision, iif(revision = 1, 'create', 'revise') AS action, comment AS why,
+             created_unix_ms FROM material_revisions
+      UNION ALL
+      SELECT 1, number, material, revision, status, reason, created_unix_ms FROM material_reviews)
+ORDER BY is_review, number;
 DROP TABLE revisions_before;
 DROP TABLE reviews_before;
 
@@ -135,14 +141,15 @@ WHEN EXISTS (SELECT 1 FROM material_measurements
              WHERE (material = NEW.material AND measurement = NEW.measurement) OR number = NEW.number)
 BEGIN SELECT RAISE (ABORT, 'a measurement never changes; add a new one'); END;
 CREATE TRIGGER material_trail_once BEFORE INSERT ON material_trail
-WHEN EXISTS (SELECT 1 FROM material_trail WHERE number = NEW.number)
+WHEN EXISTS (SELECT 1 FROM material_trail
+             WHERE (material = NEW.material AND version = NEW.version) OR number = NEW.number)
 BEGIN SELECT RAISE (ABORT, 'what was done stays written'); END;
 
 CREATE VIEW material_states AS
 SELECT m.slug, r.*, coalesce(v.status, 'draft') AS status, v.reason, v.reviewer,
        coalesce(v.created_unix_ms, 0) AS reviewed_unix_ms,
        (SELECT max(revision) FROM material_revisions l WHERE l.material = r.material) AS latest,
-       (SELECT count(*) FROM material_trail t WHERE t.material = r.material) AS version
+       (SELECT max(version) FROM material_trail t WHERE t.material = r.material) AS version
 FROM material_revisions r JOIN materials m ON m.number = r.material
 LEFT JOIN material_reviews v ON v.number = (SELECT max(number) FROM material_reviews w
                                             WHERE w.material = r.material AND w.revision = r.revision);

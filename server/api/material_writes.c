@@ -14,13 +14,19 @@
 #include "server/materials/catalogue.h"
 #include "server/materials/slug.h"
 
+// Whether a body was an object at all, so that more may be said of it than that.
+static bool is_object(Status status, const Problem *problem) {
+    return status == STATUS_OK || (status == STATUS_INVALID && problem->count > 0 &&
+                                   problem->faults[0].pointer[0] != '\0');
+}
+
 // The body into `item`, whose ranges are judged too. Cleared by fields_clear in any case.
 static Status read_body(const Request *request, const char *whose, const Field *fields, void *item,
                         Problem *problem) {
     TRY(body_require_json(request, problem));
     problem->whose = whose;
     const Status status = read_json(request->body, request->body_size, fields, item, problem);
-    if (status != STATUS_OK && status != STATUS_INVALID)
+    if (!is_object(status, problem))
         return status;
     const Status judged = fields_check(fields, item, "", problem);
     return status != STATUS_OK ? status : judged;
@@ -54,7 +60,7 @@ static Status check_measurements(const Material *material, uint64_t count, Probl
 // All faults of what is said, `status` among them.
 static Status judge(const MaterialBody *body, uint64_t measurements, Status status,
                     Problem *problem) {
-    if (status != STATUS_OK && status != STATUS_INVALID)
+    if (!is_object(status, problem))
         return status;
     const Status all[] = {status, material_check(&body->material, "", problem),
                           check_measurements(&body->material, measurements, problem),
@@ -93,7 +99,7 @@ static Status tell(App *app, const char *slug, uint64_t revision, uint64_t seen,
 Status materials_create(App *app, const Request *request, Reply *reply, Problem *problem) {
     MaterialBody body = {0};
     Status status = read_body(request, "material", new_material_fields, &body, problem);
-    if ((status == STATUS_OK || status == STATUS_INVALID) && body.slug != NULL) {
+    if (is_object(status, problem) && body.slug != NULL) {
         const Status slug = slug_check(body.slug, "/slug", problem);
         status = status != STATUS_OK ? status : slug;
     }
@@ -141,7 +147,7 @@ Status materials_revise(App *app, const Request *request, Reply *reply, Problem 
 
 static Status check_revert(const MaterialRevertBody *body, const char *slug, uint64_t latest,
                            Status status, Problem *problem) {
-    if (status != STATUS_OK && status != STATUS_INVALID)
+    if (!is_object(status, problem))
         return status;
     const Status why = check_why(body->comment, "/comment", problem);
     if (body->to != COUNT_ABSENT && body->to > latest)
@@ -194,7 +200,7 @@ Status materials_review(App *app, const Request *request, Reply *reply, Problem 
     TRY(body_require_json(request, problem));
     TRY(material_condition(app, request, slug, true, &seen, &state, problem));
     Status status = read_body(request, "review", material_review_fields, &body, problem);
-    if (status == STATUS_OK || status == STATUS_INVALID) {
+    if (is_object(status, problem)) {
         const Status why = check_why(body.reason, "/reason", problem);
         status = status != STATUS_OK ? status : why;
     }

@@ -23,6 +23,17 @@ Status material_condition(App *app, const Request *request, const char *slug, bo
 // The number of a revision as a path has it. STATUS_NOT_FOUND.
 Status material_revision_number(const char *text, uint64_t *revision, Problem *problem);
 
+// The number of a measurement likewise.
+Status measurement_number(const char *text, uint64_t *number, Problem *problem);
+
+// The head, or of a material that has none (all are deprecated) the newest revision; lists are
+// read. STATUS_NOT_FOUND, and then it is clear.
+Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem);
+
+// The separation rule that drop tests are to be read by: the query's, else the material's, else
+// zero penetration.
+Status material_separation(App *app, const Request *request, int *separation, Problem *problem);
+
 // A text and a time as members behind others: NULL and 0 are null.
 void material_put_text(Bytes *bytes, const char *name, const char *text);
 void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);

@@ -17,8 +17,9 @@
 #include "server/encode/answer.h"
 #include "server/http/doorman.h"
 #include "server/http/reply.h"
-#include "server/materials/catalogue.h"
 #include "server/jobs/documents.h"
+#include "server/jobs/uses.h"
+#include "server/materials/catalogue.h"
 
 const char no_impacts[] =
     "the scene asked for no ledger of impacts: their number is the summary's, their energy that of "
@@ -144,8 +145,52 @@ static const char *json_or(const char *json, const char *otherwise) {
     return json != NULL ? json : otherwise;
 }
 
-static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *simulation,
+static void write_said(App *app, Bytes *bytes, const Use *use) {
+    MaterialRevision material = {0};
+    if (catalogue_find(app->store, use->slug, use->revision, &material, NULL) == STATUS_OK) {
+        catalogue_write_said(bytes, &material);
+    } else { // no longer here: its numbers stand in the scene
+        bytes_text(bytes, "{\"slug\": ");
+        bytes_json_string(bytes, use->slug);
+        bytes_format(bytes, ", \"revision\": %llu}", use->revision);
+    }
+    material_revision_clear(&material);
+}
+
+static void write_link(App *app, Bytes *bytes, const Use *use) {
+    (void)app;
+    bytes_format(bytes,
+                 "{\"slug\": \"%s\", \"revision\": %llu, \"links\": {\"revision\": "
+                 "\"%s/v1/materials/%s@%llu\", \"used_by\": "
+                 "\"%s/v1/materials/%s/used-by?revision=%llu\"}}",
+                 use->slug, use->revision, link_base(), use->slug, use->revision, link_base(),
+                 use->slug, use->revision);
+}
+
+// What the scene and its study were made with, each in the words of `write`.
+static void write_materials(App *app, Bytes *bytes, const Inquiry *inquiry,
+                            void (*write)(App *app, Bytes *bytes, const Use *use)) {
+    Bytes lines = {0};
+    Use use;
+    const char *separator = "";
+    uses_write(&lines, inquiry);
+    const char *rest = lines.at;
+    bytes_text(bytes, "[");
+    while (uses_next(&rest, &use)) {
+        if (use.revision == 0)
+            continue;
+        bytes_text(bytes, separator);
+        write(app, bytes, &use);
+        separator = ", ";
+    }
+    bytes_text(bytes, "]");
+    bytes->is_failed = bytes->is_failed || lines.is_failed;
+    bytes_clear(&lines);
+}
+
+static void write_result(Bytes *bytes, const ResultRow *row, const Inquiry *inquiry,
                          const StudyAnswer *answer) {
+    const Simulation *simulation = &inquiry->simulation;
     bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
     bytes_json_string(bytes, row->engine);
     bytes_text(bytes, ", \"scene\": ");
@@ -167,6 +212,8 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Simulation *s
     bytes_real(bytes, row->sample_rate);
     bytes_format(bytes, ", \"count\": %llu, \"warnings\": ", (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
+    bytes_text(bytes, ", \"materials\": ");
+    write_materials(NULL, bytes, inquiry, write_link);
     bytes_text(bytes, ", \"study\": ");
     if (answer->study != NULL)
         document_answer(bytes, answer->study);
@@ -184,7 +231,7 @@ Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
     if (status == STATUS_OK && row->study != NULL)
         status = study_read(row, &answer, problem);
     if (status == STATUS_OK)
-        write_result(bytes, row, &inquiry.simulation, &answer);
+        write_result(bytes, row, &inquiry, &answer);
     inquiry_clear(&inquiry);
     fields_clear(study_answer_fields, &answer);
     return status;
@@ -205,50 +252,6 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
     return status;
 }
 
-static void write_used(App *app, Bytes *bytes, const char *name, bool is_first) {
-    char slug[64];
-    unsigned long long revision = 0;
-    const size_t size = strcspn(name, "@");
-    MaterialRevision material = {0};
-    if (name[size] == '@')
-        revision = strtoull(name + size + 1, NULL, 10);
-    bytes_text(bytes, is_first ? "" : ", ");
-    if (size < sizeof slug) {
-        memcpy(slug, name, size);
-        slug[size] = '\0';
-        if (catalogue_find(app->store, slug, revision, &material, NULL) == STATUS_OK) {
-            catalogue_write_said(bytes, &material);
-            material_revision_clear(&material);
-            return;
-        }
-        material_revision_clear(&material);
-    }
-    bytes_text(bytes, "{\"slug\": "); // no longer here: its numbers stand in the scene
-    bytes_json_string(bytes, name);
-    bytes_text(bytes, "}");
-}
-
-static void write_materials(App *app, Bytes *bytes, const Simulation *simulation) {
-    const Dampers *dampers = &simulation->scene.dampers;
-    const char *seen[64];
-    size_t count = 0;
-    bytes_text(bytes, "[");
-    for (size_t i = 0; i < 2 * dampers->count; i++) {
-        const Buffer *buffer =
-            damper_buffer(&dampers->at[i / 2], i % 2 == 0 ? SIDE_LEFT : SIDE_RIGHT);
-        if (buffer == NULL || buffer->material == NULL)
-            continue;
-        size_t at = 0;
-        while (at < count && strcmp(seen[at], buffer->material) != 0)
-            at++;
-        if (at < count || count == COUNT(seen))
-            continue;
-        write_used(app, bytes, buffer->material, count == 0);
-        seen[count++] = buffer->material;
-    }
-    bytes_text(bytes, "]");
-}
-
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem) {
     Inquiry inquiry = {0};
     const Status status = read_scene(row, &inquiry, problem);
@@ -265,7 +268,7 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
         bytes_text(bytes, "}, \"scene\": ");
         bytes_text(bytes, json_or(row->scene, "null"));
         bytes_text(bytes, ", \"materials\": ");
-        write_materials(app, bytes, &inquiry.simulation);
+        write_materials(app, bytes, &inquiry, write_said);
         bytes_format(
             bytes,
             ", \"again\": {\"method\": \"POST\", \"path\": \"%s/v1/jobs\", \"content_type\": "

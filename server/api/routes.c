@@ -21,6 +21,12 @@ static const char *const of_records[] = {"q", "limit", "after", NULL};
 static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
                                         "notes", "earthquake", "station", NULL};
 
+static const char *const of_measurement[] = {"separation", NULL};
+static const char *const of_measuring[] = {"dry_run", "separation", NULL};
+static const char *const of_proposal[] = {"measurements", "separation", "as", NULL};
+static const char *const of_derived[] = {"damper_mass", "structure_mass", "identified_for",
+                                         "separation", NULL};
+
 // clang-format off
 const Route routes[] = {
     {"POST",   "/v1/jobs",                              "submit", of_submit,    "Submit a scene; ?dry_run=1 only checks and plans it", jobs_create},
@@ -68,6 +74,7 @@ const Route routes[] = {
     {"POST",   "/v1/materials/import",                  "materials", of_import, "Bring materials in, all or none; ?dry_run=1 only judges them", materials_import},
     {"POST",   "/v1/materials/{slug}@{revision}/review", "materials", NULL,     "Approve or deprecate a revision, with a reason", materials_review},
     {"GET",    "/v1/materials/{slug}@{revision}/used-by", "read", of_pages,     "Results made with a revision, newest first", materials_uses_revision},
+    {"GET",    "/v1/materials/{slug}@{revision}/derived", "read", of_derived,   "What a revision comes to for a pair of masses", derived_show_revision},
     {"GET",    "/v1/materials/{slug}@{revision}",       "read",   NULL,         "One revision of a material", materials_show_revision},
     {"POST",   "/v1/materials/{slug}/revisions",        "materials", NULL,      "Add a revision of a material", materials_revise},
     {"GET",    "/v1/materials/{slug}/revisions",        "read",   of_pages,     "Revisions of a material, newest first", materials_revisions},
@@ -75,6 +82,12 @@ const Route routes[] = {
     {"GET",    "/v1/materials/{slug}/history",          "read",   of_pages,     "What was done to a material, by whom and why, newest first", materials_history},
     {"GET",    "/v1/materials/{slug}/diff",             "read",   of_diff,      "In what two revisions of a material differ", materials_diff},
     {"GET",    "/v1/materials/{slug}/used-by",          "read",   of_uses,      "How many results were made with each revision; ?revision= lists them", materials_uses},
+    {"GET",    "/v1/materials/{slug}/measurements",     "read",   of_pages,     "Drop tests of a material, newest first", measurements_list},
+    {"POST",   "/v1/materials/{slug}/measurements",     "materials", of_measuring, "Keep a drop test; ?dry_run=1 only evaluates it", measurements_create},
+    {"GET",    "/v1/materials/{slug}/measurements/{number}", "read", of_measurement, "A drop test and what it comes to", measurements_show},
+    {"GET",    "/v1/materials/{slug}/proposal.{format}", "read",  of_proposal,  "The revision that measurements would make, as json, or their chart as svg", proposals_show},
+    {"GET",    "/v1/materials/{slug}/proposal",         "read",   of_proposal,  "The revision that measurements would make, or their chart, format by Accept", proposals_show},
+    {"GET",    "/v1/materials/{slug}/derived",          "read",   of_derived,   "What a material comes to for a pair of masses: k_b, c_b with uncertainty", derived_show},
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
     {"POST",   "/v1/records",                           "materials", of_record, "Upload a ground motion's file, or its samples as JSON", records_create},
     {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list},

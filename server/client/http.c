@@ -27,7 +27,6 @@ typedef struct Transfer {
     size_t headers; // [B] so far
     uint64_t taken; // [B] handed to ask->take
     uint64_t continue_from;
-    char etag[256]; // strong, "" for none
     char location[256];
     bool has_ranges, is_right_range;
 } Transfer;
@@ -167,7 +166,7 @@ static size_t header_take(char *line, size_t one, size_t count, void *of) {
                                                           : (int)seconds;
     } else if (header_is(line, size, "etag", value, sizeof value)) {
         if (transfer->continue_from == 0)
-            text_fit(transfer->etag, sizeof transfer->etag, value[0] == '"' ? value : "");
+            text_fit(answer->etag, sizeof answer->etag, value[0] == '"' ? value : "");
     } else if (header_is(line, size, "accept-ranges", value, sizeof value)) {
         transfer->has_ranges = strcasecmp(value, "bytes") == 0;
     } else if (header_is(line, size, "location", value, sizeof value)) {
@@ -280,14 +279,18 @@ static bool headers_put(const Transfer *transfer, struct curl_slist **list) {
     if (transfer->http->token != NULL)
         is_well = is_well && header_put(list, "Authorization", token);
     if (ask->body != NULL)
-        is_well = is_well && header_put(list, "Content-Type", "application/json");
+        is_well = is_well &&
+                  header_put(list, "Content-Type",
+                             ask->content_type != NULL ? ask->content_type : "application/json");
+    if (ask->if_match != NULL)
+        is_well = is_well && header_put(list, "If-Match", ask->if_match);
     if (ask->prefer != NULL)
         is_well = is_well && header_put(list, "Prefer", ask->prefer);
     if (ask->idempotency_key != NULL)
         is_well = is_well && header_put(list, "Idempotency-Key", ask->idempotency_key);
     if (transfer->continue_from > 0)
         is_well = is_well && header_put(list, "Range", range) &&
-                  header_put(list, "If-Range", transfer->etag);
+                  header_put(list, "If-Range", transfer->answer->etag);
     return is_well;
 }
 
@@ -328,8 +331,8 @@ static CURLcode exchange(Transfer *transfer, const char *url, struct curl_slist 
 
 // Whether the rest of a body that was cut off may be asked for.
 static bool can_go_on(const Transfer *transfer, CURLcode code) {
-    return transfer->status == STATUS_OK && transfer->taken > 0 && transfer->etag[0] != '\0' &&
-           transfer->has_ranges &&
+    return transfer->status == STATUS_OK && transfer->taken > 0 &&
+           transfer->answer->etag[0] != '\0' && transfer->has_ranges &&
            (code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR || code == CURLE_GOT_NOTHING);
 }
 

@@ -34,7 +34,9 @@ bool http_exposes_token(const Http *http);
 typedef struct HttpAsk {
     const char *method;
     const char *path;            // "/v1/jobs?dry_run=1"
-    const Bytes *body;           // JSON; NULL: none
+    const Bytes *body;           // NULL: none
+    const char *content_type;    // of the body; NULL: JSON
+    const char *if_match;        // NULL: not sent
     const char *prefer;          // NULL: not sent
     const char *idempotency_key; // NULL: not sent
     // Where the body of a 200 goes as it comes, `most` bytes at most; NULL: it is kept. A body that
@@ -48,6 +50,7 @@ typedef struct HttpAsk {
 typedef struct HttpAnswer {
     int code;
     char content_type[64]; // without parameters
+    char etag[256];        // a strong one with its quotes; "" for none
     int retry_after;       // [s]; -1: not told
     Bytes body;
 } HttpAnswer;

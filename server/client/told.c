@@ -126,8 +126,9 @@ static Status status_of(int code, const char *type) {
     case 504:
         return STATUS_UNREACHABLE;
     case 409:
-    case 412:
         return STATUS_CONFLICT;
+    case 412:
+        return STATUS_STALE;
     default:
         return STATUS_INTERNAL;
     }

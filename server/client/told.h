@@ -28,8 +28,8 @@ bool job_told_event(const char *text, size_t size, const char *id, JobTold *job)
 void job_told_clear(JobTold *job);
 bool job_told_is_final(const JobTold *job);
 
-// The problem document of an answer that is none of 200, 202 and 206, as if it had been found here:
-// "pointer: detail (did you mean)". Always returns a status that is not OK.
+// The problem document of an answer that is none of 200 to 202 and 206, as if it had been found
+// here: "pointer: detail (did you mean)". Always returns a status that is not OK.
 Status problem_told_read(const HttpAnswer *answer, Problem *problem);
 // The same for the cause of a failed job.
 void problem_told_put(const ProblemTold *told, Status status, Problem *problem);

@@ -16,6 +16,7 @@ const SchemaDocument schema_documents[] = {
     {"material_revision", "A new revision of a material: all that it says, and why", material_revision_fields},
     {"material_revert", "A revision to say again", material_revert_fields},
     {"material_review", "What becomes of a revision", material_review_fields},
+    {"measurement", "A drop test as it was done: raw data", measurement_body_fields},
     {NULL, NULL, NULL},
 };
 // clang-format on

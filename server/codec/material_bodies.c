@@ -29,4 +29,10 @@ const Field material_review_fields[] = {
     FIELD_TEXT(MaterialReviewBody, reason, COMMENT_MOST, PRESENCE_REQUIRED, 0, "why"),
     FIELD_END
 };
+
+const Field measurement_body_fields[] = {
+    FIELD_BASE(MeasurementBody, test, drop_test_fields),
+    FIELD_TEXT(MeasurementBody, comment, COMMENT_MOST, PRESENCE_OPTIONAL, 0, "why it was made; \"drop test\" without"),
+    FIELD_END
+};
 // clang-format on

@@ -1,8 +1,9 @@
-// What people send to write materials: a new one, a revision, a revert, a review. Not what is
-// stored (store/material_rows.h). Read by api/, described by describe.c.
+// What people send to write materials: a new one, a revision, a revert, a review, a measurement.
+// Not what is stored (store/material_rows.h). Read by api/, described by describe.c.
 #ifndef SERVER_CODEC_MATERIAL_BODIES_H
 #define SERVER_CODEC_MATERIAL_BODIES_H
 
+#include "core/measure/drop_test.h"
 #include "core/scene/material.h"
 
 // A new material, or a new revision of one: then the slug is the address's.
@@ -25,5 +26,11 @@ typedef struct MaterialReviewBody {
     char *reason;
 } MaterialReviewBody;
 extern const Field material_review_fields[];
+
+typedef struct MeasurementBody {
+    DropTest test;
+    char *comment; // NULL: nothing is said
+} MeasurementBody;
+extern const Field measurement_body_fields[];
 
 #endif

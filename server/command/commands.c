@@ -14,6 +14,8 @@
 #include "server/command/ensemble.h"
 #include "server/command/get.h"
 #include "server/command/import.h"
+#include "server/command/materials.h"
+#include "server/command/records.h"
 #include "server/command/run.h"
 #include "server/command/serve.h"
 #include "server/command/submit.h"
@@ -41,12 +43,26 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,    &command_run,      &command_check,
-    &command_tradeoff, &command_ensemble, &command_study,
-    &command_sweep,    &command_import,   &command_token,
-    &command_backup,   &command_submit,   &command_watch,
-    &command_get,      &command_cancel,   &command_compare,
-    &command_help,     &command_version,  NULL,
+    &command_serve,
+    &command_run,
+    &command_check,
+    &command_tradeoff,
+    &command_ensemble,
+    &command_study,
+    &command_sweep,
+    &command_import,
+    &command_materials,
+    &command_records,
+    &command_token,
+    &command_backup,
+    &command_submit,
+    &command_watch,
+    &command_get,
+    &command_cancel,
+    &command_compare,
+    &command_help,
+    &command_version,
+    NULL,
 };
 
 static const char overview[] =
@@ -61,6 +77,7 @@ static const char overview[] =
     "  impactd study scene.json             the study that it asks for: compare, sensitivity\n"
     "  impactd sweep scene.json             the scene at many points: a grid or a list of values\n"
     "  impactd token create --name lab      let a client in who has this token\n"
+    "  impactd materials list               what the lab has measured, and what became of it\n"
     "  impactd backup lab.db                copy the database while the daemon runs\n"
     "  impactd import motion.AT2            make an excitation of a ground motion's file\n"
     "  impactd submit scene.json --wait 60  send it to a daemon, here or elsewhere\n"

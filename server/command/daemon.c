@@ -55,7 +55,8 @@ static void pause_for(double seconds) {
 Status daemon_ask(Daemon *daemon, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
     for (;;) {
         TRY(http_ask(daemon->http, ask, answer, problem));
-        if (answer->code == 200 || answer->code == 202)
+        if (answer->code == 200 || answer->code == 201 || answer->code == 202 ||
+            answer->code == 204)
             return STATUS_OK;
         const double pause = answer->retry_after > 0 ? answer->retry_after : 1;
         const bool is_busy = answer->code == 503 || answer->code == 429;

@@ -17,7 +17,7 @@ static bool has_operand(const Command *command, const char *part) {
 }
 
 // "create list" of "create|list [NAME]", where the first operand is one of a list.
-enum { ACTIONS_SIZE = 96 };
+enum { ACTIONS_SIZE = 160 };
 static bool actions_of(const Command *command, char actions[ACTIONS_SIZE]) {
     const char *operands = command->operands != NULL ? command->operands : "";
     const size_t length = strcspn(operands, " ");

@@ -11,8 +11,8 @@
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/gather.h"
-#include "server/jobs/prepare_record.h"
 #include "server/jobs/study.h"
+#include "server/jobs/uses.h"
 
 // A computation's run, or the study after it, as a part of the whole.
 typedef struct Part {
@@ -64,10 +64,10 @@ static Status describe(Computation *computation, Findings *findings) {
     document_work(&work, &outcome->work);
     document_warnings(&notes, &outcome->warnings);
     document_energy(&energy, &outcome->response.energy);
-    prepare_record_uses(&computation->inquiry, &uses);
     if (!document_impacts(&impacts, &outcome->response, &watch) ||
         (outcome->spectrum.densities.count > 0 && !document_psd(&psd, &outcome->spectrum, &watch)))
         status = STATUS_CANCELLED;
+    uses_write(&uses, &computation->inquiry);
     text_fit(row->id, sizeof row->id, computation->result);
     row->engine = strdup(engine_version);
     row->scene = strdup(computation->scene);

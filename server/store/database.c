@@ -15,7 +15,7 @@
 
 #include "server/store/row.h"
 
-enum { STATEMENTS = 96, APPLICATION = 0x696D7064 }; // "impd"
+enum { STATEMENTS = 192, APPLICATION = 0x696D7064 }; // "impd"
 
 typedef struct Kept {
     const char *sql;
@@ -261,6 +261,8 @@ Status database_open(const char *path, DatabaseMode mode, Database **database, P
     } else {
         sqlite3_extended_result_codes(made->connection, 1);
         sqlite3_busy_timeout(made->connection, 5000);
+        // No statement writes to the schema's own table, where the guards of rows stand.
+        (void)sqlite3_db_config(made->connection, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
         if (mode != DATABASE_COPY)
             status = check_owner(made, problem);
         if (status == STATUS_OK && mode == DATABASE_WRITER)

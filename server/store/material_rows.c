@@ -82,8 +82,13 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
         material_memory_put(memory, generation, revision, material);
         return STATUS_OK;
     }
+    MaterialState state;
+    TRY(store_material_state(store, slug, &state, problem));
     if (revision == 0)
-        return refuse_slug(slug, problem);
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "every revision of the material \"%.64s\" is deprecated; name one, as "
+                           "%.64s@%llu, to use it all the same",
+                           slug, slug, (unsigned long long)state.latest);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no material \"%.64s\" with a revision %llu", slug,
                        (unsigned long long)revision);
@@ -195,7 +200,7 @@ void material_measurements_clear(MaterialMeasurements *measurements) {
 Status store_material_trail(Store *store, const char *slug, MaterialDeeds *deeds,
                             Problem *problem) {
     static const char sql[] = "SELECT t.* FROM material_trail t JOIN materials m ON m.number = "
-                              "t.material WHERE m.slug = :slug ORDER BY t.number";
+                              "t.material WHERE m.slug = :slug ORDER BY t.version";
     const Key key = key_of(slug, 0);
     TRY(all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem));
     return deeds->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;

@@ -11,7 +11,8 @@ Status material_key_find(Database *database, const char *slug, uint64_t revision
         "SELECT m.number, "
         "(SELECT coalesce(max(revision), 0) FROM material_revisions r WHERE r.material = m.number) "
         "AS latest, "
-        "(SELECT count(*) FROM material_trail t WHERE t.material = m.number) AS version, "
+        "(SELECT coalesce(max(version), 0) FROM material_trail t WHERE t.material = m.number) AS "
+        "version, "
         "(SELECT coalesce(max(measurement), 0) FROM material_measurements t WHERE t.material = "
         "m.number) AS measurements, "
         "coalesce((SELECT coalesce((SELECT status FROM material_reviews v WHERE v.material = "
@@ -106,9 +107,10 @@ static const RowColumn slug_deed_columns[] = {
 Status material_deed_add(Database *database, const char *slug, const MaterialDeed *deed,
                          Problem *problem) {
     static const char sql[] =
-        "INSERT INTO material_trail (material, action, revision, measurement, who, why, "
-        "created_unix_ms) SELECT number, :action, nullif(:revision, 0), nullif(:measurement, 0), "
-        ":who, :why, :created_unix_ms FROM materials WHERE slug = :slug";
+        "INSERT INTO material_trail (material, version, action, revision, measurement, who, why, "
+        "created_unix_ms) SELECT number, 1 + (SELECT coalesce(max(version), 0) FROM "
+        "material_trail t WHERE t.material = m.number), :action, nullif(:revision, 0), "
+        "nullif(:measurement, 0), :who, :why, :created_unix_ms FROM materials m WHERE slug = :slug";
     const SlugDeed both = {(char *)slug, *deed};
     return database_change(database, sql, slug_deed_columns, &both, NULL, problem);
 }

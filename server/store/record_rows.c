@@ -299,7 +299,7 @@ static Status delete (Database *database, const void *work, Problem *problem) {
     if (found.results + found.jobs > 0)
         return problem_set(problem, STATUS_CONFLICT,
                            "the record \"%.64s\" is used by %llu result%s and %llu unfinished "
-                           "job%s: it can be deleted when they are",
+                           "job%s: it can be deleted when none is left",
                            deleting->key.name, (unsigned long long)found.results,
                            found.results == 1 ? "" : "s", (unsigned long long)found.jobs,
                            found.jobs == 1 ? "" : "s");

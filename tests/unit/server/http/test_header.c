@@ -2,6 +2,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -118,6 +119,23 @@ static void etags_match_in_lists_weak_or_not(void **state) {
     assert_false(header_etag_matches(NULL, "\"a\""));
 }
 
+static void strong_tags_of_a_list_come_one_after_the_other(void **state) {
+    (void)state;
+    static const char *const wanted[] = {"\"a\"", "*", "\"b, c\"", "\"\"", "\"*\""};
+    const char *list = "\"a\" , W/\"b\",*, \"b, c\", d, \"\",, \"*\"", *tag;
+    const char *rest = " ,, W/\"a\", a\"";
+    size_t size;
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        assert_true(header_etag_next(&list, &tag, &size));
+        assert_int_equal(size, strlen(wanted[i]));
+        assert_memory_equal(tag, wanted[i], size);
+    }
+    assert_false(header_etag_next(&list, &tag, &size));
+    assert_false(header_etag_next(&rest, &tag, &size));
+    rest = "\"";
+    assert_false(header_etag_next(&rest, &tag, &size));
+}
+
 static void content_types_are_compared_without_parameters(void **state) {
     (void)state;
     assert_true(header_type_is("application/json", "application/json"));
@@ -135,6 +153,7 @@ int main(void) {
         cmocka_unit_test(gzip_is_taken_where_it_is_named_or_all_is),
         cmocka_unit_test(ranges_of_ten_bytes),
         cmocka_unit_test(etags_match_in_lists_weak_or_not),
+        cmocka_unit_test(strong_tags_of_a_list_come_one_after_the_other),
         cmocka_unit_test(content_types_are_compared_without_parameters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

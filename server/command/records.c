@@ -1,0 +1,270 @@
+// The daemon reads the file and judges it; here it is sent as it is.
+#include "server/command/records.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "core/excite/import.h"
+#include "core/excite/record.h"
+#include "server/client/told_record.h"
+#include "server/command/daemon.h"
+#include "server/command/scene_file.h"
+
+enum { PAGE = 200 };
+
+typedef struct RecordsSettings {
+    char *server, *token_file, *ca_file;
+    char *name, *source, *processing, *earthquake, *station, *notes, *q;
+    double interval, wait;
+    int unit;
+    bool json;
+} RecordsSettings;
+
+// clang-format off
+static const Field records_fields[] = {
+    DAEMON_ROWS(RecordsSettings),
+    FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: what scenes call it (the file's name without its extension)"),
+    FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, where the file does not tell it"),
+    FIELD_CHOICE(RecordsSettings, unit, import_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2, over what the file tells"),
+    FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: where the file comes from"),
+    FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: what was done to it: filters, baseline"),
+    FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: which one"),
+    FIELD_TEXT(RecordsSettings, station, 200, PRESENCE_OPTIONAL, 0, "add: where it was measured, and in which direction"),
+    FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: what else one should know"),
+    FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: those alone that have this text in their words"),
+    FIELD_FLAG(RecordsSettings, json, false, "list and add: print what the daemon answers"),
+    FIELD_REAL(RecordsSettings, wait, "s", AT_LEAST(0), 0, "wait so long for a busy daemon (0)"),
+    FIELD_END,
+};
+// clang-format on
+
+static void answer_print(const HttpAnswer *answer) {
+    (void)fwrite(answer->body.at, 1, answer->body.count, stdout);
+}
+
+static void query_put(Bytes *path, const char *name, const char *value) {
+    if (value == NULL)
+        return;
+    bytes_format(path, "%s%s=", strchr(path->at, '?') == NULL ? "?" : "&", name);
+    http_encode(path, value);
+}
+
+static void line_print(const RecordTold *record) {
+    const double count = record->count == COUNT_ABSENT ? (double)NAN : (double)record->count;
+    printf("%-32s  %8.0f  %-10.6g  %-10.6g  %-10.6g  %s\n", record->name, count, record->interval,
+           record->duration, record->peak, record->source != NULL ? record->source : "-");
+}
+
+static Status list(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+                   Problem *problem) {
+    char after[RECORD_NAME_SIZE] = "";
+    (void)operand;
+    if (!settings->json)
+        printf("%-32s  %8s  %-10s  %-10s  %-10s  %s\n", "NAME", "SAMPLES", "INTERVAL s", "LENGTH s",
+               "PEAK m/s^2", "SOURCE");
+    for (size_t count = PAGE; count == PAGE;) {
+        Bytes path = {.most = 4000};
+        HttpAnswer answer = {0};
+        RecordsTold told = {{NULL, 0}};
+        bytes_format(&path, "/v1/records?limit=%d", PAGE);
+        query_put(&path, "q", settings->q);
+        query_put(&path, "after", after[0] != '\0' ? after : NULL);
+        const HttpAsk ask = {.method = "GET", .path = path.at};
+        Status status = daemon_ask(daemon, &ask, &answer, problem);
+        if (status == STATUS_OK)
+            status = records_told_read(&answer, &told, problem);
+        const RecordTold *at = told.records.at;
+        count = status == STATUS_OK ? told.records.count : 0;
+        if (status == STATUS_OK && settings->json)
+            answer_print(&answer);
+        for (size_t i = 0; i < count && !settings->json; i++)
+            line_print(&at[i]);
+        // A server that goes in circles is followed no further.
+        if (count == PAGE && strcmp(at[count - 1].name, after) <= 0)
+            status = problem_set(problem, STATUS_UNREACHABLE, "the list of records has no end");
+        else if (count > 0)
+            text_fit(after, sizeof after, at[count - 1].name);
+        records_told_clear(&told);
+        http_answer_clear(&answer);
+        bytes_clear(&path);
+        TRY(status);
+    }
+    return STATUS_OK;
+}
+
+// "I-ELC180" of "/data/I-ELC180.AT2", with dashes for what no name may have.
+static void name_of(const char *path, char name[RECORD_NAME_SIZE]) {
+    const char *slash = strrchr(path, '/'), *from = slash != NULL ? slash + 1 : path;
+    const char *point = strrchr(from, '.');
+    const size_t length = point != NULL && point > from ? (size_t)(point - from) : strlen(from);
+    snprintf(name, RECORD_NAME_SIZE, "%.*s",
+             (int)(length < RECORD_NAME_SIZE ? length : RECORD_NAME_SIZE - 1), from);
+    for (char *c = name; *c != '\0'; c++)
+        if (!((*c >= 'A' && *c <= 'Z') || (*c >= 'a' && *c <= 'z') || (*c >= '0' && *c <= '9') ||
+              strchr("._-", *c) != NULL))
+            *c = '-';
+}
+
+static void kept_tell(const char *path, const RecordTold *record, bool is_new) {
+    const RecordWarning *warnings = record->warnings.at;
+    fprintf(stderr, "%s: %s%s, %.0f samples, one every %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
+            is_new ? "" : "was there already; ", record->layout != NULL ? record->layout : "-",
+            record->count == COUNT_ABSENT ? (double)NAN : (double)record->count, record->interval,
+            record->peak, record->peak_time);
+    for (size_t i = 0; i < record->warnings.count; i++)
+        if (warnings[i].pointer != NULL && warnings[i].detail != NULL)
+            fprintf(stderr, "%s: warning: %s %s\n", path, warnings[i].pointer, warnings[i].detail);
+}
+
+static Status send(Daemon *daemon, const RecordsSettings *settings, const char *path,
+                   const Bytes *text, Problem *problem) {
+    char name[RECORD_NAME_SIZE];
+    Bytes target = {.most = 60000};
+    HttpAnswer answer = {0};
+    RecordTold record = {0};
+    name_of(path, name);
+    bytes_text(&target, "/v1/records");
+    query_put(&target, "name", settings->name != NULL ? settings->name : name);
+    query_put(&target, "unit",
+              settings->unit == CHOICE_ABSENT ? NULL : import_unit_names[settings->unit]);
+    query_put(&target, "source", settings->source);
+    query_put(&target, "processing", settings->processing);
+    query_put(&target, "earthquake", settings->earthquake);
+    query_put(&target, "station", settings->station);
+    query_put(&target, "notes", settings->notes);
+    if (!isnan(settings->interval)) {
+        bytes_text(&target, "&interval=");
+        bytes_real(&target, settings->interval);
+    }
+    const HttpAsk ask = {
+        .method = "POST", .path = target.at, .body = text, .content_type = "text/plain"};
+    Status status = target.is_failed ? problem_set(problem, STATUS_USAGE, "tells too much of it")
+                                     : daemon_ask(daemon, &ask, &answer, problem);
+    if (status == STATUS_OK)
+        status = record_told_read(&answer, &record, problem);
+    if (status == STATUS_OK && settings->json) {
+        answer_print(&answer);
+    } else if (status == STATUS_OK) {
+        kept_tell(scene_file_name(path), &record, answer.code == 201);
+        printf("%s\n", record.name);
+    }
+    record_told_clear(&record);
+    http_answer_clear(&answer);
+    bytes_clear(&target);
+    return status;
+}
+
+static Status add(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+                  Problem *problem) {
+    Bytes text;
+    Status status = scene_file_read(operand, &text, problem);
+    if (status == STATUS_OK)
+        status = send(daemon, settings, operand, &text, problem);
+    bytes_clear(&text);
+    return status;
+}
+
+static Status ask_for(Daemon *daemon, const char *method, const char *name, Problem *problem) {
+    Bytes path = {.most = 4000};
+    HttpAnswer answer = {0};
+    bytes_text(&path, "/v1/records/");
+    http_encode(&path, name);
+    const HttpAsk ask = {.method = method, .path = path.at};
+    const Status status = path.is_failed
+                              ? problem_set(problem, STATUS_USAGE, "is too long for a name")
+                              : daemon_ask(daemon, &ask, &answer, problem);
+    if (status == STATUS_OK && answer.body.count > 0)
+        answer_print(&answer);
+    http_answer_clear(&answer);
+    bytes_clear(&path);
+    return status;
+}
+
+static Status show(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+                   Problem *problem) {
+    (void)settings;
+    return ask_for(daemon, "GET", operand, problem);
+}
+
+static Status forget(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+                     Problem *problem) {
+    (void)settings;
+    TRY(ask_for(daemon, "DELETE", operand, problem));
+    fprintf(stderr, "The record \"%s\" is deleted.\n", operand);
+    return STATUS_OK;
+}
+
+static const struct Action {
+    const char *name, *operand; // NULL: takes none
+    Status (*act)(Daemon *daemon, const RecordsSettings *settings, const char *operand,
+                  Problem *problem);
+} actions[] = {
+    {"list", NULL, list},
+    {"add", "a file", add},
+    {"show", "the name of a record", show},
+    {"delete", "the name of a record", forget},
+};
+
+static const struct Action *choose(const Options *options, Problem *problem) {
+    const char *name = options->operand_count > 0 ? options->operands[0] : "";
+    for (size_t i = 0; i < COUNT(actions); i++) {
+        if (strcmp(actions[i].name, name) != 0)
+            continue;
+        const size_t takes = actions[i].operand != NULL ? 2 : 1;
+        if (options->operand_count == takes &&
+            (takes == 1 ||
+             (options->operands[1][0] != '\0' && strcmp(options->operands[1], "..") != 0)))
+            return &actions[i];
+        (void)problem_set(problem, STATUS_USAGE, "%s takes %s", name,
+                          actions[i].operand != NULL ? actions[i].operand : "nothing more");
+        return NULL;
+    }
+    (void)problem_set(problem, STATUS_USAGE,
+                      "the first operand must be list, add, show or delete%s%.60s%s",
+                      name[0] != '\0' ? ", is \"" : "", name, name[0] != '\0' ? "\"" : "");
+    return NULL;
+}
+
+static int records(void *of, const Options *options, Problem *problem) {
+    const RecordsSettings *settings = of;
+    const struct Action *action = choose(options, problem);
+    if (action == NULL)
+        return command_refuse("records", problem);
+    const char *operand = action->operand != NULL ? options->operands[1] : NULL;
+    Daemon daemon;
+    Status status = daemon_open(settings->server, settings->token_file, settings->ca_file,
+                                settings->wait, &daemon, problem);
+    if (status == STATUS_OK)
+        status = action->act(&daemon, settings, operand, problem);
+    daemon_close(&daemon);
+    return status == STATUS_OK
+               ? COMMAND_OK
+               : daemon_refuse("records", operand != NULL ? operand : "records", status, problem);
+}
+
+static int records_run(int argc, char *const *argv) {
+    RecordsSettings settings;
+    return command_with_options("records", records_fields, &settings, argc, argv, records);
+}
+
+const Command command_records = {
+    .name = "records",
+    .operands = "list|add|show|delete [FILE-or-NAME]",
+    .summary = "ground motions that a daemon keeps, for scenes to name",
+    .help =
+        "  impactd records add I-ELC180.AT2 --source 'PEER, RSN6' --processing 'as published'\n"
+        "  impactd records add column.txt --name tabas --interval 0.02 --unit g\n"
+        "  impactd records list --q elcentro\n"
+        "  impactd records show I-ELC180                   all that is known of it, as JSON\n"
+        "  impactd records delete I-ELC180                 if no result was made with it\n"
+        "\n"
+        "A scene names it: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The "
+        "layouts are "
+        "those of\n"
+        "\"impactd help import\". A record never changes: with other processing it is another one. "
+        "Exit code 3\n"
+        "if the file has faults, 4 if there is no such record, 1 if it is used or its name is "
+        "taken.\n",
+    .options = records_fields,
+    .run = records_run,
+};

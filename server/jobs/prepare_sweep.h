@@ -1,0 +1,14 @@
+// A sweep made ready: names on its axes become revisions, materials are pinned, all is judged and
+// completed. Not its points (core/study/sweep_plan.h). Used by prepare.c.
+#ifndef SERVER_JOBS_PREPARE_SWEEP_H
+#define SERVER_JOBS_PREPARE_SWEEP_H
+
+#include "core/study/inquiry.h"
+#include "server/store/store.h"
+
+// Behind prepare_materials, in place of inquiry_complete, of an inquiry whose study is a sweep.
+// Adds all faults, those of names among them.
+Status prepare_sweep(Store *store, Inquiry *inquiry, const SimulationLimits *limits,
+                     Warnings *warnings, Problem *problem);
+
+#endif

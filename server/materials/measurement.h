@@ -1,0 +1,30 @@
+// A measurement as the rest of the server takes it: the store's row with its drop test read, and
+// the JSON that it and evaluations are told in. Not the evaluation itself
+// (core/measure/evaluation.h). Used by api/.
+#ifndef SERVER_MATERIALS_MEASUREMENT_H
+#define SERVER_MATERIALS_MEASUREMENT_H
+
+#include "core/measure/evaluation.h"
+#include "server/base/bytes.h"
+#include "server/store/material_rows.h"
+
+typedef struct StoredTest {
+    MaterialMeasurement row;
+    DropTest test;
+} StoredTest;
+
+// STATUS_NOT_FOUND. Cleared by stored_test_clear in any case; `stored` is all zero before.
+Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredTest *stored,
+                        Problem *problem);
+void stored_test_clear(StoredTest *stored);
+
+// Whose it is, and when: `"slug": ..., "measurement": ...` without braces.
+void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row);
+// Of the test all but its readings, of which the numbers are told; a whole object.
+void measurement_write_brief(Bytes *bytes, const StoredTest *stored);
+// `"links": {...}`.
+void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number);
+// `"evaluation": {...}, "warnings": [...]`.
+void evaluation_write(Bytes *bytes, const Evaluation *evaluation);
+
+#endif
