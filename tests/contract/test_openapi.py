@@ -227,6 +227,16 @@ def test_real_answers_have_the_promised_shapes():
         program.finished(daemon, {**program.scene("paper_free_sponge"), "excitation": {"kind": "record", "name": "shake"}})
         call("DELETE", "/v1/records/{name}", "/v1/records/shake")
 
+        table, bring = {"Content-Type": "text/csv"}, "/v1/materials/import"
+        for target in (bring + "?dry_run=1", bring):
+            call("POST", bring, target, body="slug,name,source,restitution\nfelt,Felt,s,0.5\n", headers=table)
+        call("POST", bring, bring, json=daemon.get("/v1/materials.json").json())
+        call("POST", bring, bring, body="slug,restitution\nfelt,5\n", headers=table)
+        call("POST", bring, bring, json=[])
+        call("POST", bring, bring, body="{", headers={"Content-Type": "application/json"})
+        call("POST", bring, bring, body="x", headers=text)
+        call("POST", bring, bring, body=b" " * (1 << 24) + b"x", headers=table)
+
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{swept['result']}")
