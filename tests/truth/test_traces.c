@@ -65,7 +65,7 @@ static void stated_intervals_cover_the_truth(void **state) {
         double restitution, samples, noise;
     } cells[] = {
         {0, 0.3, 8.4, 0.01},  {0, 0.5, 8, 0.02},    {0, 0.5, 20, 0.02},   {0, 0.7, 12.3, 0.05},
-        {0, 0.95, 8, 0.05},   {0, 0.8, 60.5, 0.03}, {0, 0.1, 20.6, 0.02}, {1, 0.3, 8, 0.02},
+        {0, 0.95, 8, 0.05},   {0, 0.8, 60.5, 0.03}, {0, 0.1, 20.6, 0.05}, {1, 0.3, 8, 0.02},
         {1, 0.5, 8.6, 0.05},  {1, 0.5, 20, 0.01},   {1, 0.7, 15.2, 0.03}, {1, 0.95, 20, 0.05},
         {1, 0.3, 40.3, 0.05}, {1, 0.1, 50, 0.01},
     };
@@ -105,9 +105,12 @@ static void too_few_samples_give_an_interval_that_holds_the_truth(void **state) 
                         .before = 12,
                     };
                     const TraceScore score = traces_score(&cell, 11, 100);
-                    if (score.figures > 0 || score.covered_all < 0.95) {
+                    // Now and then nothing is seen at all.
+                    if (score.figures > 0 ||
+                        score.covered_all < 0.98 * (double)score.found / (double)score.trials) {
                         print_score(&cell, &score);
-                        fail_msg("%zu figures", score.figures);
+                        fail_msg("%zu figures, %.3f below, %.3f above, %zu found", score.figures,
+                                 score.below, score.above, score.found);
                     }
                 }
 }
@@ -122,12 +125,13 @@ static void simulate(double restitution, double contact_time, int separation, Cl
     const double omega = 2 * 3.14159265358979 / (1000 * contact_time);
     sdof->stiffness = sdof->mass * omega * omega;
     sdof->damping = 0;
-    scene->dampers.at[0].buffer.contact.separation = separation;
+    scene_choose(&scene->contact, &contact_kinds, "spring_damper");
+    ((Contact *)(void *)scene->contact)->separation = separation;
     scene->duration = 250 * contact_time;
     scene->sample_rate = 2 / contact_time;
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(simulation_complete(&simulation, NULL, &problem), STATUS_OK);
+    assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(closeup_make(&simulation, 1, 20001, NULL, NULL, NULL, closeup, &problem),
                      STATUS_OK);
     fields_clear(simulation_fields, &simulation);
@@ -177,7 +181,10 @@ static void what_the_core_simulates_is_read_back(void **state) {
                         fail_msg("%s, e %g, T_c %g at %g samples: %g, %g", rule(separation),
                                  restitutions[i], times[j], rates[k], contact->contact_time,
                                  contact->restitution);
-                    assert_true(fabs(fabs(contact->impulse) / closeup.impact.impulse - 1) < 0.005);
+                    if (!(fabs(fabs(contact->impulse) / closeup.impact.impulse - 1) < 0.005))
+                        fail_msg("%s, e %g, T_c %g at %g samples: impulse %g is %g",
+                                 rule(separation), restitutions[i], times[j], rates[k],
+                                 closeup.impact.impulse, contact->impulse);
                     worst = fmax(worst, off);
                     trace_reading_clear(&reading);
                 }
