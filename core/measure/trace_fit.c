@@ -128,8 +128,7 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
     } else {
         left += all;
     }
-    return (TraceResidue){
-        .sum = m * left + window->scatter, .amplitude = A, .baseline = b, .model_square = m * ff};
+    return (TraceResidue){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
 
 TraceResidue trace_residue(const TraceWindow *window, const TracePoint *point,
@@ -275,13 +274,13 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
 }
 
 double trace_variance(const TraceWindow *window, double sum) {
-    const double n = (double)(window->blocks * window->per_block) + window->noise_freedom;
+    const double n = (double)window->blocks + window->noise_freedom;
     // Rounding of the data and of the model is noise as well.
     return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-16;
 }
 
 double trace_likelihood(const TraceWindow *window, double sum) {
-    const double n = (double)(window->blocks * window->per_block) + window->noise_freedom;
+    const double n = (double)window->blocks + window->noise_freedom;
     return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-16);
 }
 
