@@ -64,10 +64,10 @@ static void stated_intervals_cover_the_truth(void **state) {
         int separation;
         double restitution, samples, noise;
     } cells[] = {
-        {0, 0.3, 8.4, 0.01},  {0, 0.5, 8, 0.02},    {0, 0.5, 20, 0.02},   {0, 0.7, 12.3, 0.05},
-        {0, 0.95, 8, 0.05},   {0, 0.8, 60.5, 0.03}, {0, 0.1, 20.6, 0.05}, {1, 0.3, 8, 0.02},
-        {1, 0.5, 8.6, 0.05},  {1, 0.5, 20, 0.01},   {1, 0.7, 15.2, 0.03}, {1, 0.95, 20, 0.05},
-        {1, 0.3, 40.3, 0.05}, {1, 0.1, 50, 0.01},
+        {0, 0.3, 8.4, 0.01}, {0, 0.5, 8, 0.02},    {0, 0.5, 20, 0.02},   {0, 0.7, 12.3, 0.05},
+        {0, 0.95, 8, 0.05},  {0, 0.8, 40.5, 0.03}, {0, 0.1, 20.6, 0.05}, {1, 0.3, 8, 0.02},
+        {1, 0.5, 8.6, 0.05}, {1, 0.5, 20, 0.01},   {1, 0.7, 15.2, 0.03}, {1, 0.95, 20, 0.05},
+        {1, 0.1, 30, 0.01},
     };
     for (size_t i = 0; i < COUNT(cells); i++) {
         const TraceCell cell = {
@@ -115,20 +115,20 @@ static void too_few_samples_give_an_interval_that_holds_the_truth(void **state) 
                 }
 }
 
-// The contact force of the first impact on the stop of a structure so slow that its spring does
-// nothing in a contact, by the exact solver.
+// The contact force of the first impact on the stop of a structure so slow that its spring
+// does nothing in a contact, by the exact solver.
 static void simulate(double restitution, double contact_time, int separation, Closeup *closeup) {
     Simulation simulation;
     scene_with_damper(&simulation, restitution, contact_time);
     Scene *scene = &simulation.scene;
     StructureSdof *sdof = (StructureSdof *)(void *)scene->structure;
-    const double omega = 2 * 3.14159265358979 / (1000 * contact_time);
+    const double omega = 2 * 3.14159265358979 / (1e5 * contact_time);
     sdof->stiffness = sdof->mass * omega * omega;
     sdof->damping = 0;
     scene_choose(&scene->contact, &contact_kinds, "spring_damper");
     ((Contact *)(void *)scene->contact)->separation = separation;
-    scene->duration = 250 * contact_time;
-    scene->sample_rate = 2 / contact_time;
+    scene->duration = 25000 * contact_time;
+    scene->sample_rate = 0.02 / contact_time;
     Problem problem;
     problem_clear(&problem);
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
