@@ -257,14 +257,18 @@ static void pull_window(const TraceWay *way, size_t number, double interval, dou
         window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
         return;
     }
-    for (int round = 0; round < 4 && way->effective_mass > 0; round++) {
+    for (int round = 0; round < 20 && way->effective_mass > 0; round++) {
         TraceFit fits[TRACE_FITS_MOST];
         TraceShape shape;
         double T;
         if (trace_fit(window, fits) == 0 || !trace_point_shape(window, &fits->at, &shape, &T))
             return;
         const double momentum = fits->residue.amplitude * T * peak * interval;
-        window->pull_rate = way->effective_mass * way->gravity / momentum * interval;
+        const double rate = way->effective_mass * way->gravity / momentum * interval;
+        const bool is_there = fabs(rate - window->pull_rate) < 1e-6 * rate;
+        window->pull_rate = rate;
+        if (is_there)
+            return;
     }
 }
 

@@ -87,8 +87,9 @@ static void several_contacts_are_found_whatever_sign_and_baseline(void **state) 
             assert_true(contact->peak * sign > 0 && contact->impulse * sign > 0);
             assert_true(fabs(contact->start - starts[i]) < 1e-4);
             assert_true(fabs(contact->end - starts[i] - 0.004) < 1.5e-4);
-            assert_true(contact->least_contact_time < 0.004 && contact->most_contact_time > 0.004);
             assert_true(contact->contact_time_uncertainty < 1e-4);
+            assert_true(fabs(contact->contact_time - 0.004) <
+                        3.5 * contact->contact_time_uncertainty);
             assert_true(fabs(contact->impulse) > 0.97 * 0.1 * v0 * 1.61 &&
                         fabs(contact->impulse) < 1.03 * 0.1 * v0 * 1.61);
             assert_true(contact->misfit > 0.6 && contact->misfit < 1.5);
@@ -226,7 +227,9 @@ static void gravity_is_taken_out_where_it_is_told(void **state) {
                 const TraceContact *contact = reading.contacts.at;
                 assert_null(contact->why);
                 assert_true(fabs(contact->end - contact->start - lasted) < 1e-3 * lasted);
-                assert_true(fabs(contact->contact_time - 0.025) < 2e-3 * 0.025);
+                if (!(fabs(contact->contact_time - 0.025) < 2e-3 * 0.025))
+                    fail_msg("rule %d at %g m/s, %s: %g s", rule, speeds[i],
+                             by_mass ? "by mass" : "by speed", contact->contact_time);
                 assert_true(fabs(contact->restitution - 0.61) < 5e-3);
                 trace_reading_clear(&reading);
                 way.approach_speed_count = 0;
@@ -303,7 +306,7 @@ static void many_contacts_end_at_a_limit_that_is_told(void **state) {
     Record record;
     record_new(&record, 1e-4, 4000, 0);
     for (size_t i = 10; i < 4000; i += 10)
-        record.values[i] = 1;
+        record.values[i] = 1 + 1e-6 * (double)i;
     TraceReading reading = look(&record, &usual);
     assert_int_equal(reading.contacts.count, TRACE_CONTACTS_MOST);
     assert_non_null(strstr(reading.why, "only the first"));
