@@ -294,7 +294,7 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
     if (way->gravity > 0)
         pull_window(way, number, interval, fabs(run->peak), window);
     TRY(fit_contact(window, found, run, &stretch, interval, contact));
-    if (way->gravity > 0 && !(window->pull_rate > 0) && contact->why == NULL) {
+    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time)) {
         contact->is_doubtful = true;
         return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
                                    "nor the masses are known");
