@@ -209,6 +209,21 @@ def test_large_tests_are_taken():
         assert answer["evaluation"]["contact_time"]["count"] >= 1200, answer["evaluation"]["contact_time"]
 
 
+def test_more_than_can_be_taken_is_told():
+    """A body over the limit: 413; more readings than are evaluated at a time: 422, and fewer measurements go."""
+    many = {"gravity": 0, "drops": [{"approach_speed": 1, "rebound_speed": 0.5}] * 1000}
+    with program.daemon() as daemon:
+        large = daemon.request("POST", f"{SPONGE}/measurements", body=b" " * (1 << 24) + b"x", headers={"Content-Type": "application/json"})
+        asking.problem(large, 413)
+        asking.problem(daemon.request("POST", f"{SPONGE}/measurements", body=b"{}", headers={"Content-Type": "text/csv"}), 415)
+        for _ in range(21):
+            assert post(daemon, many).status == 201
+        for target in ("proposal", "proposal.json"):
+            assert "fewer measurements" in asking.problem(daemon.get(f"{SPONGE}/{target}"), 422)["detail"]
+        some = daemon.get(f"{SPONGE}/proposal?measurements=1,2").json()
+        assert some["evaluation"]["restitution"]["count"] == 2000, some["evaluation"]["restitution"]
+
+
 def test_measurements_come_in_pages():
     """Newest first, Link to the next page, each once."""
     with program.daemon() as daemon:
