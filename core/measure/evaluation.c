@@ -195,7 +195,7 @@ static Status check_size(const Measurement *tests, size_t count, Problem *proble
 }
 
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       Evaluation *evaluation, Problem *problem) {
+                       const Watch *watch, Evaluation *evaluation, Problem *problem) {
     const double none = (double)NAN;
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
@@ -205,7 +205,7 @@ Status evaluation_make(const Measurement *tests, size_t count, Separation separa
                                .most_temperature = none};
     TRY(check_size(tests, count, problem));
     for (size_t i = 0; i < count; i++)
-        TRY(rows_add(&tests[i], i, evaluation, problem));
+        TRY(rows_add(&tests[i], i, watch, evaluation, problem));
     TRY(rows_unpull(tests, count, evaluation, problem));
     choose_restitutions(evaluation);
     find_ranges(tests, count, evaluation);

@@ -102,9 +102,10 @@ extern const Field evaluation_fields[]; // without the warnings
 size_t evaluation_samples(const Measurement *tests, size_t count);
 
 // `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
-// STATUS_LIMIT: too many rows or samples. Cleared by evaluation_clear in any case.
+// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody) says
+// so. Cleared by evaluation_clear in any case.
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       Evaluation *evaluation, Problem *problem);
+                       const Watch *watch, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
 
 #endif

@@ -18,6 +18,10 @@
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
 
+// Of evaluations: samples in traces that take a moment, and how many longer ones go at once.
+enum { SAMPLES_QUICK = 20000, LONG_MOST = 4 };
+static const double patience_most = 30; // [s]
+
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem) {
     const char *slug = request->parameters[0];
     TRY(query_choice(request, "separation", separation_names, CHOICE_ABSENT, separation, problem));
@@ -43,6 +47,50 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
         return STATUS_OK;
     material_revision_clear(revision);
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
+}
+
+typedef struct Patience {
+    App *app;
+    int64_t until_ns; // monotonic
+} Patience;
+
+static bool is_patient(void *context, double fraction) {
+    const Patience *patience = context;
+    (void)fraction;
+    return !atomic_load(&patience->app->is_stopping) && clock_monotonic_ns() < patience->until_ns;
+}
+
+static Status evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                       Evaluation *evaluation, Problem *problem) {
+    Patience patience = {app, clock_monotonic_ns() + (int64_t)(1e9 * patience_most)};
+    const Watch watch = {&patience, is_patient};
+    const Status status =
+        evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
+    if (status != STATUS_CANCELLED)
+        return status;
+    if (atomic_load(&app->is_stopping))
+        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    return problem_set(problem, STATUS_LIMIT,
+                       "to find all contacts of these traces takes more than %g s: cut the traces, "
+                       "or take in fewer measurements at a time",
+                       patience_most);
+}
+
+Status material_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                         Evaluation *evaluation, Reply *reply, Problem *problem) {
+    *evaluation = (Evaluation){.separation = separation};
+    if (evaluation_samples(tests, count) <= SAMPLES_QUICK)
+        return evaluate(app, tests, count, separation, evaluation, problem);
+    Status status = STATUS_BUSY;
+    if (atomic_fetch_add(&app->evaluations, 1) < LONG_MOST) {
+        status = evaluate(app, tests, count, separation, evaluation, problem);
+    } else {
+        reply->retry_after = 10;
+        (void)problem_set(problem, STATUS_BUSY,
+                          "other long force traces are being evaluated: ask again");
+    }
+    atomic_fetch_sub(&app->evaluations, 1);
+    return status;
 }
 
 // The body, judged. Cleared by fields_clear in any case.
@@ -121,7 +169,7 @@ static Status create(App *app, const Request *request, const MeasurementBody *bo
     TRY(material_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    Status status = evaluation_make(&test, 1, (Separation)separation, &evaluation, problem);
+    Status status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
     if (status == STATUS_OK && is_dry == 1)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
@@ -202,7 +250,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
         Evaluation evaluation;
-        status = evaluation_make(&test, 1, (Separation)separation, &evaluation, problem);
+        status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
         if (status == STATUS_OK)
             status = tell(app, &stored.row, &stored.test, &evaluation, 200, reply, problem);
         evaluation_clear(&evaluation);

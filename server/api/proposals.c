@@ -157,7 +157,7 @@ static Status propose(App *app, const Request *request, const Material *before, 
     Evaluation evaluation;
     Proposal proposal = {.why = NULL};
     Status status =
-        evaluation_make(taken->tests, taken->count, (Separation)separation, &evaluation, problem);
+        material_evaluate(app, taken->tests, taken->count, separation, &evaluation, reply, problem);
     if (status == STATUS_OK)
         status = proposal_make(&evaluation, taken->tests, taken->count, before, (ProposalForm)form,
                                &proposal, problem);
