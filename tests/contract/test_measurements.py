@@ -224,6 +224,29 @@ def test_more_than_can_be_taken_is_told():
         assert some["evaluation"]["restitution"]["count"] == 2000, some["evaluation"]["restitution"]
 
 
+def test_long_traces_do_not_keep_the_daemon():
+    """While a trace of a thousand contacts is evaluated others are answered, and SIGTERM ends the daemon in its time."""
+    pulse = [80 * math.exp(-0.0008 * i) * math.sin(math.pi * i / 600) for i in range(601)]
+    noise = random.Random(2)
+    force = [round(noise.gauss(0, 0.8), 2) for _ in range(1000)] * 1000
+    for at in range(250, len(force) - 700, 1100):
+        force[at:at + 601] = [round(a + b, 2) for a, b in zip(force[at:at + 601], pulse)]
+    body = json.dumps({"gravity": 0, "traces": [{"interval": 1e-6, "force": force}]})
+    with program.daemon() as daemon:
+        asked = threading.Thread(target=lambda: answers.append(daemon.request(
+            "POST", f"{SPONGE}/measurements", body=body, headers={"Content-Type": "application/json"}, timeout=300)))
+        answers = []
+        asked.start()
+        while asked.is_alive() and len(answers) == 0 and daemon.get("/metrics").status == 200:
+            time.sleep(0.5)
+            if daemon.get(SPONGE).status == 200 and time.monotonic() - daemon.began > 3:
+                break
+        daemon.request("GET", "/health/live")
+    # The daemon's end, within its time, is what program.daemon() asserts.
+    asked.join(60)
+    assert not asked.is_alive()
+
+
 def test_measurements_come_in_pages():
     """Newest first, Link to the next page, each once."""
     with program.daemon() as daemon:
