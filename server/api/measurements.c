@@ -142,8 +142,11 @@ static Status tell(App *app, const MaterialMeasurement *row, const DropTest *tes
     return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
-static Status keep(App *app, const Request *request, const MeasurementBody *body, uint64_t seen,
-                   const Evaluation *evaluation, Reply *reply, Problem *problem) {
+// The tag that is told is that of the writer's own state: of what others have written since they
+// know nothing.
+static Status keep(App *app, const Request *request, const MeasurementBody *body,
+                   const MaterialState *state, uint64_t seen, const Evaluation *evaluation,
+                   Reply *reply, Problem *problem) {
     Bytes document = {0};
     write_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
     char *text = bytes_take(&document, NULL);
@@ -157,12 +160,16 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
                                .document = text};
     Status status = store_material_measure(app->store, &row, seen, problem);
     free(text);
-    return status == STATUS_OK ? tell(app, &row, &body->test, evaluation, 201, reply, problem)
-                               : status;
+    if (status != STATUS_OK)
+        return status;
+    char tag[MATERIAL_TAG];
+    material_tag(row.slug, state->latest, state->version + 1, tag);
+    snprintf(reply->etag, sizeof reply->etag, "\"%s\"", tag);
+    return tell(app, &row, &body->test, evaluation, 201, reply, problem);
 }
 
-static Status create(App *app, const Request *request, const MeasurementBody *body, uint64_t seen,
-                     Reply *reply, Problem *problem) {
+static Status create(App *app, const Request *request, const MeasurementBody *body,
+                     const MaterialState *state, uint64_t seen, Reply *reply, Problem *problem) {
     size_t is_dry;
     int separation;
     TRY(request_count(request, "dry_run", 0, 1, 0, &is_dry, problem));
@@ -173,7 +180,7 @@ static Status create(App *app, const Request *request, const MeasurementBody *bo
     if (status == STATUS_OK && is_dry == 1)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
-        status = keep(app, request, body, seen, &evaluation, reply, problem);
+        status = keep(app, request, body, state, seen, &evaluation, reply, problem);
     evaluation_clear(&evaluation);
     return status;
 }
@@ -186,7 +193,7 @@ Status measurements_create(App *app, const Request *request, Reply *reply, Probl
     TRY(material_condition(app, request, request->parameters[0], false, &seen, &state, problem));
     Status status = read_body(request, &body, problem);
     if (status == STATUS_OK)
-        status = create(app, request, &body, seen, reply, problem);
+        status = create(app, request, &body, &state, seen, reply, problem);
     fields_clear(measurement_body_fields, &body);
     return status;
 }

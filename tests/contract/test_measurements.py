@@ -274,7 +274,8 @@ def test_writers_that_have_seen_an_older_state_are_told():
     """If-Match is honoured where it is sent: 412 where the material has changed, 201 with its tag, and without it."""
     with program.daemon() as daemon:
         tag = daemon.get(SPONGE).headers["etag"]
-        assert post(daemon, drops([0.6]), headers={"If-Match": tag}).status == 201
+        made = post(daemon, drops([0.6]), headers={"If-Match": tag})
+        assert made.status == 201 and made.headers["etag"] == daemon.get(SPONGE).headers["etag"] != tag, made
         asking.problem(post(daemon, drops([0.6]), headers={"If-Match": tag}), 412)
         assert post(daemon, drops([0.6])).status == 201
         assert daemon.get(f"{SPONGE}/measurements").json()["count"] == 2
