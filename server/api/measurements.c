@@ -17,6 +17,7 @@
 #include "server/materials/measurement.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
+enum { PAGE_MOST = 32 << 20 }; // bytes of documents that are read for one page
 
 // Of evaluations: samples in traces that take a moment, and how many longer ones go at once.
 enum { SAMPLES_QUICK = 20000, LONG_MOST = 4 };
@@ -215,12 +216,14 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %zu, \"measurements\": [", slug, count);
     Status status = STATUS_OK;
-    for (size_t i = beyond - 1; i >= least && status == STATUS_OK; i--) {
+    size_t next = beyond, size = 0;
+    while (next > least && status == STATUS_OK && size < PAGE_MOST) {
         StoredTest stored = {.row = {.slug = NULL}};
-        status = stored_test_load(app->store, slug, i, &stored, problem);
+        status = stored_test_load(app->store, slug, --next, &stored, problem);
+        bytes_text(&bytes, next + 1 < beyond ? ",\n " : "");
         if (status == STATUS_OK)
             measurement_write_brief(&bytes, &stored);
-        bytes_text(&bytes, i > least ? ",\n " : "");
+        size += stored.row.document != NULL ? strlen(stored.row.document) : 0;
         stored_test_clear(&stored);
     }
     bytes_text(&bytes, "]}\n");
@@ -229,8 +232,8 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
         return status;
     }
     char number[24];
-    snprintf(number, sizeof number, "%zu", least);
-    if (least > 1)
+    snprintf(number, sizeof number, "%zu", next);
+    if (next > 1)
         query_link_next(request, reply, "before", number);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

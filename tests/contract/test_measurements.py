@@ -224,6 +224,13 @@ def test_more_than_can_be_taken_is_told():
             assert post(daemon, many).status == 201
         for target in ("proposal", "proposal.json"):
             assert "fewer measurements" in asking.problem(daemon.get(f"{SPONGE}/{target}"), 422)["detail"]
+        silence = json.dumps({"traces": [{"interval": 1e-6, "force": [0] * 600000}]})
+        for _ in range(2):
+            made = post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120)
+            assert made.status == 201, made
+        assert "samples in traces" in asking.problem(daemon.get(f"{SPONGE}/proposal?measurements=22,23"), 422)["detail"]
+        silence = json.dumps({"traces": [{"interval": 1e-6, "force": [0] * 600000}] * 2})
+        asking.problem(post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120), 422, "/traces")
         some = daemon.get(f"{SPONGE}/proposal?measurements=1,2").json()
         assert some["evaluation"]["restitution"]["count"] == 2000, some["evaluation"]["restitution"]
 
