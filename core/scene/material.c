@@ -73,6 +73,13 @@ static Status fault(const char *pointer, const char *name, Problem *problem, con
     return problem_add(problem, STATUS_INVALID, place, "%s", detail);
 }
 
+// Whether the member `name` could not be read, which is told: what depends on it cannot be judged.
+static bool is_unread(const char *pointer, const char *name, const Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_concerns(problem, place);
+}
+
 static Status check_text(const char *text, const char *pointer, const char *name,
                          Problem *problem) {
     if (text == NULL || text[strspn(text, " \t\r\n")] != '\0')
@@ -100,18 +107,22 @@ static Status check_table(const Material *material, const char *pointer, Problem
         status = problem_add(problem, STATUS_INVALID, table,
                              "must have at least two rows, has 1: restitution and contact_time "
                              "alone hold for every approach speed");
+    char first[sizeof((Fault){0}.pointer)];
+    pointer_index(first, sizeof first, table, 0);
+    const bool is_first_unread = is_unread(first, "contact_time", problem);
     for (size_t i = 0; i < rows->count; i++) {
         const MaterialRow *row = &rows->at[i];
         char at[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32], than[32];
         pointer_index(at, sizeof at, table, i);
-        if (has(row->contact_time) != has(rows->at[0].contact_time))
+        if (has(row->contact_time) != has(rows->at[0].contact_time) && !is_first_unread)
             status = fault(at, "contact_time", problem,
                            "must be given in every row of the table or in none");
-        if (has(row->contact_time_deviation) && !has(row->contact_time))
+        if (has(row->contact_time_deviation) && !has(row->contact_time) &&
+            !is_unread(at, "contact_time", problem))
             status = fault(at, "contact_time_deviation", problem,
                            "needs a contact_time that it belongs to");
-        if (i == 0 || row->approach_speed > rows->at[i - 1].approach_speed)
-            continue;
+        if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
+            continue; // also where one is not known
         pointer_join(place, sizeof place, at, "approach_speed");
         status = problem_add_real(problem, STATUS_INVALID, place, row->approach_speed, "m/s",
                                   "must be above the row before, %s m/s, is %s",
@@ -139,7 +150,8 @@ static Status check_ways(const Material *material, const char *pointer, Problem 
     if (!has(material->restitution))
         status = fault(pointer, "restitution", problem,
                        "is required, or a table over approach speed: coefficient of restitution e");
-    if (has(material->contact_time_deviation) && !has(material->contact_time))
+    if (has(material->contact_time_deviation) && !has(material->contact_time) &&
+        !is_unread(pointer, "contact_time", problem))
         status = fault(pointer, "contact_time_deviation", problem,
                        "needs a contact_time that it belongs to");
     return status;

@@ -149,13 +149,24 @@ def test_real_answers_have_the_promised_shapes():
         shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 1, 0]}
         assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
 
+        drops = {"drops": [{"drop_height": 0.1, "rebound_height": 0.04, "contact_time": 0.001}]}
+        measurements = "/v1/materials/{slug}/measurements"
+        for body in (drops, {}):
+            call("POST", measurements, "/v1/materials/sponge/measurements", json=body)
+            call("POST", measurements, "/v1/materials/sponge/measurements?dry_run=1", json=body)
+        call("POST", measurements, "/v1/materials/none/measurements", json=drops)
+        call("POST", measurements, "/v1/materials/sponge/measurements", json=drops, headers={"If-Match": '"x"'})
+        call("POST", measurements, "/v1/materials/sponge/measurements", body="{}")
+
         for (method, path), operation in operations().items():
             if method != "GET":
                 continue
             formats = [p["schema"]["enum"] for p in operation.get("parameters", []) if p["name"] == "format"]
             for extension in formats[0] if formats else [None]:
-                target = path.format(**{"id": job["result"], "format": extension, **values.get(path, {})})
+                target = path.format(**{"id": job["result"], "format": extension, "slug": "sponge", "revision": "1",
+                                           "number": "1", **values.get(path, {})})
                 target += f"?a={job['result']}&b={studies['compare']['id']}" if path == "/v1/compare" else ""
+                target += "?damper_mass=1" if path.endswith("/derived") else ""
                 call(method, path, target)
                 if "400" in operation["responses"]:
                     call(method, path, target.split("?")[0] + "?unknown=1")
@@ -215,6 +226,16 @@ def test_real_answers_have_the_promised_shapes():
             call("DELETE", "/v1/records/{name}", "/v1/records/file")
         program.finished(daemon, {**program.scene("paper_free_sponge"), "excitation": {"kind": "record", "name": "shake"}})
         call("DELETE", "/v1/records/{name}", "/v1/records/shake")
+
+        table, bring = {"Content-Type": "text/csv"}, "/v1/materials/import"
+        for target in (bring + "?dry_run=1", bring):
+            call("POST", bring, target, body="slug,name,source,restitution\nfelt,Felt,s,0.5\n", headers=table)
+        call("POST", bring, bring, json=daemon.get("/v1/materials.json").json())
+        call("POST", bring, bring, body="slug,restitution\nfelt,5\n", headers=table)
+        call("POST", bring, bring, json=[])
+        call("POST", bring, bring, body="{", headers={"Content-Type": "application/json"})
+        call("POST", bring, bring, body="x", headers=text)
+        call("POST", bring, bring, body=b" " * (1 << 24) + b"x", headers=table)
 
         call("GET", "/v1/results/{id}", f"/v1/results/{study['result']}")
         call("GET", "/v1/results/{id}", f"/v1/results/{many['result']}")
