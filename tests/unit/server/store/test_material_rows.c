@@ -338,8 +338,8 @@ static void no_sql_changes_what_was_said(void **state) {
         "created_unix_ms, document) SELECT material, measurement, 'x', 0, '[]' FROM "
         "material_measurements",
         "INSERT OR REPLACE INTO materials (slug) VALUES ('felt')",
-        "INSERT OR REPLACE INTO material_trail (material, version, action, why, created_unix_ms) "
-        "SELECT material, version, 'revise', 'x', 0 FROM material_trail",
+        ("INSERT OR REPLACE INTO material_trail (material, version, action, why, created_unix_ms) "
+         "SELECT material, version, 'revise', 'x', 0 FROM material_trail"),
         "UPDATE material_states SET restitution = 0.9",
         "DELETE FROM material_states",
         "INSERT INTO material_states (slug) VALUES ('felt')"};
