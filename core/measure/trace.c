@@ -173,9 +173,9 @@ static void withdraw(TraceContact *contact) {
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
-// `noise` is what of it is left in `count` means, over the peak.
-static Status judge(const TraceInterval *likely, double noise, size_t count, int separation,
-                    TraceContact *contact) {
+// `noise` is that of `count` means during contact, over the peak, and known from so many samples.
+static Status judge(const TraceInterval *likely, double noise, size_t count, double known_from,
+                    int separation, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     if (!(width < widest * contact->contact_time)) {
         withdraw(contact);
@@ -192,7 +192,7 @@ static Status judge(const TraceInterval *likely, double noise, size_t count, int
     // So much is seldom left by chance.
     const double freedom = fmax((double)count - 4, 1);
     if (contact->misfit_share > 0.01 &&
-        contact->misfit_share > noise * (1 + 3.7 / sqrt(2 * freedom))) {
+        contact->misfit_share > noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
         contact->is_doubtful = true;
         return tell(&contact->why,
                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
@@ -244,7 +244,8 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->most_contact_time = likely.most * interval;
     contact->restitution = fmin(exp(-likely.decay.mean), 1);
     contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
-    return judge(&likely, noise, means, window->separation, contact);
+    return judge(&likely, noise, means, fmax(found->noise_count - 1, 1), window->separation,
+                 contact);
 }
 
 // g / v0, which without v0 is m_e g over the fitted m_e v0, and that hangs on g / v0 but little.
@@ -284,9 +285,15 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    if (way->gravity > 0 && number < way->approach_speed_count && way->approach_speeds[number] > 0)
-        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
-    return fit_contact(window, found, run, &stretch, interval, contact);
+    if (way->gravity > 0)
+        pull_window(way, number, interval, fabs(run->peak), window);
+    TRY(fit_contact(window, found, run, &stretch, interval, contact));
+    if (way->gravity > 0 && !(window->pull_rate > 0) && contact->why == NULL) {
+        contact->is_doubtful = true;
+        return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
+                                   "nor the masses are known");
+    }
+    return STATUS_OK;
 }
 
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
