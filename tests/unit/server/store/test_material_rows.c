@@ -422,11 +422,16 @@ static void check_migrated(Store *store) {
     assert_int_equal(store_material_revise(store, &next, 5, NULL), STATUS_OK);
     assert_int_equal(next.revision, 3);
     MaterialRevisions heads;
-    assert_int_equal(store_materials(store, &heads, NULL), STATUS_OK);
+    assert_int_equal(store_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
     assert_int_equal(heads.count, 5);
     for (size_t i = 0; i < heads.count; i++)
         assert_string_equal(heads.at[i].status, "approved");
     material_revisions_clear(&heads);
+    Texts slugs;
+    assert_int_equal(store_material_slugs(store, &slugs, NULL), STATUS_OK);
+    assert_int_equal(slugs.count, 5);
+    assert_string_equal(slugs.at[4], "sponge");
+    material_slugs_clear(&slugs);
 }
 
 static void a_database_of_each_step_before_goes_on(void **state) {
