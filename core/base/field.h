@@ -100,7 +100,8 @@ typedef enum Presence {
 enum {
     // Changes nothing: left out of the canonical form (title, labels).
     FIELD_NOTE = 1,
-    // ITEM: JSON null is allowed and makes every member absent (fields_clear).
+    // ITEM: JSON null is allowed and makes every member absent (fields_clear). TEXT: JSON null is
+    // allowed and stands for "", which is not absent and is written so.
     FIELD_NULL_IS_EMPTY = 2,
     // TEXTS: a JSON object of strings is allowed too and kept as "key=value".
     FIELD_PAIRS = 4,

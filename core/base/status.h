@@ -56,6 +56,8 @@ typedef struct Fault {
     char value[128];       // the offending value as JSON text; "" if there is none
     char unit[24];         // "" if it has none
     char did_you_mean[64]; // "" if nothing is near
+    size_t row;            // of a table, from 1, its header the first; 0: it is in none
+    char column[64];       // of that row
 } Fault;
 
 // All zero is "no problem". Only the first `count` faults (at most PROBLEM_FAULTS) are set.

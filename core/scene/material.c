@@ -11,6 +11,8 @@
 const char *const material_base_names[] = {
     [MATERIAL_BASE_FIXED] = "fixed", [MATERIAL_BASE_FREE] = "free", NULL};
 
+enum { TAG_MOST = 60 };
+
 // clang-format off
 static const Field row_fields[] = {
     FIELD_REAL(MaterialRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
@@ -21,7 +23,7 @@ static const Field row_fields[] = {
     FIELD_END
 };
 
-#define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by")
+#define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by, of at most 60 bytes")
 #define TABLE FIELD_LIST(Material, table, row_fields, MATERIAL_ROWS, PRESENCE_OPTIONAL, "restitution and contact_time over approach speed, in place of the two; linear between the rows, constant beyond them")
 #define MEASUREMENTS FIELD_REALS(Material, measurements, NULL, AT_LEAST(1), 1000, PRESENCE_OPTIONAL, "numbers of this material's measurements that restitution and contact_time were taken from")
 
@@ -71,11 +73,18 @@ static Status fault(const char *pointer, const char *name, Problem *problem, con
     return problem_add(problem, STATUS_INVALID, place, "%s", detail);
 }
 
+// Whether the member `name` could not be read, which is told: what depends on it cannot be judged.
+static bool is_unread(const char *pointer, const char *name, const Problem *problem) {
+    char place[sizeof((Fault){0}.pointer)];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_concerns(problem, place);
+}
+
 static Status check_text(const char *text, const char *pointer, const char *name,
                          Problem *problem) {
     if (text == NULL || text[strspn(text, " \t\r\n")] != '\0')
         return STATUS_OK;
-    return fault(pointer, name, problem, "must not be empty: leave it out, or say something");
+    return fault(pointer, name, problem, "must not be empty");
 }
 
 static Status check_order(double least, double most, const char *unit, const char *pointer,
@@ -98,18 +107,22 @@ static Status check_table(const Material *material, const char *pointer, Problem
         status = problem_add(problem, STATUS_INVALID, table,
                              "must have at least two rows, has 1: restitution and contact_time "
                              "alone hold for every approach speed");
+    char first[sizeof((Fault){0}.pointer)];
+    pointer_index(first, sizeof first, table, 0);
+    const bool is_first_unread = is_unread(first, "contact_time", problem);
     for (size_t i = 0; i < rows->count; i++) {
         const MaterialRow *row = &rows->at[i];
         char at[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)], is[32], than[32];
         pointer_index(at, sizeof at, table, i);
-        if (has(row->contact_time) != has(rows->at[0].contact_time))
+        if (has(row->contact_time) != has(rows->at[0].contact_time) && !is_first_unread)
             status = fault(at, "contact_time", problem,
                            "must be given in every row of the table or in none");
-        if (has(row->contact_time_deviation) && !has(row->contact_time))
+        if (has(row->contact_time_deviation) && !has(row->contact_time) &&
+            !is_unread(at, "contact_time", problem))
             status = fault(at, "contact_time_deviation", problem,
                            "needs a contact_time that it belongs to");
-        if (i == 0 || row->approach_speed > rows->at[i - 1].approach_speed)
-            continue;
+        if (i == 0 || !(row->approach_speed <= rows->at[i - 1].approach_speed))
+            continue; // also where one is not known
         pointer_join(place, sizeof place, at, "approach_speed");
         status = problem_add_real(problem, STATUS_INVALID, place, row->approach_speed, "m/s",
                                   "must be above the row before, %s m/s, is %s",
@@ -137,7 +150,8 @@ static Status check_ways(const Material *material, const char *pointer, Problem 
     if (!has(material->restitution))
         status = fault(pointer, "restitution", problem,
                        "is required, or a table over approach speed: coefficient of restitution e");
-    if (has(material->contact_time_deviation) && !has(material->contact_time))
+    if (has(material->contact_time_deviation) && !has(material->contact_time) &&
+        !is_unread(pointer, "contact_time", problem))
         status = fault(pointer, "contact_time_deviation", problem,
                        "needs a contact_time that it belongs to");
     return status;
@@ -174,12 +188,29 @@ static Status check_measurements(const Material *material, const char *pointer, 
     return status;
 }
 
+static Status check_tags(const Material *material, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < material->tags.count; i++) {
+        const char *tag = material->tags.at[i];
+        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
+        const size_t size = strlen(tag);
+        if (size <= TAG_MOST && tag[strspn(tag, " \t\r\n")] != '\0')
+            continue;
+        pointer_join(list, sizeof list, pointer, "tags");
+        pointer_index(place, sizeof place, list, i);
+        status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s",
+                             TAG_MOST, size > TAG_MOST ? "is longer" : "is empty");
+    }
+    return status;
+}
+
 Status material_check(const Material *material, const char *pointer, Problem *problem) {
     const Status faults[] = {
         fields_check(material_fields, material, pointer, problem),
         check_text(material->name, pointer, "name", problem),
         check_text(material->kind, pointer, "kind", problem),
         check_text(material->source, pointer, "source", problem),
+        check_tags(material, pointer, problem),
         check_ways(material, pointer, problem),
         check_table(material, pointer, problem),
         check_order(material->least_speed, material->most_speed, "m/s", pointer, "most_speed",

@@ -37,6 +37,7 @@ Handler cache_show, cache_explain;
 Handler compare_results, compare_measured;
 Handler sweeps_table, sweeps_point, sweeps_scene;
 Handler materials_list, materials_show, materials_show_revision;
+Handler materials_export, materials_import;
 Handler measurements_list, measurements_create, measurements_show, proposals_show;
 Handler derived_show, derived_show_revision;
 Handler materials_create, materials_revise, materials_revert, materials_review;

@@ -120,15 +120,6 @@ static Status dry_run(App *app, const Request *request, Reply *reply, Problem *p
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-static Status read_flag(const Request *request, const char *name, bool *flag, Problem *problem) {
-    const char *text = request_query(request, name);
-    *flag = text != NULL && (strcmp(text, "1") == 0 || strcmp(text, "true") == 0);
-    if (text == NULL || *flag || strcmp(text, "0") == 0 || strcmp(text, "false") == 0)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_USAGE,
-                       "the query parameter \"%s\" must be 1 or 0, is \"%.40s\"", name, text);
-}
-
 // The next time this body comes it is answered without being read.
 static void learn(App *app, const Submission *submission, uint64_t mark, Job *job) {
     JobShow show = {0};
@@ -222,7 +213,7 @@ Status jobs_create(App *app, const Request *request, Reply *reply, Problem *prob
     if (request->kept != NULL)
         return answer_job(app, request, reply, pause_end(request->kept, reply), problem);
     bool is_dry = false;
-    TRY(read_flag(request, "dry_run", &is_dry, problem));
+    TRY(request_flag(request, "dry_run", &is_dry, problem));
     TRY(body_require_json(request, problem));
     if (is_dry)
         return dry_run(app, request, reply, problem);

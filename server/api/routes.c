@@ -11,6 +11,7 @@ static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
                                           "most_shift", "interval", "unit",  NULL};
+static const char *const of_import[] = {"dry_run", NULL};
 static const char *const of_materials[] = {"q",   "kind",  "status", "e",
                                            "T_c", "limit", "after",  NULL};
 static const char *const of_pages[] = {"limit", "before", NULL};
@@ -69,6 +70,8 @@ const Route routes[] = {
     {"POST",   "/v1/cache/explain",                     "read",   NULL,         "Whether a scene is known, and in what it differs from the nearest that is", cache_explain},
     {"GET",    "/v1/materials",                         "read",   of_materials, "Buffer materials; ?q= searches, ?kind= ?status= ?e= ?T_c= choose", materials_list},
     {"POST",   "/v1/materials",                         "materials", NULL,      "Add a material", materials_create},
+    {"GET",    "/v1/materials.{format}",                "read",   NULL,         "All that is said of materials, as json or csv: what an import takes", materials_export},
+    {"POST",   "/v1/materials/import",                  "materials", of_import, "Bring materials in, all or none; ?dry_run=1 only judges them", materials_import},
     {"POST",   "/v1/materials/{slug}@{revision}/review", "materials", NULL,     "Approve or deprecate a revision, with a reason", materials_review},
     {"GET",    "/v1/materials/{slug}@{revision}/used-by", "read", of_pages,     "Results made with a revision, newest first", materials_uses_revision},
     {"GET",    "/v1/materials/{slug}@{revision}/derived", "read", of_derived,   "What a revision comes to for a pair of masses", derived_show_revision},

@@ -126,6 +126,14 @@ static size_t character_length(const unsigned char *text) {
     return 0;
 }
 
+bool text_is_utf8(const char *text) {
+    const unsigned char *at = (const unsigned char *)text;
+    for (size_t length; *at != '\0'; at += length)
+        if ((length = character_length(at)) == 0)
+            return false;
+    return true;
+}
+
 static bool is_plain(unsigned char c) {
     return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
 }

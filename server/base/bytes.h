@@ -26,6 +26,8 @@ void bytes_real(Bytes *bytes, double value);
 void bytes_reals(Bytes *bytes, const double *values, size_t count);
 // Quoted and escaped; NULL is null, bad UTF-8 becomes U+FFFD.
 void bytes_json_string(Bytes *bytes, const char *text);
+// Whether all of a text is UTF-8.
+bool text_is_utf8(const char *text);
 // As part of a URL's query: what is not a letter, a digit or one of -._~ as %XX.
 void bytes_percent(Bytes *bytes, const char *text);
 // Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with

@@ -16,4 +16,14 @@ enum { READ_DEPTH = 32 };
 // theirs to the same problem.
 Status read_json(const char *text, size_t size, const Field *fields, void *item, Problem *problem);
 
+// The same of `count` bytes of the text from `first` on, which are a document by themselves and
+// stand at `pointer` of the whole.
+Status read_json_part(const char *text, size_t size, size_t first, size_t count,
+                      const char *pointer, const Field *fields, void *item, Problem *problem);
+
+// A text that is one value, into the member of `item` under `field`; `item` has its defaults, and
+// the value stands at `pointer`. STATUS_INVALID also where it is not JSON.
+Status read_json_value(const char *text, size_t size, const Field *field, void *item,
+                       const char *pointer, Problem *problem);
+
 #endif

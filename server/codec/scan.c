@@ -147,6 +147,52 @@ static void key_name(const Scan *scan, const Frame *frame, char name[KEY_SIZE]) 
     json_decref(parsed);
 }
 
+bool scan_list(const char *text, size_t size, const char *name, ScanList *list) {
+    Scan scan = {.text = text};
+    char key[KEY_SIZE];
+    bool is_inside = false;
+    *list = (ScanList){.text = text, .end = size};
+    while (scan.at < size && !is_too_deep(&scan) && text[scan.at] != '\0') {
+        const size_t at = scan.at, depth = scan.depth;
+        const Frame outer = scan.frames[0];
+        step(&scan, size);
+        if (is_inside && scan.depth < 2) {
+            list->end = at;
+            return true;
+        }
+        if (is_inside || depth != 1 || scan.depth != 2 || text[at] != '[' || outer.is_array ||
+            !outer.has_key)
+            continue;
+        key_name(&scan, &outer, key);
+        is_inside = strcmp(key, name) == 0;
+        list->begin = list->at = at + 1;
+    }
+    return is_inside && scan.at >= size;
+}
+
+static bool is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+bool scan_element(ScanList *list) {
+    Scan scan = {.text = list->text, .at = list->at};
+    size_t first = list->at;
+    if (list->at > list->end)
+        return false;
+    while (scan.at < list->end && (scan.depth > 0 || list->text[scan.at] != ','))
+        step(&scan, list->end);
+    size_t last = scan.at;
+    const bool is_all = list->at == list->begin && last == list->end;
+    list->at = last + 1; // behind the comma
+    while (first < last && is_blank(list->text[first]))
+        first++;
+    while (last > first && is_blank(list->text[last - 1]))
+        last--;
+    list->first = first;
+    list->count = last - first;
+    return list->count > 0 || !is_all; // an array of nothing has none
+}
+
 void scan_place(const char *text, size_t size, size_t position, ScanPlace *place) {
     Scan scan = {.text = text};
     const size_t stop = position < size ? position : size;

@@ -30,4 +30,20 @@ void scan_place(const char *text, size_t size, size_t position, ScanPlace *place
 // Whether the text may be parsed at all. If not, where not and why (a static sentence).
 bool scan_allows(const char *text, size_t size, size_t *position, const char **sentence);
 
+// The elements of one array, one after the other, as they stand in the text.
+typedef struct ScanList {
+    const char *text;
+    size_t begin, end;   // what stands between the brackets
+    size_t at;           // where the next element is looked for
+    size_t first, count; // of the element: without the blanks around it
+} ScanList;
+
+// The array under the key `name` of a document that is an object. False where there is none, or a
+// NUL byte or too deep a nesting before its end. One that is not closed ends with the text.
+bool scan_list(const char *text, size_t size, const char *name, ScanList *list);
+
+// The next element; false behind the last. What stands between two commas is one, also if it is
+// nothing.
+bool scan_element(ScanList *list);
+
 #endif

@@ -43,8 +43,9 @@ static void read_count(Reader *reader, const json_t *value, const Field *field, 
 
 static void read_text(Reader *reader, const json_t *value, const Field *field, char **target,
                       const char *pointer) {
-    if (!json_is_string(value)) {
-        refuse_type(reader, pointer, value, field, "a string");
+    const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
+    if (!json_is_string(value) && !(takes_null && json_is_null(value))) {
+        refuse_type(reader, pointer, value, field, takes_null ? "a string or null" : "a string");
         return;
     }
     const size_t length = json_string_length(value);
@@ -53,7 +54,7 @@ static void read_text(Reader *reader, const json_t *value, const Field *field, c
                      field->most, length);
         return;
     }
-    char *text = strdup(json_string_value(value));
+    char *text = strdup(json_is_null(value) ? "" : json_string_value(value));
     if (text == NULL) {
         read_no_memory(reader);
         return;
@@ -289,4 +290,9 @@ static void walk_members(Reader *reader, const json_t *object, const Field *fiel
 void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
                  const char *pointer) {
     walk_members(reader, object, fields, item, pointer, NULL);
+}
+
+void walk_value(Reader *reader, const json_t *value, const Field *field, void *item,
+                const char *pointer) {
+    read_value(reader, value, field, (char *)item + field->offset, pointer);
 }

@@ -11,4 +11,8 @@
 void walk_object(Reader *reader, const json_t *object, const Field *fields, void *item,
                  const char *pointer);
 
+// Reads `value`, which stands at `pointer`, into the member under `field` of `item`.
+void walk_value(Reader *reader, const json_t *value, const Field *field, void *item,
+                const char *pointer);
+
 #endif

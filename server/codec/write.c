@@ -109,8 +109,13 @@ static void put_value(Bytes *bytes, const Field *field, const void *member, Writ
     }
 }
 
-// An item that null empties, and that is empty: left out it would come back with its defaults.
+// What null empties, and what is empty: left out it would come back with its defaults, or as if
+// nothing were said.
 static bool is_emptied(const Field *field, const void *item) {
+    if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_NULL_IS_EMPTY) != 0) {
+        const char *text = *(char *const *)(const void *)((const char *)item + field->offset);
+        return text != NULL && text[0] == '\0';
+    }
     Field optional = *field;
     optional.presence = PRESENCE_OPTIONAL;
     return field->kind == FIELD_KIND_ITEM && (field->flags & FIELD_NULL_IS_EMPTY) != 0 &&
@@ -180,6 +185,11 @@ static void put_fault(Bytes *bytes, const Fault *fault) {
         put_text_member(bytes, "unit", fault->unit, &count);
     if (fault->did_you_mean[0] != '\0')
         put_text_member(bytes, "did_you_mean", fault->did_you_mean, &count);
+    if (fault->row > 0) {
+        put_name(bytes, "row", &count);
+        bytes_format(bytes, "%zu", fault->row);
+        put_text_member(bytes, "column", fault->column, &count);
+    }
     bytes_text(bytes, "}");
 }
 

@@ -180,3 +180,12 @@ Status request_count(const Request *request, const char *name, size_t least, siz
     *value = (size_t)number;
     return STATUS_OK;
 }
+
+Status request_flag(const Request *request, const char *name, bool *flag, Problem *problem) {
+    const char *text = request_query(request, name);
+    *flag = text != NULL && (strcmp(text, "1") == 0 || strcmp(text, "true") == 0);
+    if (text == NULL || *flag || strcmp(text, "0") == 0 || strcmp(text, "false") == 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_USAGE,
+                       "the query parameter \"%s\" must be 1 or 0, is \"%.40s\"", name, text);
+}

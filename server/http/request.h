@@ -73,7 +73,9 @@ bool request_decode(char *text, bool is_query);
 // would be right.
 Status request_number(const Request *request, const char *name, double least, double most,
                       double initial, double *value, Problem *problem);
-// The same for a whole number of at most 2^53.
+// 1, 0, true or false; without it false. STATUS_USAGE likewise.
+Status request_flag(const Request *request, const char *name, bool *flag, Problem *problem);
+// A whole number of at most 2^53, likewise.
 Status request_count(const Request *request, const char *name, size_t least, size_t most,
                      size_t initial, size_t *value, Problem *problem);
 

@@ -6,6 +6,7 @@
 
 Status material_key_find(Database *database, const char *slug, uint64_t revision, MaterialKey *key,
                          Problem *problem) {
+    // Not by the view, of which a join would make all rows.
     static const char sql[] =
         "SELECT m.number, "
         "(SELECT coalesce(max(revision), 0) FROM material_revisions r WHERE r.material = m.number) "
@@ -14,9 +15,13 @@ Status material_key_find(Database *database, const char *slug, uint64_t revision
         "version, "
         "(SELECT coalesce(max(measurement), 0) FROM material_measurements t WHERE t.material = "
         "m.number) AS measurements, "
-        "coalesce(s.status, '') AS status, coalesce(s.author, '') AS author "
-        "FROM materials m LEFT JOIN material_states s ON s.material = m.number AND s.revision = "
-        ":revision WHERE m.slug = :slug";
+        "coalesce((SELECT coalesce((SELECT status FROM material_reviews v WHERE v.material = "
+        "m.number AND v.revision = :revision ORDER BY v.number DESC LIMIT 1), 'draft') FROM "
+        "material_revisions r WHERE r.material = m.number AND r.revision = :revision), '') AS "
+        "status, "
+        "coalesce((SELECT author FROM material_revisions r WHERE r.material = m.number AND "
+        "r.revision = :revision), '') AS author "
+        "FROM materials m WHERE m.slug = :slug";
     Statement *statement;
     bool has_row = false;
     *key = (MaterialKey){.slug = (char *)slug,

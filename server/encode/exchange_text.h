@@ -1,0 +1,26 @@
+// All materials as one document or table, made piece by piece: what materials/exchange_json.h and
+// exchange_csv.h read, to the byte the same from the same rows. Used by api/material_exchange.c.
+#ifndef SERVER_ENCODE_EXCHANGE_TEXT_H
+#define SERVER_ENCODE_EXCHANGE_TEXT_H
+
+#include "server/base/bytes.h"
+#include "server/store/material_export.h"
+
+// How far it is.
+typedef struct ExchangeText {
+    Store *store;
+    MaterialMoment moment;
+    bool is_table;
+    bool has_begun, is_in_material;
+    size_t measurements;               // of this material so far
+    char slug[MATERIAL_SLUG_MOST + 1]; // the material's; "" before the first
+    uint64_t number;                   // of its last measurement
+} ExchangeText;
+
+Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem);
+
+// Appends the next piece, a material without measurements or one measurement; *is_last behind it
+// all.
+Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem);
+
+#endif

@@ -1,0 +1,77 @@
+#include "server/store/material_export.h"
+
+#include <string.h>
+
+#include "server/store/material_columns.h"
+
+typedef struct Key {
+    char *slug;
+    uint64_t number;
+    MaterialMoment moment;
+} Key;
+// clang-format off
+static const RowColumn key_columns[] = {
+    ROW_COLUMN(Key, slug, COLUMN_TEXT),
+    ROW_COLUMN(Key, number, COLUMN_COUNT),
+    ROW_COLUMN_AS(Key, moment.revisions, "revisions", COLUMN_INTEGER),
+    ROW_COLUMN_AS(Key, moment.reviews, "reviews", COLUMN_INTEGER),
+    ROW_COLUMN_AS(Key, moment.measurements, "measurements", COLUMN_INTEGER),
+    ROW_END
+};
+static const RowColumn moment_columns[] = {
+    ROW_COLUMN(MaterialMoment, revisions, COLUMN_INTEGER),
+    ROW_COLUMN(MaterialMoment, reviews, COLUMN_INTEGER),
+    ROW_COLUMN(MaterialMoment, measurements, COLUMN_INTEGER),
+    ROW_END
+};
+// clang-format on
+
+Status store_material_moment(Store *store, MaterialMoment *moment, Problem *problem) {
+    static const char sql[] =
+        "SELECT (SELECT coalesce(max(number), 0) FROM material_revisions) AS revisions, "
+        "(SELECT coalesce(max(number), 0) FROM material_reviews) AS reviews, "
+        "(SELECT coalesce(max(number), 0) FROM material_measurements) AS measurements";
+    bool is_found;
+    *moment = (MaterialMoment){0, 0, 0};
+    return store_first(store, sql, NULL, NULL, moment_columns, moment, &is_found, problem);
+}
+
+// A review is younger than its revision: of what is told of, all revisions are there.
+Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
+                             MaterialRevisions *revisions, MaterialReviews *reviews,
+                             Problem *problem) {
+    static const char revisions_sql[] =
+        "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
+        "WHERE m.slug = (SELECT n.slug FROM materials n WHERE n.slug > :slug AND EXISTS (SELECT 1 "
+        "FROM material_revisions o WHERE o.material = n.number AND o.number <= :revisions) ORDER "
+        "BY n.slug LIMIT 1) AND r.number <= :revisions ORDER BY r.revision";
+    static const char reviews_sql[] =
+        "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
+        "WHERE m.slug = :slug AND v.number <= :reviews ORDER BY v.revision, v.number";
+    Key key = {.slug = (char *)slug, .moment = *moment};
+    void *at;
+    *reviews = (MaterialReviews){NULL, 0};
+    Status status = store_all(store, revisions_sql, key_columns, &key, material_revision_columns,
+                              sizeof *revisions->at, &at, &revisions->count, problem);
+    revisions->at = at;
+    if (status != STATUS_OK || revisions->count == 0)
+        return status;
+    key.slug = revisions->at[0].slug;
+    status = store_all(store, reviews_sql, key_columns, &key, material_review_columns,
+                       sizeof *reviews->at, &at, &reviews->count, problem);
+    reviews->at = at;
+    return status;
+}
+
+Status store_measurement_behind(Store *store, const MaterialMoment *moment, const char *slug,
+                                uint64_t number, MaterialMeasurement *measurement, bool *is_found,
+                                Problem *problem) {
+    static const char sql[] =
+        "SELECT m.slug, t.* FROM materials m JOIN material_measurements t ON t.material = m.number "
+        "WHERE m.slug = :slug AND t.measurement > :number AND t.number <= :measurements "
+        "ORDER BY t.measurement LIMIT 1";
+    const Key key = {(char *)slug, number, *moment};
+    memset(measurement, 0, sizeof *measurement);
+    return store_first(store, sql, key_columns, &key, material_measurement_columns, measurement,
+                       is_found, problem);
+}
