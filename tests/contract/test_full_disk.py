@@ -56,7 +56,8 @@ def test_a_full_disk_stops_writes_alone():
                 assert daemon.request("DELETE", path).status == 507, path
             felt = {"name": "Felt", "restitution": 0.3, "source": "here", "comment": "x"}
             for path, body in (("", {"slug": "felt", **felt}), ("/sponge/revisions", felt), ("/sponge/revert", {"to": 1, "comment": "x"}),
-                               ("/sponge@1/review", {"status": "deprecated", "reason": "x"})):
+                               ("/sponge@1/review", {"status": "deprecated", "reason": "x"}),
+                               ("/sponge/measurements", {"drops": [{"contact_time": 0.001}]})):
                 assert daemon.request("POST", "/v1/materials" + path, json=body, headers={"If-Match": "*"}).status == 507, path
             assert daemon.get("/v1/materials/sponge/history").json()["version"] == 2
             for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
