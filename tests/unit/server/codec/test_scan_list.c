@@ -96,11 +96,11 @@ static void a_value_alone_is_read_by_its_row(void **state) {
     assert_int_equal(one.numbers.count, 2);
     assert_int_equal(read_json_value("\"too long\"", 10, &fields[0], &one, "/2/text", &problem),
                      STATUS_INVALID);
-    assert_int_equal(read_json_value("[1,", 3, &fields[1], &one, "/3/numbers", &problem),
+    assert_int_equal(read_json_value("[1", 2, &fields[1], &one, "/3/numbers", &problem),
                      STATUS_INVALID);
     assert_int_equal(problem.status, STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/2/text");
-    assert_string_equal(problem.faults[1].pointer, "/3/numbers/1");
+    assert_string_equal(problem.faults[1].pointer, "/3/numbers/0");
     fields_clear(fields, &one);
 }
 
