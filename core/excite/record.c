@@ -36,6 +36,8 @@ NamedRecord *named_record_new(const char *name, const char *digest, double inter
         text_fit(named->digest, sizeof named->digest, digest);
         named->interval = interval;
         named->samples = *samples;
+        for (size_t i = 0; i < samples->count; i++)
+            named->peak = fmax(named->peak, fabs(samples->at[i]));
     } else {
         free(samples->at);
     }
@@ -108,6 +110,9 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
     const Reals *samples = record_samples(record);
     if (!isfinite(record->scale))
         return STATUS_OK; // told by the rows
+    // Every point of a sweep comes here.
+    if (record->named != NULL && isfinite(record_named(record)->peak * record->scale))
+        return STATUS_OK;
     for (size_t i = 0; i < samples->count; i++) {
         if (isfinite(samples->at[i] * record->scale) || !isfinite(samples->at[i]))
             continue;

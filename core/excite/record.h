@@ -14,6 +14,7 @@ typedef struct NamedRecord {
     char name[RECORD_NAME_SIZE];     // [A-Za-z0-9][A-Za-z0-9._-]*
     char digest[RECORD_DIGEST_SIZE]; // of interval and samples, in hexadecimal digits
     double interval;                 // [s]
+    double peak;                     // the largest magnitude of the samples [m/s^2]
     Reals samples;                   // [m/s^2]
 } NamedRecord;
 

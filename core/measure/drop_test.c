@@ -251,9 +251,12 @@ static Status check_base(const DropTest *test, const char *pointer, Problem *pro
 
 Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = fields_check(drop_test_fields, test, pointer, problem);
-    char place[POINTER_SIZE];
-    if (test->drops.count == 0 && test->traces.count == 0) {
-        pointer_join(place, sizeof place, pointer, "drops");
+    char place[POINTER_SIZE], traces[POINTER_SIZE];
+    pointer_join(place, sizeof place, pointer, "drops");
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    // Lists that could not be read are empty, too.
+    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
+        !problem_concerns(problem, traces)) {
         status = problem_add(problem, STATUS_INVALID, place,
                              "is required unless there are traces: at least one drop");
     }

@@ -176,9 +176,10 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, Evaluatio
         .approach_speeds = trace->approach_speed.at,
         .approach_speed_count = trace->approach_speed.count,
     };
-    char pointer[sizeof((Fault){0}.pointer)];
-    row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i},
-                pointer, sizeof pointer);
+    char place[sizeof((Fault){0}.pointer)], pointer[sizeof((Fault){0}.pointer)];
+    row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i}, place,
+                sizeof place);
+    pointer_join(pointer, sizeof pointer, place, "force");
     TraceReading reading = {0};
     // What cannot be read at all may be why it is excluded.
     Status status = trace_read(trace->interval, &trace->force, &way, pointer, &reading,

@@ -118,6 +118,26 @@ static Status warn_of_interval(Evaluation *evaluation) {
     return STATUS_OK;
 }
 
+// Figures that a trace gives with a reservation count, but not in silence.
+static Status warn_of_doubt(Evaluation *evaluation) {
+    const EvaluationRow *first = NULL;
+    size_t count = 0;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        if (!row->is_of_trace || !row->contact_time_counts || row->note == NULL)
+            continue;
+        first = first != NULL ? first : row;
+        count++;
+    }
+    if (first == NULL)
+        return STATUS_OK;
+    char pointer[POINTER_SIZE];
+    row_pointer(first, pointer, sizeof pointer);
+    return warnings_add(&evaluation->warnings, pointer,
+                        "%zu contact%s of traces count%s though doubtful; %s: %s", count,
+                        count == 1 ? "" : "s", count == 1 ? "s" : "", first->from, first->note);
+}
+
 static Status warn_of_outlier(const EvaluationRow *row, const char *name, double value,
                               double score, const Quantity *of, Evaluation *evaluation) {
     char pointer[POINTER_SIZE];
@@ -156,5 +176,6 @@ Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evalu
     TRY(warn_of_pairs(tests, count, evaluation));
     TRY(warn_of_pulses(evaluation, is_left_out));
     TRY(warn_of_interval(evaluation));
+    TRY(warn_of_doubt(evaluation));
     return warn_of_outliers(evaluation);
 }

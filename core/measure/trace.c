@@ -14,7 +14,11 @@
 
 enum { SAMPLES_LEAST = 5, TRACE_LEAST = 8 };
 
-static const double widest = 0.5; // interval over T_c that still is a figure
+// An interval this wide over T_c is no figure, nor is one that reaches to so high an L.
+static const double widest = 0.5, faintest = 4.2;
+
+// A fit that leaves so much of the peak is none.
+static const double worst = 0.15;
 
 // clang-format off
 const Field trace_contact_fields[] = {
@@ -90,7 +94,8 @@ static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) 
         stretch.from = stretch.from > wall ? stretch.from : wall;
     }
     if (number + 1 < found->count) {
-        const size_t wall = run->last + (found->runs[number + 1].first - run->last) * 2 / 3;
+        const size_t gap = found->runs[number + 1].first - run->last - 1;
+        const size_t wall = run->last + 1 + gap * 2 / 3;
         stretch.to = stretch.to < wall ? stretch.to : wall;
     }
     stretch.is_at_begin = stretch.from == 0;
@@ -145,54 +150,55 @@ static void count_samples(const TraceFound *found, const TraceRun *run, int sepa
     contact->most_contact_time = (seen + 2) * (1 + after) * interval;
 }
 
-// rms of what the fit leaves during contact [peak].
-static double left_over(const TraceWindow *window, const TraceFit *fit) {
+// rms of what the fit leaves of the window's means during contact [peak], of *count of them.
+static double left_over(const TraceWindow *window, const TraceFit *fit, size_t *count) {
     TraceShape shape;
     double T, sum = 0;
     trace_point_shape(window, &fit->at, &shape, &T);
     const long m = (long)window->per_block;
-    size_t count = 0;
-    for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++, count++) {
+    *count = 0;
+    for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++) {
         const double at = (double)(k * m) + (double)(m - 1) / 2;
         const double force = trace_shape_force(&shape, (at - fit->at.part[0]) / T);
         const double left =
             window->mean[k] - fit->residue.amplitude * force - fit->residue.baseline;
-        sum += left * left * (double)m;
+        sum += left * left;
+        ++*count;
     }
-    return sqrt(sum / fmax((double)count - 4, 1));
+    return sqrt(sum / fmax((double)*count - 4, 1));
 }
 
-static Status judge(const TraceWindow *window, const TraceFit *fit, double noise, double interval,
-                    TraceContact *contact) {
+static void withdraw(TraceContact *contact) {
+    contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
+    contact->restitution = contact->restitution_uncertainty = (double)NAN;
+}
+
+// `noise` is that of `count` means during contact, over the peak, and known from so many samples.
+static Status judge(const TraceInterval *likely, double noise, size_t count, double known_from,
+                    int separation, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
-    if (contact->samples < SAMPLES_LEAST || !(width < widest * contact->contact_time)) {
-        contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
-        contact->restitution = contact->restitution_uncertainty = (double)NAN;
-        if (contact->samples < SAMPLES_LEAST)
-            return tell(&contact->why,
-                        "only %d samples are in contact, and pulses of very different length fit "
-                        "so few: sample "
-                        "at least %.0f times as fast, so that 5 or better 20 are",
-                        (int)contact->samples, ceil(20.0 / (double)contact->samples));
+    if (!(width < widest * contact->contact_time)) {
+        withdraw(contact);
         return tell(&contact->why,
                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-                    "more samples "
-                    "in contact would tell them apart",
+                    "more samples in contact would tell them apart",
                     contact->least_contact_time, contact->most_contact_time);
     }
+    if (likely->decay.mean + 2 * likely->decay.deviation > faintest) {
+        withdraw(contact);
+        return tell(&contact->why, "the force fades away without an end that could be told: pulses "
+                                   "with a restitution of next to nothing fit the trace as well");
+    }
     // So much is seldom left by chance.
-    const double freedom = fmax((double)(contact->samples) - 4, 1);
+    const double freedom = fmax((double)count - 4, 1);
     if (contact->misfit_share > 0.01 &&
-        contact->misfit_share > noise * (1 + 3.7 / sqrt(2 * freedom))) {
+        contact->misfit_share > noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
         contact->is_doubtful = true;
         return tell(&contact->why,
                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
-                    "best one leaves "
-                    "%.2g %% of the peak, the noise is %.2g %% of it",
-                    separation_names[window->separation], 100 * contact->misfit_share, 100 * noise);
+                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
+                    separation_names[separation], 100 * contact->misfit_share, 100 * noise);
     }
-    (void)fit;
-    (void)interval;
     return STATUS_OK;
 }
 
@@ -203,7 +209,6 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     if (count == 0)
         return tell(&contact->why, "no pulse of the model's fits");
     const TraceFit *fit = &fits[0];
-    const bool is_short = fit->last - fit->first + 1 < SAMPLES_LEAST;
     contact->samples = (uint64_t)(fit->last - fit->first + 1);
     const double origin = (double)stretch->from;
     contact->first = (origin + (double)fit->first) * interval;
@@ -215,22 +220,50 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->crossing_shortfall = 1 - (visible.pressed - visible.from);
     contact->impulse =
         fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
-    contact->misfit_share = left_over(window, fit);
-    const double noise = found->noise / fabs(run->peak);
-    contact->misfit = contact->misfit_share / noise;
-    if (!is_short) {
-        TraceInterval likely;
-        TRY(trace_interval(window, fits, count, &likely));
-        contact->start = (origin + likely.start.mean) * interval;
-        contact->end = (origin + likely.end.mean) * interval;
-        contact->contact_time = likely.contact_time.mean * interval;
-        contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
-        contact->least_contact_time = likely.least * interval;
-        contact->most_contact_time = likely.most * interval;
-        contact->restitution = fmin(exp(-likely.decay.mean), 1);
-        contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
+    size_t means;
+    contact->misfit_share = left_over(window, fit, &means);
+    const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
+    contact->misfit = noise > 0 ? contact->misfit_share / noise : (double)NAN;
+    if (contact->samples < SAMPLES_LEAST)
+        return tell(&contact->why,
+                    "only %d samples are in contact, and pulses of very different length fit so "
+                    "few: 5 are the least, 20 are better",
+                    (int)contact->samples);
+    if (contact->misfit_share > worst && contact->misfit_share > 2 * noise)
+        return tell(&contact->why,
+                    "the trace is no pulse of the model's under the separation rule %s: the best "
+                    "one leaves %.2g %% of the peak",
+                    separation_names[window->separation], 100 * contact->misfit_share);
+    TraceInterval likely;
+    TRY(trace_interval(window, fits, count, &likely));
+    contact->start = (origin + likely.start.mean) * interval;
+    contact->end = (origin + likely.end.mean) * interval;
+    contact->contact_time = likely.contact_time.mean * interval;
+    contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
+    contact->least_contact_time = likely.least * interval;
+    contact->most_contact_time = likely.most * interval;
+    contact->restitution = fmin(exp(-likely.decay.mean), 1);
+    contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
+    return judge(&likely, noise, means, fmax(found->noise_count - 1, 1), window->separation,
+                 contact);
+}
+
+// g / v0, which without v0 is m_e g over the fitted m_e v0, and that hangs on g / v0 but little.
+static void pull_window(const TraceWay *way, size_t number, double interval, double peak,
+                        TraceWindow *window) {
+    if (number < way->approach_speed_count && way->approach_speeds[number] > 0) {
+        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+        return;
     }
-    return judge(window, fit, noise, interval, contact);
+    for (int round = 0; round < 4 && way->effective_mass > 0; round++) {
+        TraceFit fits[TRACE_FITS_MOST];
+        TraceShape shape;
+        double T;
+        if (trace_fit(window, fits) == 0 || !trace_point_shape(window, &fits->at, &shape, &T))
+            return;
+        const double momentum = fits->residue.amplitude * T * peak * interval;
+        window->pull_rate = way->effective_mass * way->gravity / momentum * interval;
+    }
 }
 
 static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
@@ -252,9 +285,15 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    if (way->gravity > 0 && number < way->approach_speed_count && way->approach_speeds[number] > 0)
-        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
-    return fit_contact(window, found, run, &stretch, interval, contact);
+    if (way->gravity > 0)
+        pull_window(way, number, interval, fabs(run->peak), window);
+    TRY(fit_contact(window, found, run, &stretch, interval, contact));
+    if (way->gravity > 0 && !(window->pull_rate > 0) && contact->why == NULL) {
+        contact->is_doubtful = true;
+        return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
+                                   "nor the masses are known");
+    }
+    return STATUS_OK;
 }
 
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,

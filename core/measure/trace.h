@@ -7,7 +7,7 @@
 #include "core/base/field.h"
 #include "core/contact/contact.h"
 
-enum { TRACE_CONTACTS_MOST = 1000, TRACE_WHY_MOST = 400 };
+enum { TRACE_CONTACTS_MOST = 200, TRACE_WHY_MOST = 400 };
 
 // How a trace is read.
 typedef struct TraceWay {

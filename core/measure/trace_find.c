@@ -17,6 +17,24 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+// What a value that comes again and again in sorted ones is next to, if that comes often as well:
+// the step of a converter that is coarser than the noise; else 0.
+static double step_about(const double *values, size_t count, size_t at) {
+    size_t from = at, to = at + 1, before, after;
+    while (from > 0 && values[from - 1] == values[at])
+        from--;
+    while (to < count && values[to] == values[at])
+        to++;
+    for (before = from; before > 0 && values[before - 1] == values[from - 1]; before--)
+        ;
+    for (after = to; after < count && values[after] == values[to]; after++)
+        ;
+    if (from - before + (after - to) < 3 + count / 50)
+        return 0;
+    return fmax(from > before ? values[at] - values[from - 1] : 0,
+                after > to ? values[to] - values[at] : 0);
+}
+
 // The middle of the shortest interval that holds 30 % of the values, which become sorted.
 static double densest(double *values, size_t count, double *width) {
     qsort(values, count, sizeof *values, by_value);
@@ -26,6 +44,10 @@ static double densest(double *values, size_t count, double *width) {
         if (values[i + held - 1] - values[i] < values[best + held - 1] - values[best])
             best = i;
     *width = values[best + held - 1] - values[best];
+    // Of few the shortest is shorter by chance.
+    *width *= 1 + 8 / (double)held;
+    if (*width == 0)
+        *width = step_about(values, count, best);
     return held % 2 == 1 ? values[best + held / 2]
                          : (values[best + held / 2 - 1] + values[best + held / 2]) / 2;
 }
@@ -174,8 +196,8 @@ static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
     return true;
 }
 
-// Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though not
-// to the baseline, or as the tensile end, which is smaller and follows soon.
+// Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though
+// not to the baseline, or as the tensile end, which is smaller and follows soon.
 static bool belongs(const TraceFound *found, const TraceRun *run, const TraceRun *next) {
     const size_t length = run->last - run->first + 1, other = next->last - next->first + 1;
     const size_t longer = length > other ? length : other, gap = next->first - run->last - 1;

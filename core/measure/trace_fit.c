@@ -294,29 +294,46 @@ static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
 
 // From gap to gap as long as it gets better.
 static void climb(const TraceWindow *window, TraceFit *fit) {
-    static const int moves[8][2] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
-                                    {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
-    for (bool is_better = true; is_better;) {
-        const long first = fit->first, last = fit->last;
-        TraceFit best = *fit;
-        is_better = false;
-        for (long stride = 1; stride <= (last - first) / 8 + 1; stride *= 2)
-            for (int way = 0; way < 8; way++) {
-                const long from = first + stride * moves[way][0],
-                           to = last + stride * moves[way][1];
-                if (from < window->least_start || from > window->first || to < window->last ||
-                    to > window->most_end)
-                    continue;
-                TraceFit other = *fit;
-                const TraceBox box = trace_box(from, to, 1);
-                trace_fit_box(window, &box, &other);
-                if (other.residue.sum < best.residue.sum * (1 - 1e-9)) {
-                    best = other;
-                    is_better = true;
-                }
-            }
-        *fit = best;
+    static const int moves[8][2] = {{0, 1}, {0, -1},  {1, 0},  {-1, 0},
+                                    {1, 1}, {-1, -1}, {-1, 1}, {1, -1}};
+    long stride = 1;
+    for (int way = 0, failed = 0; failed < 8; way = (way + 1) % 8) {
+        const long from = fit->first + stride * moves[way][0];
+        const long to = fit->last + stride * moves[way][1];
+        TraceFit other = *fit;
+        other.residue.sum = (double)INFINITY;
+        if (from >= window->least_start && from <= window->first && to >= window->last &&
+            to <= window->most_end) {
+            const TraceBox box = trace_box(from, to, 1);
+            trace_fit_box(window, &box, &other);
+        }
+        if (other.residue.sum < fit->residue.sum * (1 - 1e-9)) {
+            *fit = other;
+            failed = 0;
+            way--; // once more the same way, twice as far
+            stride *= 2;
+        } else if (stride > 1) {
+            stride = 1;
+            way--;
+        } else {
+            failed++;
+        }
     }
+}
+
+static bool is_known(const TraceFit *fits, size_t count, const TraceFit *fit) {
+    for (size_t i = 0; i < count; i++)
+        if (fit->first == fits[i].first && fit->last == fits[i].last)
+            return true;
+    return false;
+}
+
+static size_t insert(TraceFit *fits, size_t count, const TraceFit *fit) {
+    size_t at = count;
+    for (; at > 0 && fits[at - 1].residue.sum > fit->residue.sum; at--)
+        fits[at] = fits[at - 1];
+    fits[at] = *fit;
+    return count + 1;
 }
 
 size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]) {
@@ -327,29 +344,27 @@ size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]) {
         .first = window->least_start,
         .last = window->most_end,
     };
-    size_t count = 0;
+    TraceFit seeds[TRACE_FITS_MOST];
+    size_t seeded = 0, count = 0;
     for (size_t i = 0; i < TRACE_FITS_MOST; i++) {
         TraceFit fit;
         if (!seek(window, decays[i], &fit))
             continue;
-        // As if there were no jumps, then from gap to gap.
+        // As if there were no jumps.
         trace_fit_box(window, &wide, &fit);
         const TraceBox box = trace_box(fit.first, fit.last, 1);
         trace_fit_box(window, &box, &fit);
-        bool is_new = isfinite(fit.residue.sum);
-        for (size_t j = 0; j < count; j++)
-            is_new = is_new && !(fit.first == fits[j].first && fit.last == fits[j].last &&
-                                 fabs(fit.at.part[DECAY] - fits[j].at.part[DECAY]) < 0.1);
-        if (is_new)
-            climb(window, &fit);
-        for (size_t j = 0; j < count; j++)
-            is_new = is_new && !(fit.first == fits[j].first && fit.last == fits[j].last);
-        if (!is_new)
-            continue;
-        size_t at = count++;
-        for (; at > 0 && fits[at - 1].residue.sum > fit.residue.sum; at--)
-            fits[at] = fits[at - 1];
-        fits[at] = fit;
+        if (isfinite(fit.residue.sum) && !is_known(seeds, seeded, &fit))
+            seeded = insert(seeds, seeded, &fit);
+    }
+    for (size_t i = 0; i < seeded; i++) {
+        // Hopelessly worse than the best: no climbing mends that.
+        if (i > 0 && trace_likelihood(window, seeds[i].residue.sum) <
+                         trace_likelihood(window, fits[0].residue.sum) - 40)
+            break;
+        climb(window, &seeds[i]);
+        if (!is_known(fits, count, &seeds[i]))
+            count = insert(fits, count, &seeds[i]);
     }
     return count;
 }

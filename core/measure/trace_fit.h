@@ -8,7 +8,7 @@
 
 #include <stddef.h>
 
-enum { TRACE_BLOCKS_MOST = 1024, TRACE_BLOCK_FROM = 400, TRACE_PARTS = 3, TRACE_FITS_MOST = 6 };
+enum { TRACE_BLOCKS_MOST = 512, TRACE_PARTS = 3, TRACE_FITS_MOST = 6 };
 
 // The stretch, in means of so many samples each; samples count from its beginning.
 typedef struct TraceWindow {

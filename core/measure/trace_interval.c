@@ -1,8 +1,8 @@
 // The likelihood of start, end and L, with size, baseline and noise integrated out, each value of
-// start, end and L counting alike beforehand. It jumps from gap to gap between samples: where the
-// force jumps by much more than the noise, the samples say for sure in which gap a contact began,
-// and it may have been anywhere there. So boxes, a gap of starts by a gap of ends, are filled with
-// points one by one, from the best one outwards, as long as they matter:
+// start, end and e = exp(-L) counting alike beforehand. It jumps from gap to gap between samples:
+// where the force jumps by much more than the noise, the samples say for sure in which gap a
+// contact began, and it may have been anywhere there. So boxes, a gap of starts by a gap of ends,
+// are filled with points one by one, from the best one outwards, as long as they matter:
 //
 //   start over its range under a normal distribution cut off by the box, end over that given start,
 //   L at its best given both, by the parabola through three values.
@@ -53,8 +53,8 @@ static bool invert(double a[3][3], double inverse[3][3]) {
     return det > 0 && inverse[0][0] > 0 && inverse[1][1] > 0 && inverse[2][2] > 0;
 }
 
-// The log likelihood at the best L given start and end, and the residue there; *width is that of the
-// normal distribution that L has about it.
+// The log likelihood at the best L given start and end, and the residue there; *width is that of
+// the normal distribution that L has about it.
 static double profile(const TraceWindow *window, const TraceBox *box, TracePoint *point,
                       double step, double *width, TraceResidue *best) {
     double value = -(double)INFINITY;
@@ -137,7 +137,8 @@ static bool fill(const TraceWindow *window, const TraceBox *box, const TraceFit 
                 !trace_point_shape(window, &point, &shape, &target->contact_time))
                 continue;
             *target = (Point){
-                .weight = value + log(width) - log(best.model_square) / 2 + log(start_step * end_step),
+                .weight = value - point.part[DECAY] + log(width) - log(best.model_square) / 2 +
+                          log(start_step * end_step),
                 .contact_time = target->contact_time,
                 .half_width = (fabs(1 - share) * start_step + end_step) / 4 / shape.length,
                 .start = point.part[START],

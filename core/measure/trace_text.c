@@ -126,6 +126,10 @@ static Status take_times(const TraceColumns *rows, double *interval, Problem *pr
 
 static Status take(TraceColumns *rows, double interval, Trace *trace, Problem *problem) {
     char is[32], asked[32];
+    if (rows->count == 0)
+        return problem_set(problem, STATUS_UNREADABLE,
+                           "has no line of numbers: a time in s and a force in N, or the force "
+                           "alone");
     if (rows->count < 2)
         return problem_set(problem, STATUS_UNREADABLE, "has %zu samples; must have at least 2",
                            rows->count);

@@ -155,9 +155,9 @@ static bool is_rig_given(const Damper *damper) {
 
 // The first side whose material does not tell all of the masses that it was tested with; NULL: all
 // that were measured tell the same ones, *test.
-static const Buffer *find_untold(const Damper *damper, const BufferTest **test, bool *is_same) {
+static const Buffer *find_untold(const Damper *damper, const BufferTest **test, bool *is_alike) {
     *test = NULL;
-    *is_same = true;
+    *is_alike = true;
     for (int side = 0; side < 2; side++) {
         const Buffer *buffer = damper_buffer(damper, (Side)side);
         if (!buffer_is_measured(buffer))
@@ -166,28 +166,56 @@ static const Buffer *find_untold(const Damper *damper, const BufferTest **test, 
             return buffer;
         if (*test == NULL)
             *test = &buffer->test;
-        *is_same = *is_same && buffer->test.impactor_mass == (*test)->impactor_mass &&
-                   buffer->test.base_mass == (*test)->base_mass;
+        *is_alike = *is_alike && buffer->test.impactor_mass == (*test)->impactor_mass &&
+                    buffer->test.base_mass == (*test)->base_mass;
     }
     return NULL;
+}
+
+static bool is_same(double a, double b) {
+    return a == b || (isnan(a) && isnan(b));
+}
+
+static bool is_same_rig(const Rig *a, const Rig *b) {
+    return is_same(a->impactor_mass, b->impactor_mass) && is_same(a->base_mass, b->base_mass);
+}
+
+static Rig rig_of(const BufferTest *test) {
+    return (Rig){test->impactor_mass, isinf(test->base_mass) ? (double)NAN : test->base_mass};
 }
 
 // A rig that is not given is that of the materials' tests.
 static void fill_rig(Damper *damper, const ContactLaw *law) {
     const BufferTest *test;
-    bool is_same;
+    bool is_alike;
     if (damper->identified_for != IDENTIFIED_FOR_RIG || is_rig_given(damper) ||
-        !is_carried(damper, law) || find_untold(damper, &test, &is_same) != NULL || !is_same)
+        !is_carried(damper, law) || find_untold(damper, &test, &is_alike) != NULL || !is_alike)
         return;
-    damper->rig.impactor_mass = test->impactor_mass;
-    damper->rig.base_mass = isinf(test->base_mass) ? (double)NAN : test->base_mass;
+    damper->rig = rig_of(test);
+}
+
+void damper_ask_rig(const Damper *base, Damper *damper) {
+    const BufferTest *test;
+    bool is_alike;
+    if (base->identified_for != IDENTIFIED_FOR_RIG || !is_same_rig(&base->rig, &damper->rig) ||
+        find_untold(base, &test, &is_alike) != NULL || test == NULL || !is_alike)
+        return;
+    const Rig told = rig_of(test);
+    if (!is_same_rig(&base->rig, &told))
+        return;
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        if (buffer_is_measured(buffer) && buffer->material == NULL)
+            return; // its numbers were changed, not its test
+    }
+    fields_clear(rig_fields, &damper->rig);
 }
 
 // Why the materials could not stand for it.
 static Status refuse_rig(const Damper *damper, const char *place, Problem *problem) {
     const BufferTest *test;
-    bool is_same;
-    const Buffer *untold = find_untold(damper, &test, &is_same);
+    bool is_alike;
+    const Buffer *untold = find_untold(damper, &test, &is_alike);
     if (untold == NULL)
         return problem_add(problem, STATUS_INVALID, place,
                            "is required by identified_for \"rig\": %.64s and %.64s were measured "
@@ -204,7 +232,7 @@ static Status refuse_rig(const Damper *damper, const char *place, Problem *probl
                        "impactor_mass [kg] and, unless it was fixed, the base_mass of its test",
                        untold->material,
                        !isnan(untold->test.base_mass)       ? "the mass of the impactor"
-                       : !isnan(untold->test.impactor_mass) ? "what base it lay on"
+                       : !isnan(untold->test.impactor_mass) ? "the base that it lay on"
                                                             : "the masses that it was tested with");
 }
 

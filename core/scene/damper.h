@@ -49,6 +49,10 @@ const Buffer *damper_buffer(const Damper *damper, Side side);
 // The effective mass for which e and T_c hold, where that of the scene's pair is `own` [kg].
 double damper_identified_mass(const Damper *damper, double own);
 
+// Takes the rig off `damper`, which began as a copy of the completed `base`, where that is the one
+// that the materials of `base` tell: completed anew it has that of its own materials.
+void damper_ask_rig(const Damper *base, Damper *damper);
+
 // Which law a run of these dampers uses: what "auto" stands for is spring_damper wherever a contact
 // time or k, c is known on any side, else impulse.
 const ContactLaw *dampers_contact_law(const Dampers *dampers, const Contact *contact);

@@ -11,6 +11,8 @@
 const char *const material_base_names[] = {
     [MATERIAL_BASE_FIXED] = "fixed", [MATERIAL_BASE_FREE] = "free", NULL};
 
+enum { TAG_MOST = 60 };
+
 // clang-format off
 static const Field row_fields[] = {
     FIELD_REAL(MaterialRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
@@ -21,7 +23,7 @@ static const Field row_fields[] = {
     FIELD_END
 };
 
-#define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by")
+#define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by, of at most 60 bytes")
 #define TABLE FIELD_LIST(Material, table, row_fields, MATERIAL_ROWS, PRESENCE_OPTIONAL, "restitution and contact_time over approach speed, in place of the two; linear between the rows, constant beyond them")
 #define MEASUREMENTS FIELD_REALS(Material, measurements, NULL, AT_LEAST(1), 1000, PRESENCE_OPTIONAL, "numbers of this material's measurements that restitution and contact_time were taken from")
 
@@ -82,7 +84,7 @@ static Status check_text(const char *text, const char *pointer, const char *name
                          Problem *problem) {
     if (text == NULL || text[strspn(text, " \t\r\n")] != '\0')
         return STATUS_OK;
-    return fault(pointer, name, problem, "must not be empty: leave it out, or say something");
+    return fault(pointer, name, problem, "must not be empty");
 }
 
 static Status check_order(double least, double most, const char *unit, const char *pointer,
@@ -186,12 +188,29 @@ static Status check_measurements(const Material *material, const char *pointer, 
     return status;
 }
 
+static Status check_tags(const Material *material, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < material->tags.count; i++) {
+        const char *tag = material->tags.at[i];
+        char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
+        const size_t size = strlen(tag);
+        if (size <= TAG_MOST && tag[strspn(tag, " \t\r\n")] != '\0')
+            continue;
+        pointer_join(list, sizeof list, pointer, "tags");
+        pointer_index(place, sizeof place, list, i);
+        status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s",
+                             TAG_MOST, size > TAG_MOST ? "is longer" : "is empty");
+    }
+    return status;
+}
+
 Status material_check(const Material *material, const char *pointer, Problem *problem) {
     const Status faults[] = {
         fields_check(material_fields, material, pointer, problem),
         check_text(material->name, pointer, "name", problem),
         check_text(material->kind, pointer, "kind", problem),
         check_text(material->source, pointer, "source", problem),
+        check_tags(material, pointer, problem),
         check_ways(material, pointer, problem),
         check_table(material, pointer, problem),
         check_order(material->least_speed, material->most_speed, "m/s", pointer, "most_speed",

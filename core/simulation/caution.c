@@ -101,30 +101,39 @@ static void tell_range(double from, double to, char *text, size_t size) {
         snprintf(text, size, "%s to %s m/s", low, high);
 }
 
+// "slower than", "faster than" or both, and how far it went.
+static void tell_outside(const Approaches *met, char which[48], char reach[64]) {
+    if (met->above == 0) {
+        snprintf(which, 48, "slower");
+        snprintf(reach, 64, "down to %.3g", met->least);
+    } else if (met->below == 0) {
+        snprintf(which, 48, "faster");
+        snprintf(reach, 64, "up to %.3g", met->most);
+    } else {
+        snprintf(which, 48, "slower and %llu faster", (unsigned long long)met->above);
+        snprintf(reach, 64, "at %.3g to %.3g", met->least, met->most);
+    }
+}
+
 static Status warn_of_stops(const Stops *stops, size_t damper, const Approaches *all,
                             Warnings *warnings) {
     const Approaches met = add_up(&all[stops->first], stops->count);
     const bool is_named = stops->buffer->material != NULL;
-    char pointer[64], range[96], below[96] = "", above[96] = "";
+    char pointer[64], range[96], which[48], reach[64];
     if (met.below + met.above == 0)
         return STATUS_OK;
     snprintf(pointer, sizeof pointer, "/dampers/%zu/%s%s", damper, stops->name,
              is_named ? "" : "/table");
     tell_range(met.from, met.to, range, sizeof range);
-    if (met.below > 0)
-        snprintf(below, sizeof below, "%llu were slower, down to %.3g m/s",
-                 (unsigned long long)met.below, met.least);
-    if (met.above > 0)
-        snprintf(above, sizeof above, "%s%llu were faster, up to %.3g m/s",
-                 met.below > 0 ? " and " : "", (unsigned long long)met.above, met.most);
+    tell_outside(&met, which, reach);
     return warnings_add(
         warnings, pointer,
-        "%.80s %s approach speeds of %s: of %llu impacts at the %s of damper %zu %s%s; there %s",
-        is_named ? stops->buffer->material : "the table",
-        is_named ? "was measured at" : "is one over", range, (unsigned long long)met.count,
-        stops->where, damper + 1, below, above,
-        stops->buffer->table.count > 0 ? "the nearest row holds"
-                                       : "its numbers are used without a measurement");
+        "%llu of %llu impacts at the %s of damper %zu were %s than %.80s%s (%s), %s m/s: %s",
+        (unsigned long long)(met.below > 0 ? met.below : met.above), (unsigned long long)met.count,
+        stops->where, damper + 1, which, is_named ? stops->buffer->material : "the table",
+        is_named ? " was measured" : " tells", range, reach,
+        stops->buffer->table.count > 0 ? "the nearest row is used there"
+                                       : "its numbers are used there without a measurement");
 }
 
 static Status warn_of_speeds(const Scene *scene, const Approaches *met, Warnings *warnings) {

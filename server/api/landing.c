@@ -15,6 +15,10 @@
     "\"sample_rate\": 1000"
 #define STUDY                                                                                      \
     "\"study\": {\"kind\": \"tradeoff\", \"solvers\": [\"exact\", \"rk4\"], \"repeats\": 1}"
+#define FELT                                                                                       \
+    "{\"slug\": \"felt\", \"name\": \"Felt\", \"restitution\": 0.3, \"contact_time\": 0.02, "      \
+    "\"source\": \"notebook 7\"}"
+#define APPROVAL "{\"status\": \"approved\", \"reason\": \"as measured\"}"
 // Of a job's document.
 #define RESULT "grep -o '\"result\": \"r-[0-9a-f]*' | cut -d'\"' -f4"
 // Of an example, once it is done.
@@ -63,12 +67,23 @@ static const Step steps[] = {
     {NULL, "curl -s @/v1/results/$R/compare.csv"},
     {NULL, "R=" RESULT_OF("sensitivity_sponge")},
     {NULL, "curl -s @/v1/results/$R/sensitivity.csv"},
+    {"A material of your own: a draft, approved, what was done to it, who used it:",
+     "curl -s --json '" FELT "' @/v1/materials"},
+    {NULL,
+     "curl -s -H 'If-Match: \"felt@1-1\"' --json '" APPROVAL "' @/v1/materials/felt@1/review"},
+    {NULL, "curl -s @/v1/materials/felt/history"},
+    {NULL, "curl -s @/v1/materials/felt/used-by"},
+    {"A ground motion, for scenes to name:",
+     "curl -s -H 'Content-Type: text/plain' --data-binary '0 1 -2 2 -1 0' "
+     "'@/v1/records?name=shake&interval=0.1&unit=g'"},
+    {NULL, "curl -s @/v1/records/shake/samples.csv"},
     {"Where tokens are asked for, every line needs this too:",
      "curl -s -H \"Authorization: Bearer $IMPACTD_TOKEN\" @/v1/jobs"},
-    {"Jobs, what is known already, materials, examples, schemas, the whole API:",
+    {"Jobs, what is known already, materials, records, examples, schemas, the whole API:",
      "curl -s @/v1/jobs"},
     {NULL, "curl -s @/v1/cache"},
     {NULL, "curl -s @/v1/materials"},
+    {NULL, "curl -s @/v1/records"},
     {NULL, "curl -s @/v1/examples"},
     {NULL, "curl -s @/schemas/scene"},
     {NULL, "curl -s @/openapi.json"},

@@ -11,67 +11,77 @@
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-enum { LIST_INITIAL = 100, LIST_MOST = 1000 };
+// Revisions may be long, with their tables; what was done is short.
+enum { REVISIONS_MOST = 100, DEEDS_INITIAL = 100, DEEDS_MOST = 1000 };
 
-// A page of a list that is numbered from 1, newest first: items beyond - 1 down to `least`.
+// A page of a list that is numbered from 1, newest first: `limit` items before `before`.
 typedef struct Page {
-    size_t beyond, least;
+    size_t limit, before;
 } Page;
 
-static Status read_page(const Request *request, size_t count, Page *page, Problem *problem) {
-    size_t limit, before;
-    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
-    TRY(request_count(request, "before", 1, (size_t)1 << 53, count + 1, &before, problem));
-    page->beyond = before <= count ? before : count + 1;
-    page->least = page->beyond > limit ? page->beyond - limit : 1;
-    return STATUS_OK;
+static Status read_page(const Request *request, size_t initial, size_t most, Page *page,
+                        Problem *problem) {
+    const size_t beyond = (size_t)1 << 53;
+    TRY(request_count(request, "limit", 1, most, initial, &page->limit, problem));
+    return request_count(request, "before", 1, beyond, beyond, &page->before, problem);
 }
 
-static void link_page(const Request *request, Reply *reply, const Page *page) {
+// `last` is the number of the last item of a page.
+static void link_page(const Request *request, Reply *reply, uint64_t last) {
     char number[24];
-    snprintf(number, sizeof number, "%zu", page->least);
-    if (page->least > 1)
+    snprintf(number, sizeof number, "%llu", (unsigned long long)last);
+    if (last > 1)
         query_link_next(request, reply, "before", number);
 }
 
-// True where the client has this state of the material already, in the page that it asks for.
-static bool is_known(const Request *request, Reply *reply, const MaterialState *state) {
+// True where the client has this state of the material already.
+static bool is_known(const Request *request, Reply *reply, uint64_t latest, uint64_t version) {
     char tag[MATERIAL_TAG];
-    material_tag(request->parameters[0], state->latest, state->version, tag);
+    material_tag(request->parameters[0], latest, version, tag);
     return reply_tagged(reply, request, tag);
 }
 
-static Status list_revisions(App *app, const Request *request, MaterialRevisions *revisions,
-                             Reply *reply, Problem *problem) {
-    const MaterialRevision *last = &revisions->at[revisions->count - 1];
-    const MaterialState state = {last->latest, last->version, 0};
-    Page page;
-    TRY(read_page(request, revisions->count, &page, problem));
-    if (is_known(request, reply, &state))
+static Status put_revisions(Bytes *bytes, MaterialRevisions *revisions, Problem *problem) {
+    for (size_t i = 0; i < revisions->count; i++) {
+        TRY(catalogue_read_lists(&revisions->at[i], problem));
+        bytes_text(bytes, i > 0 ? ",\n " : "");
+        catalogue_write(bytes, &revisions->at[i]);
+    }
+    return STATUS_OK;
+}
+
+// `state` was read before the revisions: what has come since is not told, so that its tag is not
+// newer than what it stands for.
+static Status list_revisions(App *app, const Request *request, const MaterialState *state,
+                             MaterialRevisions *revisions, Reply *reply, Problem *problem) {
+    if (is_known(request, reply, state->latest, state->version))
         return STATUS_OK;
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"latest\": %llu, \"version\": %llu, \"revisions\": [",
-                 last->slug, (unsigned long long)state.latest, (unsigned long long)state.version);
-    for (size_t i = page.beyond - 1; i >= page.least; i--) {
-        const Status status = catalogue_read_lists(&revisions->at[i - 1], problem);
-        if (status != STATUS_OK) {
-            bytes_clear(&bytes);
-            return status;
-        }
-        catalogue_write(&bytes, &revisions->at[i - 1]);
-        bytes_text(&bytes, i > page.least ? ",\n " : "");
+                 request->parameters[0], (unsigned long long)state->latest,
+                 (unsigned long long)state->version);
+    const Status status = put_revisions(&bytes, revisions, problem);
+    if (status != STATUS_OK) {
+        bytes_clear(&bytes);
+        return status;
     }
     bytes_text(&bytes, "]}\n");
-    link_page(request, reply, &page);
+    if (revisions->count > 0)
+        link_page(request, reply, revisions->at[revisions->count - 1].revision);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status materials_revisions(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *slug = request->parameters[0];
     MaterialRevisions revisions = {0};
-    Status status =
-        store_material_revisions(app->store, request->parameters[0], &revisions, problem);
-    if (status == STATUS_OK)
-        status = list_revisions(app, request, &revisions, reply, problem);
+    MaterialState state;
+    Page page;
+    TRY(read_page(request, REVISIONS_MOST, REVISIONS_MOST, &page, problem));
+    TRY(store_material_state(app->store, slug, &state, problem));
+    if (page.before > state.latest + 1)
+        page.before = state.latest + 1;
+    TRY(store_material_page(app->store, slug, page.before, page.limit, &revisions, problem));
+    const Status status = list_revisions(app, request, &state, &revisions, reply, problem);
     material_revisions_clear(&revisions);
     return status;
 }
@@ -83,8 +93,9 @@ static void put_number(Bytes *bytes, const char *name, uint64_t number) {
         bytes_format(bytes, ", \"%s\": null", name);
 }
 
-static void put_deed(Bytes *bytes, const MaterialDeed *deed, size_t version) {
-    bytes_format(bytes, "{\"version\": %zu, \"action\": \"%s\"", version, deed->action);
+static void put_deed(Bytes *bytes, const MaterialDeed *deed) {
+    bytes_format(bytes, "{\"version\": %llu, \"action\": \"%s\"", (unsigned long long)deed->version,
+                 deed->action);
     put_number(bytes, "revision", deed->revision);
     put_number(bytes, "measurement", deed->measurement);
     material_put_text(bytes, "who", deed->who);
@@ -93,34 +104,30 @@ static void put_deed(Bytes *bytes, const MaterialDeed *deed, size_t version) {
     bytes_text(bytes, "}");
 }
 
-static Status list_deeds(App *app, const Request *request, const MaterialDeeds *deeds, Reply *reply,
-                         Problem *problem) {
-    MaterialState state = {0, deeds->count, 0}; // each deed made a version
-    for (size_t i = 0; i < deeds->count; i++)
-        state.latest = deeds->at[i].revision > state.latest ? deeds->at[i].revision : state.latest;
+Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *slug = request->parameters[0];
+    MaterialDeeds deeds = {0};
+    MaterialState state;
     Page page;
-    TRY(read_page(request, deeds->count, &page, problem));
-    if (is_known(request, reply, &state))
+    TRY(read_page(request, DEEDS_INITIAL, DEEDS_MOST, &page, problem));
+    TRY(store_material_state(app->store, slug, &state, problem));
+    if (page.before > state.version + 1)
+        page.before = state.version + 1;
+    if (is_known(request, reply, state.latest, state.version))
         return STATUS_OK;
+    TRY(store_material_trail(app->store, slug, page.before, page.limit, &deeds, problem));
     Bytes bytes = {.most = app->reply_most};
-    bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %zu, \"history\": [",
-                 request->parameters[0], deeds->count);
-    for (size_t i = page.beyond - 1; i >= page.least; i--) {
-        put_deed(&bytes, &deeds->at[i - 1], i);
-        bytes_text(&bytes, i > page.least ? ",\n " : "");
+    bytes_format(&bytes, "{\"slug\": \"%s\", \"version\": %llu, \"history\": [", slug,
+                 (unsigned long long)state.version);
+    for (size_t i = 0; i < deeds.count; i++) {
+        bytes_text(&bytes, i > 0 ? ",\n " : "");
+        put_deed(&bytes, &deeds.at[i]);
     }
     bytes_text(&bytes, "]}\n");
-    link_page(request, reply, &page);
-    return reply_bytes(reply, 200, type_json, &bytes, problem);
-}
-
-Status materials_history(App *app, const Request *request, Reply *reply, Problem *problem) {
-    MaterialDeeds deeds = {0};
-    Status status = store_material_trail(app->store, request->parameters[0], &deeds, problem);
-    if (status == STATUS_OK)
-        status = list_deeds(app, request, &deeds, reply, problem);
+    if (deeds.count > 0)
+        link_page(request, reply, deeds.at[deeds.count - 1].version);
     material_deeds_clear(&deeds);
-    return status;
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 static void put_side(Bytes *bytes, const char *name, const MaterialRevision *revision) {
@@ -162,21 +169,26 @@ static size_t put_differences(Bytes *bytes, const Material *from, const Material
     return count;
 }
 
-static Status diff(App *app, const Request *request, const MaterialRevisions *revisions,
-                   size_t approved, Reply *reply, Problem *problem) {
-    const size_t count = revisions->count;
-    size_t from, to;
-    TRY(request_count(request, "to", 1, count, count, &to, problem));
-    // What came newest is set beside what is in use; that itself beside the one before it.
-    size_t before = to > 1 ? to - 1 : 1;
-    if (approved > 0 && approved < to)
-        before = approved;
-    TRY(request_count(request, "from", 1, count, before, &from, problem));
-    MaterialRevision *a = &revisions->at[from - 1], *b = &revisions->at[to - 1];
-    TRY(catalogue_read_lists(a, problem));
-    if (a != b)
-        TRY(catalogue_read_lists(b, problem));
-    if (is_known(request, reply, &(MaterialState){b->latest, b->version, 0}))
+// What came newest is set beside what is in use; that itself beside the one before it.
+static Status read_sides(App *app, const Request *request, size_t *from, size_t *to,
+                         Problem *problem) {
+    const char *slug = request->parameters[0];
+    MaterialState state;
+    MaterialRevision head;
+    TRY(store_material_state(app->store, slug, &state, problem));
+    const size_t latest = (size_t)state.latest;
+    TRY(request_count(request, "to", 1, latest, latest, to, problem));
+    size_t before = *to > 1 ? *to - 1 : 1;
+    const Status status = store_material(app->store, slug, 0, &head, NULL);
+    if (status == STATUS_OK && strcmp(head.status, "approved") == 0 && head.revision < *to)
+        before = (size_t)head.revision;
+    material_revision_clear(&head);
+    return request_count(request, "from", 1, latest, before, from, problem);
+}
+
+static Status diff(App *app, const Request *request, const MaterialRevision *a,
+                   const MaterialRevision *b, Reply *reply, Problem *problem) {
+    if (is_known(request, reply, b->latest, b->version))
         return STATUS_OK;
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\"", a->slug);
@@ -189,15 +201,16 @@ static Status diff(App *app, const Request *request, const MaterialRevisions *re
 }
 
 Status materials_diff(App *app, const Request *request, Reply *reply, Problem *problem) {
-    MaterialRevisions revisions = {0};
-    Status status =
-        store_material_revisions(app->store, request->parameters[0], &revisions, problem);
-    size_t approved = 0;
-    for (size_t i = 0; i < revisions.count; i++)
-        if (strcmp(revisions.at[i].status, "approved") == 0)
-            approved = i + 1;
+    const char *slug = request->parameters[0];
+    MaterialRevision a = {0}, b = {0};
+    size_t from, to;
+    TRY(read_sides(app, request, &from, &to, problem));
+    Status status = catalogue_find(app->store, slug, from, &a, problem);
     if (status == STATUS_OK)
-        status = diff(app, request, &revisions, approved, reply, problem);
-    material_revisions_clear(&revisions);
+        status = catalogue_find(app->store, slug, to, &b, problem);
+    if (status == STATUS_OK)
+        status = diff(app, request, &a, &b, reply, problem);
+    material_revision_clear(&a);
+    material_revision_clear(&b);
     return status;
 }

@@ -8,7 +8,7 @@
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-enum { LIST_INITIAL = 100, LIST_MOST = 1000 };
+enum { LIST_INITIAL = 100, LIST_MOST = 1000, LOOKED_AT = 100 };
 static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 
 typedef struct Search {
@@ -81,8 +81,6 @@ static bool is_in_ranges(const Material *said, const Search *search) {
 
 static bool is_meant(const MaterialRevision *revision, const Search *search) {
     const Material *said = &revision->material;
-    if (search->after != NULL && strcmp(revision->slug, search->after) <= 0)
-        return false;
     if (search->status >= 0 && strcmp(revision->status, statuses[search->status]) != 0)
         return false;
     return (search->kind.at == NULL || is_of_kind(said, search->kind.at)) &&
@@ -90,45 +88,64 @@ static bool is_meant(const MaterialRevision *revision, const Search *search) {
            (search->words.at == NULL || has_words(revision, search->words.at));
 }
 
-// At most search->limit of them; *last is the slug of the last one where more follow, else NULL.
-static Status list(MaterialRevisions *materials, const Search *search, Bytes *bytes,
-                   const char **last, Problem *problem) {
-    const char *shown = NULL;
-    size_t count = 0;
-    *last = NULL;
-    for (size_t i = 0; i < materials->count; i++) {
+typedef struct Listed {
+    size_t count;
+    char last[MATERIAL_SLUG_MOST + 1]; // shown
+    bool is_more;
+} Listed;
+
+static Status put_some(MaterialRevisions *materials, const Search *search, Listed *list,
+                       Bytes *bytes, Problem *problem) {
+    for (size_t i = 0; i < materials->count && !list->is_more; i++) {
         MaterialRevision *material = &materials->at[i];
         TRY(catalogue_read_lists(material, problem));
         if (!is_meant(material, search))
             continue;
-        if (count++ == search->limit) {
-            *last = shown;
+        list->is_more = list->count == search->limit;
+        if (list->is_more)
             break;
-        }
-        bytes_text(bytes, shown == NULL ? "" : ",\n ");
+        bytes_text(bytes, list->count++ > 0 ? ",\n " : "");
         catalogue_write(bytes, material);
-        shown = material->slug;
+        text_fit(list->last, sizeof list->last, material->slug);
+    }
+    return STATUS_OK;
+}
+
+// At most search->limit of them.
+static Status put_list(Store *store, const Search *search, Listed *list, Bytes *bytes,
+                       Problem *problem) {
+    char after[QUERY_TEXT_MOST + 1] = "";
+    bool is_end = false;
+    if (search->after != NULL)
+        text_fit(after, sizeof after, search->after);
+    while (!is_end && !list->is_more) {
+        MaterialRevisions materials = {0};
+        Status status = store_material_heads(store, after, LOOKED_AT, &materials, problem);
+        if (status == STATUS_OK)
+            status = put_some(&materials, search, list, bytes, problem);
+        is_end = materials.count < LOOKED_AT;
+        if (!is_end)
+            text_fit(after, sizeof after, materials.at[materials.count - 1].slug);
+        material_revisions_clear(&materials);
+        TRY(status);
     }
     return STATUS_OK;
 }
 
 static Status answer(App *app, const Request *request, const Search *search, Reply *reply,
                      Problem *problem) {
-    MaterialRevisions materials = {0};
-    const char *last = NULL;
+    Listed list = {0};
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, "{\"materials\": [");
-    Status status = store_materials(app->store, &materials, problem);
-    if (status == STATUS_OK)
-        status = list(&materials, search, &bytes, &last, problem);
-    if (last != NULL)
-        query_link_next(request, reply, "after", last);
-    material_revisions_clear(&materials);
+    const Status status = put_list(app->store, search, &list, &bytes, problem);
     bytes_text(&bytes, "]}\n");
-    if (status == STATUS_OK)
-        return reply_bytes(reply, 200, type_json, &bytes, problem);
-    bytes_clear(&bytes);
-    return status;
+    if (status != STATUS_OK) {
+        bytes_clear(&bytes);
+        return status;
+    }
+    if (list.is_more)
+        query_link_next(request, reply, "after", list.last);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status materials_list(App *app, const Request *request, Reply *reply, Problem *problem) {

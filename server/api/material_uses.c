@@ -57,45 +57,33 @@ static Status list_uses(App *app, const Request *request, uint64_t revision, Rep
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-static uint64_t used(const MaterialUses *uses, uint64_t revision) {
-    for (size_t i = 0; i < uses->count; i++)
-        if (uses->at[i].revision == revision)
-            return uses->at[i].results;
-    return 0;
-}
-
-static void put_counts(Bytes *bytes, const MaterialRevisions *revisions, const MaterialUses *uses) {
-    const char *slug = revisions->at[0].slug;
+static void put_counts(Bytes *bytes, const char *slug, const MaterialUses *uses) {
+    const char *base = link_base();
     uint64_t total = 0;
     bytes_format(bytes, "{\"slug\": \"%s\", \"revisions\": [", slug);
-    for (size_t i = revisions->count; i-- > 0;) {
-        const MaterialRevision *revision = &revisions->at[i];
-        const unsigned long long number = revision->revision, count = used(uses, number);
-        total += count;
+    for (size_t i = 0; i < uses->count; i++) {
+        const MaterialUse *use = &uses->at[i];
+        const unsigned long long number = use->revision;
+        total += use->results;
         bytes_format(bytes,
-                     "{\"revision\": %llu, \"status\": \"%s\", \"results\": %llu, \"links\": "
+                     "%s{\"revision\": %llu, \"status\": \"%s\", \"results\": %llu, \"links\": "
                      "{\"self\": \"%s/v1/materials/%s@%llu\", \"used_by\": "
-                     "\"%s/v1/materials/%s@%llu/used-by\"}}%s",
-                     number, revision->status, count, link_base(), slug, number, link_base(), slug,
-                     number, i > 0 ? ",\n " : "");
+                     "\"%s/v1/materials/%s@%llu/used-by\"}}",
+                     i > 0 ? ",\n " : "", number, use->status, (unsigned long long)use->results,
+                     base, slug, number, base, slug, number);
     }
     bytes_format(bytes, "], \"total\": %llu}\n", (unsigned long long)total);
 }
 
 static Status count_uses(App *app, const char *slug, Reply *reply, Problem *problem) {
-    MaterialRevisions revisions = {0};
+    MaterialState state;
     MaterialUses uses = {0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = store_material_revisions(app->store, slug, &revisions, problem);
-    if (status == STATUS_OK)
-        status = store_material_uses(app->store, slug, &uses, problem);
-    if (status == STATUS_OK) {
-        put_counts(&bytes, &revisions, &uses);
-        status = reply_bytes(reply, 200, type_json, &bytes, problem);
-    }
+    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(store_material_uses(app->store, slug, &uses, problem));
+    put_counts(&bytes, slug, &uses);
     free(uses.at);
-    material_revisions_clear(&revisions);
-    return status;
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
 Status materials_uses(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -162,7 +162,7 @@ static void write_link(App *app, Bytes *bytes, const Use *use) {
     bytes_format(bytes,
                  "{\"slug\": \"%s\", \"revision\": %llu, \"links\": {\"revision\": "
                  "\"%s/v1/materials/%s@%llu\", \"used_by\": "
-                 "\"%s/v1/materials/%s/used-by?revision=%llu\"}}",
+                 "\"%s/v1/materials/%s@%llu/used-by\"}}",
                  use->slug, use->revision, link_base(), use->slug, use->revision, link_base(),
                  use->slug, use->revision);
 }

@@ -8,6 +8,8 @@
 
 typedef struct FaultTold {
     char *pointer, *detail, *unit, *did_you_mean;
+    uint64_t row;
+    char *column;
 } FaultTold;
 
 // clang-format off
@@ -16,6 +18,8 @@ static const Field fault_fields[] = {
     FIELD_TEXT(FaultTold, detail, 0, PRESENCE_OPTIONAL, 0, "what is wrong"),
     FIELD_TEXT(FaultTold, unit, 0, PRESENCE_OPTIONAL, 0, "unit"),
     FIELD_TEXT(FaultTold, did_you_mean, 0, PRESENCE_OPTIONAL, 0, "suggestion"),
+    FIELD_COUNT(FaultTold, row, NULL, ANY, OPTIONAL, "of a table"),
+    FIELD_TEXT(FaultTold, column, 0, PRESENCE_OPTIONAL, 0, "of that row"),
     FIELD_END,
 };
 static const Field problem_fields[] = {
@@ -87,11 +91,24 @@ static void text_put(char *target, size_t size, const char *text) {
     told_tame(target);
 }
 
+// A cell of a table is what people look for, not its place in a document.
+static void place_put(Fault *fault, const FaultTold *told) {
+    const bool has_column = told->column != NULL && told->column[0] != '\0';
+    char place[sizeof fault->pointer];
+    if (told->row == COUNT_ABSENT) {
+        text_put(fault->pointer, sizeof fault->pointer, told->pointer);
+        return;
+    }
+    snprintf(place, sizeof place, "row %llu%s%.100s", (unsigned long long)told->row,
+             has_column ? ", column " : "", has_column ? told->column : "");
+    text_put(fault->pointer, sizeof fault->pointer, place);
+}
+
 void problem_told_put(const ProblemTold *told, Status status, Problem *problem) {
     const FaultTold *faults = told->errors.at;
     for (size_t i = 0; i < told->errors.count && problem != NULL; i++) {
         Fault fault = {0};
-        text_put(fault.pointer, sizeof fault.pointer, faults[i].pointer);
+        place_put(&fault, &faults[i]);
         text_put(fault.detail, sizeof fault.detail, faults[i].detail);
         text_put(fault.unit, sizeof fault.unit, faults[i].unit);
         text_put(fault.did_you_mean, sizeof fault.did_you_mean, faults[i].did_you_mean);

@@ -1,5 +1,5 @@
 // What commands that ask a daemon share: where it is, patience while it is busy, watching a job.
-// Not a command. Used by submit.c, watch.c, get.c, cancel.c and compare.c.
+// Not a command. Used by submit.c, watch.c, get.c, cancel.c, compare.c and materials*.c.
 #ifndef SERVER_COMMAND_DAEMON_H
 #define SERVER_COMMAND_DAEMON_H
 

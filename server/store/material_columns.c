@@ -60,6 +60,7 @@ const RowColumn material_measurement_columns[] = {
 };
 
 const RowColumn material_deed_columns[] = {
+    ROW_COLUMN(MaterialDeed, version, COLUMN_COUNT),
     ROW_COLUMN(MaterialDeed, action, COLUMN_TEXT),
     ROW_COLUMN(MaterialDeed, revision, COLUMN_COUNT),
     ROW_COLUMN(MaterialDeed, measurement, COLUMN_COUNT),

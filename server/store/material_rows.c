@@ -9,14 +9,22 @@
 
 typedef struct Key {
     char *slug;
-    uint64_t number; // of a revision, a measurement
+    uint64_t number; // of a revision, a measurement, an entry of the trail
+    uint64_t most;
 } Key;
 static const RowColumn key_columns[] = {ROW_COLUMN(Key, slug, COLUMN_TEXT),
-                                        ROW_COLUMN(Key, number, COLUMN_COUNT), ROW_END};
+                                        ROW_COLUMN(Key, number, COLUMN_COUNT),
+                                        ROW_COLUMN(Key, most, COLUMN_COUNT), ROW_END};
 
 // SQLite counts with a sign; no number is that high.
 static Key key_of(const char *slug, uint64_t number) {
-    return (Key){(char *)slug, number > INT64_MAX ? INT64_MAX : number};
+    return (Key){(char *)slug, number > INT64_MAX ? INT64_MAX : number, INT64_MAX};
+}
+
+static Key key_of_page(const char *slug, uint64_t before, size_t most) {
+    Key key = key_of(slug, before);
+    key.most = most > INT64_MAX ? INT64_MAX : most;
+    return key;
 }
 
 // The head: an approved revision before any other, the newest first; a deprecated one is nobody's
@@ -26,10 +34,12 @@ static const char head_sql[] =
     "ORDER BY status = 'approved' DESC, revision DESC LIMIT 1";
 static const char revision_sql[] =
     "SELECT * FROM material_states WHERE slug = :slug AND revision = :number";
-static const char heads_sql[] = "SELECT * FROM (SELECT *, row_number() OVER (PARTITION BY slug "
-                                "ORDER BY status = 'approved' DESC, "
-                                "status = 'draft' DESC, revision DESC) AS place FROM "
-                                "material_states) WHERE place = 1 ORDER BY slug";
+// Of each material the same, and of one whose revisions are all deprecated the newest.
+static const char heads_sql[] =
+    "SELECT s.* FROM materials m JOIN material_states s ON s.material = m.number AND s.revision = "
+    "(SELECT h.revision FROM material_states h WHERE h.material = m.number ORDER BY h.status = "
+    "'approved' DESC, h.status = 'draft' DESC, h.revision DESC LIMIT 1) WHERE m.slug > :slug ORDER "
+    "BY m.slug LIMIT :most";
 
 void material_revision_clear(MaterialRevision *revision) {
     fields_clear(material_fields, &revision->material);
@@ -111,7 +121,13 @@ static Status all(Store *store, const char *sql, const Key *key, const RowColumn
 }
 
 Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem) {
-    return all(store, heads_sql, NULL, material_revision_columns, sizeof *materials->at, materials,
+    return store_material_heads(store, "", SIZE_MAX, materials, problem);
+}
+
+Status store_material_heads(Store *store, const char *after, size_t most,
+                            MaterialRevisions *materials, Problem *problem) {
+    const Key key = key_of_page(after, 0, most);
+    return all(store, heads_sql, &key, material_revision_columns, sizeof *materials->at, materials,
                problem);
 }
 
@@ -124,6 +140,15 @@ Status store_material_revisions(Store *store, const char *slug, MaterialRevision
     TRY(all(store, slug != NULL ? own_sql : all_sql, slug != NULL ? &key : NULL,
             material_revision_columns, sizeof *revisions->at, revisions, problem));
     return slug != NULL && revisions->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;
+}
+
+Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
+                           MaterialRevisions *revisions, Problem *problem) {
+    static const char sql[] = "SELECT * FROM material_states WHERE slug = :slug AND revision < "
+                              ":number ORDER BY revision DESC LIMIT :most";
+    const Key key = key_of_page(slug, before, most);
+    return all(store, sql, &key, material_revision_columns, sizeof *revisions->at, revisions,
+               problem);
 }
 
 static void clear_all(const RowColumn *columns, size_t size, void *list) {
@@ -197,13 +222,13 @@ void material_measurements_clear(MaterialMeasurements *measurements) {
     clear_all(material_measurement_columns, sizeof *measurements->at, measurements);
 }
 
-Status store_material_trail(Store *store, const char *slug, MaterialDeeds *deeds,
-                            Problem *problem) {
-    static const char sql[] = "SELECT t.* FROM material_trail t JOIN materials m ON m.number = "
-                              "t.material WHERE m.slug = :slug ORDER BY t.version";
-    const Key key = key_of(slug, 0);
-    TRY(all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem));
-    return deeds->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;
+Status store_material_trail(Store *store, const char *slug, uint64_t before, size_t most,
+                            MaterialDeeds *deeds, Problem *problem) {
+    static const char sql[] =
+        "SELECT t.* FROM material_trail t JOIN materials m ON m.number = t.material WHERE m.slug = "
+        ":slug AND t.version < :number ORDER BY t.version DESC LIMIT :most";
+    const Key key = key_of_page(slug, before, most);
+    return all(store, sql, &key, material_deed_columns, sizeof *deeds->at, deeds, problem);
 }
 
 void material_deeds_clear(MaterialDeeds *deeds) {

@@ -45,10 +45,16 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
                       Problem *problem);
 // The head of every material, by slug; of those that are all deprecated the newest revision.
 Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
+// At most `most` of them, those behind the slug `after` ("": from the first).
+Status store_material_heads(Store *store, const char *after, size_t most,
+                            MaterialRevisions *materials, Problem *problem);
 // All revisions of one material, or of all (slug NULL), by slug and number. STATUS_NOT_FOUND where
 // there is no such material.
 Status store_material_revisions(Store *store, const char *slug, MaterialRevisions *revisions,
                                 Problem *problem);
+// Newest first, at most `most` of one material's, those before `before`.
+Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
+                           MaterialRevisions *revisions, Problem *problem);
 void material_revisions_clear(MaterialRevisions *materials);
 
 typedef struct MaterialReview {
@@ -88,6 +94,7 @@ void material_measurement_clear(MaterialMeasurement *measurement);
 void material_measurements_clear(MaterialMeasurements *measurements);
 
 typedef struct MaterialDeed {
+    uint64_t version;               // of the material after it; what is added gets the next
     char *action;                   // "create", "revise" ...: schema/sql/009_materials.sql
     uint64_t revision, measurement; // 0: not about one
     char *who, *why;
@@ -97,16 +104,18 @@ typedef struct MaterialDeeds {
     MaterialDeed *at;
     size_t count;
 } MaterialDeeds;
-// The trail of one material, oldest first.
-Status store_material_trail(Store *store, const char *slug, MaterialDeeds *deeds, Problem *problem);
+// The trail of one material, newest first, at most `most` entries, those before `before`.
+Status store_material_trail(Store *store, const char *slug, uint64_t before, size_t most,
+                            MaterialDeeds *deeds, Problem *problem);
 void material_deeds_clear(MaterialDeeds *deeds);
 
-// How many results were made with each revision that any was made with, by revision; pairs of a
-// revision and its count.
+// Each revision with how many results were made with it, newest first.
+typedef struct MaterialUse {
+    uint64_t revision, results;
+    char status[16];
+} MaterialUse;
 typedef struct MaterialUses {
-    struct MaterialUse {
-        uint64_t revision, results;
-    } * at; // freed by free
+    MaterialUse *at; // freed by free
     size_t count;
 } MaterialUses;
 Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem);

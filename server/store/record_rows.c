@@ -136,7 +136,8 @@ typedef struct Adding {
 } Adding;
 
 static Status add(Database *database, const void *work, Problem *problem) {
-    static const char count_sql[] = "SELECT count(*) AS count FROM records";
+    static const char count_sql[] =
+        "SELECT count(*) AS count, coalesce(sum(count), 0) AS most FROM records";
     static const char head_sql[] =
         "INSERT INTO records (name, source, processing, earthquake, station, notes, layout, "
         "header, unit, stated_unit, interval, count, peak, peak_time, peak_velocity, end_velocity, "
@@ -165,6 +166,11 @@ static Status add(Database *database, const void *work, Problem *problem) {
         return problem_set(problem, STATUS_LIMIT,
                            "%d records are kept, no more; delete some that nothing uses",
                            RECORDS_MOST);
+    if (counted.most + row->count > RECORDS_SAMPLES)
+        return problem_set(problem, STATUS_LIMIT,
+                           "the records have %llu samples, with this one more than the %llu that "
+                           "are kept; delete some that nothing uses",
+                           (unsigned long long)counted.most, (unsigned long long)RECORDS_SAMPLES);
     TRY(database_change(database, head_sql, record_columns, row, NULL, problem));
     key.samples = (StoredBytes){adding->samples->at, adding->samples->count * sizeof(double)};
     return database_change(database, body_sql, key_columns, &key, NULL, problem);

@@ -1,5 +1,4 @@
 // Which results were made with what of the catalogue.
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "server/store/access.h"
@@ -42,31 +41,18 @@ Status store_result_uses(Store *store, const char *name, size_t most, int64_t be
     return status;
 }
 
-// The names of a material's revisions begin alike: "sponge@" up to "spongeA", the next byte.
-typedef struct UseSpan {
-    char first[72], beyond[72];
-} UseSpan;
-static const RowColumn span_columns[] = {ROW_COLUMN(UseSpan, first, COLUMN_NAME),
-                                         ROW_COLUMN(UseSpan, beyond, COLUMN_NAME), ROW_END};
-typedef struct MaterialUse MaterialUse;
-static const RowColumn material_use_columns[] = {ROW_COLUMN(MaterialUse, revision, COLUMN_COUNT),
-                                                 ROW_COLUMN(MaterialUse, results, COLUMN_COUNT),
-                                                 ROW_END};
+static const RowColumn material_use_columns[] = {
+    ROW_COLUMN(MaterialUse, revision, COLUMN_COUNT), ROW_COLUMN(MaterialUse, results, COLUMN_COUNT),
+    ROW_COLUMN(MaterialUse, status, COLUMN_NAME), ROW_END};
 
 Status store_material_uses(Store *store, const char *slug, MaterialUses *uses, Problem *problem) {
     static const char sql[] =
-        "SELECT CAST(substr(name, instr(name, '@') + 1) AS INTEGER) AS revision, count(*) AS "
-        "results FROM result_uses WHERE name >= :first AND name < :beyond GROUP BY name ORDER BY "
-        "revision";
-    UseSpan span;
+        "SELECT revision, status, (SELECT count(*) FROM result_uses u WHERE u.name = slug || '@' "
+        "|| revision) AS results FROM material_states WHERE slug = :name ORDER BY revision DESC";
+    const UseKey key = {.name = (char *)slug};
     void *at;
-    *uses = (MaterialUses){NULL, 0};
-    if (!material_slug_is_good(slug))
-        return STATUS_OK;
-    snprintf(span.first, sizeof span.first, "%s@", slug);
-    snprintf(span.beyond, sizeof span.beyond, "%sA", slug);
     store_settle(store);
-    const Status status = store_all(store, sql, span_columns, &span, material_use_columns,
+    const Status status = store_all(store, sql, key_columns, &key, material_use_columns,
                                     sizeof *uses->at, &at, &uses->count, problem);
     uses->at = at;
     if (status != STATUS_OK) {

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """The commands that ask a daemon: submit, watch, get, cancel, compare; and what they do with a server that is none."""
 
-import contextlib
 import http.server
 import json
 import os
@@ -19,6 +18,7 @@ import numpy
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from client import Fake, client, endless_body, endless_headers, fake, raw, say  # noqa: E402
 
 SANITIZED = True
 WAITS = True
@@ -31,12 +31,6 @@ def endless():
     scene.update(duration=2000, sample_rate=10, output={"channels": [], "psd": None},
                  accuracy={"solver": "rk4", "step": 1e-5})
     return json.dumps(scene)
-
-
-def client(url, *arguments, text="", environment=None, timeout=60):
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("IMPACTD_")}
-    return program.run(*arguments, text=text, timeout=timeout,
-                       environment={**kept, "IMPACTD_SERVER": url, **(environment or {})})
 
 
 def test_submit_prints_the_job_and_waits_for_it():
@@ -291,74 +285,6 @@ def test_wrong_words_are_usage():
             assert code == 2 and out == "" and words in errors and "secret" not in errors, (arguments, code, errors)
         code, _, errors = client("http://127.0.0.1:1", "get", "r-1", environment={"IMPACTD_TOKEN": "secret of mine"})
         assert code == 2 and "IMPACTD_TOKEN" in errors and "secret" not in errors, (code, errors)
-
-
-class Fake(http.server.BaseHTTPRequestHandler):
-    """Answers as a list of functions says, one after another; the last one stays."""
-    protocol_version = "HTTP/1.1"
-
-    def answer(self):
-        size = int(self.headers.get("Content-Length") or 0)
-        self.rfile.read(size)
-        self.server.seen.append((self.command, self.path, dict(self.headers)))
-        plan = self.server.plan
-        with contextlib.suppress(OSError):
-            (plan.pop(0) if len(plan) > 1 else plan[0])(self)
-
-    do_GET = do_POST = do_DELETE = answer
-
-    def log_message(self, *_):
-        pass
-
-
-def say(code=200, body=b"{}", kind="application/json", length=None, **headers):
-    def speak(handler):
-        handler.send_response(code)
-        handler.send_header("Content-Type", kind)
-        handler.send_header("Content-Length", str(len(body) if length is None else length))
-        for name, value in headers.items():
-            handler.send_header(name.replace("_", "-"), value)
-        handler.end_headers()
-        handler.wfile.write(body)
-        if length is not None:
-            handler.close_connection = True
-    return speak
-
-
-def raw(data):
-    def speak(handler):
-        handler.wfile.write(data)
-        handler.close_connection = True
-    return speak
-
-
-@contextlib.contextmanager
-def fake(*plan):
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Fake)
-    server.plan, server.seen = list(plan), []
-    server.daemon_threads = True
-    server.handle_error = lambda *_: None
-    thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}", server.seen
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
-
-
-def endless_headers(handler):
-    handler.wfile.write(b"HTTP/1.1 200 OK\r\n")
-    for i in range(100000):
-        handler.wfile.write(b"X-%d: %s\r\n" % (i, b"y" * 900))
-
-
-def endless_body(handler):
-    handler.wfile.write(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n")
-    piece = b"%x\r\n%s\r\n" % (1 << 20, b"[" * (1 << 20))
-    for _ in range(200):
-        handler.wfile.write(piece)
 
 
 def test_a_hostile_server_is_bounded_and_refused():

@@ -90,10 +90,15 @@ def test_settings_come_from_flag_environment_file_and_default():
         assert code == 2 and f"{path}:5" in errors and "workers" in errors and f"{path}:6" in errors, errors
 
 
+def is_warned(errors):
+    """Whether that is all: late impacts of the paper's scene are slower than any that the paper measured."""
+    return errors.count("\n") == 1 and "warning: /dampers/0/buffer: 6 of 22 impacts" in errors
+
+
 def test_run_prints_the_finished_job():
-    """`run` without -o prints the job of the contract, and nothing else."""
+    """`run` without -o prints the job of the contract, and nothing else; warnings go to the standard error."""
     code, out, errors = program.run("run", SPONGE)
-    assert code == 0 and errors == "", (code, errors)
+    assert code == 0 and is_warned(errors), (code, errors)
     job = json.loads(out)
     for member in ("id", "status", "progress", "cached", "result", "created", "started", "finished", "problem",
                    "plan", "summary", "warnings", "timing", "links"):
@@ -114,7 +119,7 @@ def test_run_writes_each_format_alike():
     with tempfile.TemporaryDirectory() as folder:
         for extension in ("json", "csv", "npy"):
             code, out, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "out." + extension))
-            assert (code, out, errors) == (0, "", ""), (extension, code, out, errors)
+            assert (code, out) == (0, "") and is_warned(errors), (extension, code, out, errors)
         assert sorted(os.listdir(folder)) == ["out.csv", "out.json", "out.npy"]
         with open(os.path.join(folder, "out.json"), encoding="utf-8") as file:
             whole = json.load(file)
@@ -271,7 +276,7 @@ def test_progress_bar_on_a_terminal():
     percents = [int(part.split("%")[0].split("]")[1]) for part in shown.split("\r") if "%" in part]
     assert len(percents) >= 3 and percents == sorted(percents) and percents[-1] <= 100, shown
     with open(SPONGE, encoding="utf-8") as file:
-        assert on_a_terminal(file.read(), 20) == ""
+        assert "%" not in on_a_terminal(file.read(), 20)
 
 
 def test_no_file_takes_a_closed_streams_place():

@@ -54,6 +54,11 @@ def test_a_full_disk_stops_writes_alone():
             assert folder in problem["detail"] and "bytes are free" in problem["detail"], problem
             for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}"):
                 assert daemon.request("DELETE", path).status == 507, path
+            felt = {"name": "Felt", "restitution": 0.3, "source": "here", "comment": "x"}
+            for path, body in (("", {"slug": "felt", **felt}), ("/sponge/revisions", felt), ("/sponge/revert", {"to": 1, "comment": "x"}),
+                               ("/sponge@1/review", {"status": "deprecated", "reason": "x"})):
+                assert daemon.request("POST", "/v1/materials" + path, json=body, headers={"If-Match": "*"}).status == 507, path
+            assert daemon.get("/v1/materials/sponge/history").json()["version"] == 2
             for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
                          f"/v1/results/{before['result']}/series.npy", f"/v1/results/{before['result']}/psd.json",
                          "/health/live"):

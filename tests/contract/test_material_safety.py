@@ -19,6 +19,8 @@ import program  # noqa: E402
 ROUNDS, KILLS, REVISIONS = 1000, 25, 100
 TABLES = ("materials", "material_revisions", "material_reviews", "material_measurements", "material_trail")
 FELT = {"name": "Felt", "restitution": 0.3, "contact_time": 0.02, "source": "notebook 7, page 12", "tags": ["lab"]}
+DROP = {"impactor": "steel ball, 30 mm", "impactor_mass": 0.11, "base": "fixed", "drops": [{"drop_height": 0.1, "rebound_height": 0.009},
+                                                                                          {"drop_height": 0.1, "rebound_height": 0.0091}]}
 ANY = {"If-Match": "*"}
 # What is told of a revision and may change: its review, and how far its material has come.
 STATE = ("status", "review", "latest", "version")
@@ -54,18 +56,6 @@ def review(daemon, name, status="approved"):
     return daemon.request("POST", f"/v1/materials/{name}/review", json={"status": status, "reason": "looked at"}, headers=ANY)
 
 
-def measure(folder):
-    """A measurement, beside the daemon: what is kept of one is the same whichever way it came."""
-    connection = sqlite3.connect(os.path.join(folder, "impactd.db"), timeout=30)
-    with connection:
-        number = connection.execute("SELECT number FROM materials WHERE slug = 'felt'").fetchone()[0]
-        connection.execute("INSERT INTO material_measurements (material, measurement, comment, created_unix_ms, document) "
-                           "VALUES (?, 1, 'first drop', 1795219200000, '{}')", (number,))
-        connection.execute("INSERT INTO material_trail (material, version, action, measurement, why, created_unix_ms) SELECT material, "
-                           "max(version) + 1, 'measure', 1, 'first drop', 1795219200000 FROM material_trail WHERE material = ?", (number,))
-    connection.close()
-
-
 def targets():
     """Every pattern of routes.c, with names of what is there in place of its parameters, and places near them."""
     with open(os.path.join(program.SOURCE, "server", "api", "routes.c"), encoding="utf-8") as file:
@@ -80,15 +70,16 @@ def targets():
 def test_no_request_changes_what_was_said():
     """Every path of the API with every method and bodies meant to do harm: all rows stay as they were, and are told as they were."""
     bodies = [None, {}, {**FELT, "slug": "felt", "comment": "x"}, {**FELT, "comment": "x", "restitution": 0.9},
-              {"to": 1, "comment": "x"}, {"status": "deprecated", "reason": "x"},
+              {"to": 1, "comment": "x"}, {"status": "deprecated", "reason": "x"}, {**DROP, "comment": "x", "geometry": "another"},
               {"materials": [{"slug": "felt", "revision": 1, **FELT, "restitution": 0.9}], "format": "impactd-materials"},
               {"slug": "felt'; UPDATE material_revisions SET restitution = 0.9; --", **FELT}]
     with program.daemon() as daemon:
         add(daemon, "felt")
         revise(daemon, "felt", restitution=0.35)
         review(daemon, "felt@1")
-        measure(daemon.data)
-        names = ["felt@1", "felt@2", "sponge@1"]
+        measured = daemon.request("POST", "/v1/materials/felt/measurements", json={**DROP, "comment": "first drop"})
+        assert measured.status == 201, measured
+        names = ["felt@1", "felt@2", "sponge@1", "felt/measurements/1"]
         before, told = kept(daemon.data), {name: said(daemon, name) for name in names}
         asked, taken = 0, 0
         for target in targets():

@@ -127,8 +127,8 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/results/{id}/impacts/{number}/force": {"number": "22"},
                   "/v1/jobs/{id}": {"id": job["id"]}, "/v1/jobs/{id}/events": {"id": job["id"]},
                   **{f"/v1/records/{{name}}{rest}": {"name": "shake"} for rest in ("", "/samples", "/samples.{format}")},
-                  "/v1/materials/{slug}": {"slug": "sponge"},
-                  "/v1/materials/{slug}@{revision}": {"slug": "sponge", "revision": "1"},
+                  **{f"/v1/materials/{{slug}}{rest}": {"slug": "sponge"} for rest in ("", "/revisions", "/history", "/diff", "/used-by")},
+                  **{f"/v1/materials/{{slug}}@{{revision}}{rest}": {"slug": "sponge", "revision": "1"} for rest in ("", "/used-by")},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"}}
 
         def call(method, path, target, **options):
@@ -149,13 +149,24 @@ def test_real_answers_have_the_promised_shapes():
         shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 1, 0]}
         assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
 
+        drops = {"drops": [{"drop_height": 0.1, "rebound_height": 0.04, "contact_time": 0.001}]}
+        measurements = "/v1/materials/{slug}/measurements"
+        for body in (drops, {}):
+            call("POST", measurements, "/v1/materials/sponge/measurements", json=body)
+            call("POST", measurements, "/v1/materials/sponge/measurements?dry_run=1", json=body)
+        call("POST", measurements, "/v1/materials/none/measurements", json=drops)
+        call("POST", measurements, "/v1/materials/sponge/measurements", json=drops, headers={"If-Match": '"x"'})
+        call("POST", measurements, "/v1/materials/sponge/measurements", body="{}")
+
         for (method, path), operation in operations().items():
             if method != "GET":
                 continue
             formats = [p["schema"]["enum"] for p in operation.get("parameters", []) if p["name"] == "format"]
             for extension in formats[0] if formats else [None]:
-                target = path.format(**{"id": job["result"], "format": extension, **values.get(path, {})})
+                target = path.format(**{"id": job["result"], "format": extension, "slug": "sponge", "revision": "1",
+                                           "number": "1", **values.get(path, {})})
                 target += f"?a={job['result']}&b={studies['compare']['id']}" if path == "/v1/compare" else ""
+                target += "?damper_mass=1" if path.endswith("/derived") else ""
                 call(method, path, target)
                 if "400" in operation["responses"]:
                     call(method, path, target.split("?")[0] + "?unknown=1")
@@ -170,6 +181,37 @@ def test_real_answers_have_the_promised_shapes():
                               (target, {"Accept": "application/x-npy"}))
                 call(method, path, part, headers={**kind, "Range": "bytes=0-9"})
                 call(method, path, part, headers={**kind, "Range": "bytes=99999999-"})
+
+        felt = {"slug": "felt", "name": "Felt", "restitution": 0.3, "contact_time": 0.02, "source": "here"}
+        assert call("POST", "/v1/materials", "/v1/materials", json=felt) == {"Location", "ETag"}
+        call("POST", "/v1/materials", "/v1/materials", json=felt)
+        assert call("GET", "/v1/materials", "/v1/materials?limit=1") == {"Link"}
+        revised = {**{name: value for name, value in felt.items() if name != "slug"}, "comment": "anew"}
+        for path, body, good in (("", felt, None), ("/{slug}/revisions", revised, {"Location", "ETag"}),
+                                 ("/{slug}/revert", {"to": 1, "comment": "back"}, {"Location", "ETag"}),
+                                 ("/{slug}@{revision}/review", {"status": "approved", "reason": "fine"}, {"ETag"})):
+            path, anyhow = "/v1/materials" + path, {"If-Match": "*"}
+            target = path.format(slug="felt", revision="1")
+            if good is not None:
+                call("POST", path, target, json=body)
+                call("POST", path, target, json=body, headers={"If-Match": '"felt@1-99"'})
+                assert call("POST", path, target, json=body, headers=anyhow) == good, path
+                call("POST", path, path.format(slug="none", revision="1"), json=body, headers=anyhow)
+            if "review" in path:
+                call("POST", path, target, json=body, headers=anyhow)
+            call("POST", path, target, json={}, headers=anyhow)
+            call("POST", path, target, body="{", headers={**anyhow, "Content-Type": "application/json"})
+            call("POST", path, target, body="{}", headers=anyhow)
+            call("POST", path, target, body=b" " * (1 << 24) + b"x", headers={**anyhow, "Content-Type": "application/json"})
+        for rest in ("revisions", "history"):
+            assert call("GET", f"/v1/materials/{{slug}}/{rest}", f"/v1/materials/felt/{rest}?limit=1") == {"ETag", "Link"}
+        call("GET", "/v1/materials/{slug}/diff", "/v1/materials/felt/diff?from=1&to=2")
+        for clearance in (0.013, 0.014):
+            used = program.scene("paper_free_sponge")
+            used["dampers"][0]["clearance"] = clearance
+            program.finished(daemon, used)
+        call("GET", "/v1/materials/{slug}/used-by", "/v1/materials/sponge/used-by?revision=1&limit=1")
+        call("GET", "/v1/materials/{slug}@{revision}/used-by", "/v1/materials/sponge@1/used-by?limit=1")
 
         text = {"Content-Type": "text/plain"}
         assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}

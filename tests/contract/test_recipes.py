@@ -99,6 +99,13 @@ def test_lines():
             file.write("A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n")
         with open(os.path.join(folder, "measured.csv"), "w", encoding="utf-8") as file:
             file.write("time [s],acceleration [m/s^2]\n" + "".join(f"{0.001 * i:.3f},{0.1 * (i % 7)}\n" for i in range(40)))
+        cork = {"slug": "cork", "name": "Cork", "restitution": 0.4, "contact_time": 0.01, "source": "a guess"}
+        drops = {"gravity": 0, "drops": [{"drop_height": 0.1, "rebound_height": 0.0001 * height} for height in (158, 161, 164)]}
+        for name, document in (("cork", cork), ("test", drops)):
+            with open(os.path.join(folder, name + ".json"), "w", encoding="utf-8") as file:
+                json.dump(document, file)
+        with open(os.path.join(folder, "force.csv"), "w", encoding="utf-8") as file:
+            file.write("time [s],force [N]\n" + "".join(f"{0.001 * i:.3f},{max(0, numpy.sin(0.3 * i - 3)) if i < 20 else 0:.4f}\n" for i in range(60)))
         endless = program.scene("paper_sine_aluminium")
         endless.update(duration=2e6, sample_rate=10, output={"channels": [], "psd": None})
         one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))

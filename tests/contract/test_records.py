@@ -98,12 +98,12 @@ def test_every_layout_comes_back_in_si():
                 twins = [w["detail"] for w in told["warnings"] if "under another name" in w["detail"]]
                 assert suffix == "t" or f"r{i}t" in twins[0], told
         assert "STATION 7" in daemon.get("/v1/records/r0t").json()["header"]
-        told = upload(daemon, "json", samples=[1, -2, 1], unit="cm/s^2", source="made", processing="none",
+        told = upload(daemon, "json", samples=[1, -2, 2, -1], unit="cm/s^2", source="made", processing="none",
                       earthquake="none", station="here", notes="a \"note\"")
         assert told["layout"] == "json" and told["notes"] == 'a "note"' and told["warnings"] == [], told
-        assert samples_of(daemon, "json") == [0.01, -0.02, 0.01]
-        commas = send(daemon, "0,.1\n.01,-.2\n", name="csv", unit="g", headers={"Content-Type": "text/csv"})
-        assert commas["layout"] == "time_acceleration" and commas["count"] == 2, commas
+        assert samples_of(daemon, "json") == [0.01, -0.02, 0.02, -0.01]
+        commas = send(daemon, "0,.1\n.01,-.2\n.02,.1\n", name="csv", unit="g", headers={"Content-Type": "text/csv"})
+        assert commas["layout"] == "time_acceleration" and commas["count"] == 3, commas
 
 
 def test_published_files_are_taken_as_they_are():

@@ -68,7 +68,9 @@ def test_the_file_grows_by_as_little():
         for first, last in ((0, 20), (20, 20 + count)):
             with daemons.Daemon(program.build, data=data) as daemon:
                 for seed in range(first, last):
+                    # By its numbers: pages hold whole results, and what is warned of a material's is beside.
                     scene = summary_only("paper_random_sponge", duration=1, output={"impacts": False})
+                    scene["dampers"][0]["buffer"] = {"restitution": 0.61, "contact_time": 0.025}
                     scene["excitation"]["seed"] = seed
                     program.finished(daemon, scene)
             sizes.append(os.path.getsize(os.path.join(data, "impactd.db")))

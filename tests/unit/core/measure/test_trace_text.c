@@ -69,8 +69,8 @@ static void forces_alone_need_an_interval(void **state) {
 static void what_cannot_be_meant_is_told_with_its_line(void **state) {
     (void)state;
     const double none = (double)NAN;
-    bad("", none, "0 samples");
-    bad("force [N]\n", none, "0 samples");
+    bad("", none, "no line of numbers");
+    bad("force [N]\n", none, "no line of numbers");
     bad("0 1\n", none, "1 samples");
     bad("time [s],force [kN]\n0,1\n1,2\n", none, "kN");
     bad("time [ms],force [N]\n0,1\n1,2\n", none, "line 1");

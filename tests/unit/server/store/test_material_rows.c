@@ -184,11 +184,16 @@ static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) 
     assert_int_equal(head_of(store), 0);
     assert_int_equal(review(store, 5, "deprecated", NULL, ANY_VERSION), STATUS_NOT_FOUND);
     MaterialDeeds deeds;
-    assert_int_equal(store_material_trail(store, "felt", &deeds, NULL), STATUS_OK);
+    assert_int_equal(store_material_trail(store, "felt", 100, 100, &deeds, NULL), STATUS_OK);
     assert_int_equal(deeds.count, 12);
-    assert_string_equal(deeds.at[4].action, "approve");
-    assert_string_equal(deeds.at[4].why, "because");
-    assert_int_equal(deeds.at[4].revision, 2);
+    assert_int_equal(deeds.at[0].version, 12);
+    assert_string_equal(deeds.at[7].action, "approve");
+    assert_string_equal(deeds.at[7].why, "because");
+    assert_int_equal(deeds.at[7].revision, 2);
+    material_deeds_clear(&deeds);
+    assert_int_equal(store_material_trail(store, "felt", 3, 1, &deeds, NULL), STATUS_OK);
+    assert_int_equal(deeds.count, 1);
+    assert_int_equal(deeds.at[0].version, 2);
     material_deeds_clear(&deeds);
     store_close(store);
 }
@@ -383,17 +388,20 @@ static void check_migrated(Store *store) {
     assert_true(found.material.restitution == 0.61 && found.material.impactor_mass == 0.11);
     material_revision_clear(&found);
     MaterialDeeds deeds;
-    assert_int_equal(store_material_trail(store, "sponge", &deeds, NULL), STATUS_OK);
-    static const char *const actions[] = {"create", "revise", "approve", "approve", "deprecate"};
+    assert_int_equal(store_material_trail(store, "sponge", 100, 100, &deeds, NULL), STATUS_OK);
+    static const char *const actions[] = {"deprecate", "approve", "approve", "revise", "create"};
     assert_int_equal(deeds.count, COUNT(actions));
     for (size_t i = 0; i < COUNT(actions); i++)
         assert_string_equal(deeds.at[i].action, actions[i]);
     material_deeds_clear(&deeds);
     MaterialUses uses;
     assert_int_equal(store_material_uses(store, "sponge", &uses, NULL), STATUS_OK);
-    assert_int_equal(uses.count, 1);
-    assert_int_equal(uses.at[0].revision, 1);
-    assert_int_equal(uses.at[0].results, 1);
+    assert_int_equal(uses.count, 2);
+    assert_int_equal(uses.at[0].revision, 2);
+    assert_int_equal(uses.at[0].results, 0);
+    assert_string_equal(uses.at[0].status, "approved");
+    assert_int_equal(uses.at[1].revision, 1);
+    assert_int_equal(uses.at[1].results, 1);
     free(uses.at);
     ResultUses results;
     uint64_t total;

@@ -236,6 +236,42 @@ static void nothing_written_beside_the_daemon_changes_a_record(void **state) {
     store_end(store);
 }
 
+static void there_are_only_so_many(void **state) {
+    (void)state;
+    static const char many[] =
+        "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 20000) INSERT "
+        "INTO records (name, layout, unit, interval, count, peak, peak_time, peak_velocity, "
+        "end_velocity, digest, created_unix_ms) SELECT 'n' || i, 'json', 'g', 1, 1, 0, 0, 0, 0, "
+        "printf('%064d', i), 0 FROM n";
+    static const char huge[] =
+        "INSERT INTO records (name, layout, unit, interval, count, peak, peak_time, "
+        "peak_velocity, end_velocity, digest, created_unix_ms) SELECT 'huge', 'json', 'g', 1, "
+        "2147483645 - sum(count), 0, 0, 0, 0, printf('%064d', 0), 0 FROM records";
+    char path[SCRATCH_SIZE + 16];
+    Store *store = store_make();
+    Database *database;
+    RecordUses uses;
+    bool is_there;
+    snprintf(path, sizeof path, "%s/impactd.db", folder);
+    assert_int_equal(database_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+    assert_int_equal(database_execute(database, many, &problem), STATUS_OK);
+    assert_int_equal(add(store, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "20000 records"));
+    for (int i = 1; i <= 3; i++) {
+        char name[8];
+        snprintf(name, sizeof name, "n%d", i);
+        assert_int_equal(store_record_delete(store, name, &uses, &problem), STATUS_OK);
+    }
+    // Now there is room for two, and for three samples.
+    assert_int_equal(database_execute(database, huge, &problem), STATUS_OK);
+    add_new(store, "three", 1);
+    assert_int_equal(store_record_delete(store, "n4", &uses, &problem), STATUS_OK);
+    assert_int_equal(add(store, "three_more", 2, NULL, &is_there), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "2147483648"));
+    database_close(database);
+    store_end(store);
+}
+
 typedef struct Racer {
     Store *store;
     pthread_t thread;
@@ -338,6 +374,7 @@ int main(void) {
         cmocka_unit_test(a_list_goes_on_behind_a_name_and_searches_words),
         cmocka_unit_test(a_record_in_use_is_not_deleted),
         cmocka_unit_test(nothing_written_beside_the_daemon_changes_a_record),
+        cmocka_unit_test(there_are_only_so_many),
         cmocka_unit_test(of_two_same_uploads_at_once_one_is_kept),
         cmocka_unit_test(names_are_fit_for_paths_and_files),
         cmocka_unit_test(the_memory_forgets_what_nobody_holds_beyond_its_budget),
