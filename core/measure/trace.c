@@ -330,6 +330,10 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         reading->noise = found.noise;
         reading->threshold = found.threshold;
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
+            if (!watch_advance(way->watch, (double)i / (double)found.count)) {
+                status = STATUS_CANCELLED;
+                break;
+            }
             reading->contacts.count++;
             status = read_contact(interval, way, &found, force->count, i, window,
                                   &reading->contacts.at[i]);
