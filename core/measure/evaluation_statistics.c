@@ -8,21 +8,16 @@
 // Outliers are told by the distance from the median over the median of all such distances, which a
 // few wild readings do not move, in units that are standard deviations of normal readings (Iglewicz
 // and Hoaglin 1993). Their common cut of 3.5 would mark every fifth sample of three to ten good
-// readings, hence the table.
-//
-// The trend is a straight line by least squares, with the same weights. Where it is shown, outliers
-// are told from the line.
+// readings, hence the table. Where a trend over speed is shown they are told from its line.
 #include "core/measure/evaluation_statistics.h"
 
 #include <stdlib.h>
 
 #include "core/math/student.h"
+#include "core/measure/evaluation_trend.h"
 #include "core/measure/sentence.h"
 
-static const double significance = 0.05;
-static const double speeds_alike = 0.1;  // of their mean: a span that shows no trend
 static const double rounding = 1e-12;    // of a mean: no spread at all
-static const double resolved = 1e-6;     // of a value: less is no outlier and no trend
 static const double implausible = 0.001; // the chance of so little spread
 enum { WEIGHTED_LEAST = 4, HALVINGS = 100 };
 
@@ -183,119 +178,13 @@ static bool make_interval(const Reading *readings, size_t count, Quantity *quant
     return is_said;
 }
 
-// Slope and intercept of those readings that have a speed.
-typedef struct Line {
-    size_t count;
-    double speed, value; // means
-    double squares;      // of speeds about their mean
-    double slope, left;  // what remains of the squares of the values
-    double least, most;
-} Line;
-
-static Line fit_line(const Reading *readings, size_t count) {
-    Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
-    double weights = 0, products = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        line.count++;
-        weights += readings[i].weight;
-        line.speed += readings[i].weight * readings[i].speed;
-        line.value += readings[i].weight * readings[i].value;
-        line.least = fmin(line.least, readings[i].speed);
-        line.most = fmax(line.most, readings[i].speed);
-    }
-    line.speed /= weights;
-    line.value /= weights;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off = readings[i].speed - line.speed;
-        line.squares += readings[i].weight * off * off;
-        products += readings[i].weight * off * (readings[i].value - line.value);
-    }
-    line.slope = line.squares > 0 ? products / line.squares : 0;
-    for (size_t i = 0; i < count; i++) {
-        if (isnan(readings[i].speed))
-            continue;
-        const double off =
-            readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
-        line.left += readings[i].weight * off * off;
-    }
-    // In units of an average weight.
-    line.left *= (double)line.count / weights;
-    line.squares *= (double)line.count / weights;
-    return line;
-}
-
-static bool say_trend(const char *name, const char *unit, double mean, Trend *trend) {
-    const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
-    if (trend->verdict == TREND_NOT_CONSTANT)
-        return sentence(&trend->detail,
-                        "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
-                        "constant over speed, and a table over speed says more than a mean",
-                        name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
-                        fabs(trend->change) * percent, trend->least_speed, trend->most_speed,
-                        trend->p);
-    const bool is_constant = trend->verdict == TREND_CONSTANT;
-    return sentence(&trend->detail,
-                    "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
-                    "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
-                    "been seen",
-                    name, trend->least_speed, trend->most_speed, trend->slope,
-                    trend->standard_error, unit, trend->p,
-                    is_constant ? " and may be taken as constant there;"
-                                : ", but the readings are too few or too scattered to tell:",
-                    trend->missed_change, unit, missed);
-}
-
-static bool make_trend(const Reading *readings, size_t count, const char *name, const char *unit,
-                       Quantity *quantity) {
-    const Line line = fit_line(readings, count);
-    Trend *trend = &quantity->trend;
-    trend->count = line.count;
-    if (line.count > 0) {
-        trend->least_speed = line.least;
-        trend->most_speed = line.most;
-    }
-    if (line.count < 3)
-        return sentence(&trend->detail,
-                        "whether %s is constant over speed cannot be told: %zu reading%s with a "
-                        "speed, at least three are needed",
-                        name, line.count, line.count == 1 ? "" : "s");
-    const double span = line.most - line.least;
-    if (!(span > speeds_alike * line.speed))
-        return sentence(&trend->detail,
-                        "whether %s is constant over speed cannot be told: all readings were made "
-                        "at about %.3g m/s",
-                        name, line.speed);
-    const double least = resolved * fabs(quantity->mean);
-    const size_t freedom = line.count - 2;
-    const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
-    trend->mean_speed = line.speed;
-    trend->mean_value = line.value;
-    trend->slope = line.slope;
-    trend->standard_error = sqrt(fmax(line.left / (double)freedom, least * least) / line.squares);
-    trend->low = line.slope - t * trend->standard_error;
-    trend->high = line.slope + t * trend->standard_error;
-    trend->t = line.slope / trend->standard_error;
-    trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
-    trend->change = line.slope * span;
-    trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
-    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
-                     : trend->missed_change <= TREND_MATTERS * fabs(quantity->mean)
-                         ? TREND_CONSTANT
-                         : TREND_UNDECIDED;
-    return say_trend(name, unit, quantity->mean, trend);
-}
-
 // Distances from the median, or where a trend is shown from its line.
 static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
     double *values = calloc(2 * count, sizeof *values);
     if (values == NULL)
         return false;
     const bool has_line = quantity->trend.verdict == TREND_NOT_CONSTANT;
-    const Line line = fit_line(readings, count);
+    const Line line = line_fit(readings, count);
     for (size_t i = 0; i < count; i++) {
         values[i] = readings[i].value;
         if (has_line && !isnan(readings[i].speed))
@@ -314,7 +203,7 @@ static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
     const double spread = median > rounding * fabs(middle) ? 1.482602 * median : 1.253314 * mean;
     for (size_t i = 0; i < count; i++) {
         const double own = readings[i].uncertainty > 0 ? readings[i].uncertainty : 0;
-        const double scale = fmax(fmax(spread, own), resolved * fabs(middle));
+        const double scale = fmax(fmax(spread, own), EVALUATION_RESOLVED * fabs(middle));
         readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
         readings[i].is_outlier = fabs(readings[i].score) > outlier_cut(count);
         quantity->outliers += readings[i].is_outlier ? 1 : 0;
@@ -396,7 +285,7 @@ Status quantity_make(Reading *readings, size_t count, const char *name, const ch
         quantity->mean = mean_of(readings, count, true);
         is_made = is_made && make_interval(readings, count, quantity);
     }
-    is_made = is_made && make_trend(readings, count, name, unit, quantity);
+    is_made = is_made && trend_make(readings, count, name, unit, quantity);
     if (is_made && count > 2)
         is_made = find_outliers(readings, count, quantity);
     return is_made ? STATUS_OK
