@@ -141,17 +141,6 @@ Status store_material_heads(Store *store, const char *after, size_t most,
                problem);
 }
 
-Status store_material_revisions(Store *store, const char *slug, MaterialRevisions *revisions,
-                                Problem *problem) {
-    static const char own_sql[] =
-        "SELECT * FROM material_states WHERE slug = :slug ORDER BY revision";
-    static const char all_sql[] = "SELECT * FROM material_states ORDER BY slug, revision";
-    const Key key = key_of(slug, 0);
-    TRY(all(store, slug != NULL ? own_sql : all_sql, slug != NULL ? &key : NULL,
-            material_revision_columns, sizeof *revisions->at, revisions, problem));
-    return slug != NULL && revisions->count == 0 ? refuse_slug(slug, problem) : STATUS_OK;
-}
-
 Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
                            MaterialRevisions *revisions, Problem *problem) {
     static const char sql[] = "SELECT * FROM material_states WHERE slug = :slug AND revision < "
@@ -176,39 +165,13 @@ void material_revisions_clear(MaterialRevisions *materials) {
     *materials = (MaterialRevisions){NULL, 0};
 }
 
-Status store_material_reviews(Store *store, const char *slug, MaterialReviews *reviews,
-                              Problem *problem) {
-    static const char own_sql[] = "SELECT m.slug, v.* FROM material_reviews v JOIN materials m ON "
-                                  "m.number = v.material WHERE m.slug = :slug ORDER BY v.number";
-    static const char all_sql[] =
-        "SELECT m.slug, v.* FROM material_reviews v JOIN materials m ON m.number = v.material "
-        "ORDER BY m.slug, v.revision, v.number";
-    const Key key = key_of(slug, 0);
-    return all(store, slug != NULL ? own_sql : all_sql, slug != NULL ? &key : NULL,
-               material_review_columns, sizeof *reviews->at, reviews, problem);
-}
-
 void material_reviews_clear(MaterialReviews *reviews) {
     clear_all(material_review_columns, sizeof *reviews->at, reviews);
 }
 
-static const char measurements_sql[] = "SELECT m.slug, t.* FROM material_measurements t JOIN "
-                                       "materials m ON m.number = t.material ORDER BY m.slug, "
-                                       "t.measurement";
-static const char own_measurements_sql[] =
-    "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
-    "WHERE m.slug = :slug ORDER BY t.measurement";
 static const char measurement_sql[] =
     "SELECT m.slug, t.* FROM material_measurements t JOIN materials m ON m.number = t.material "
     "WHERE m.slug = :slug AND t.measurement = :number";
-
-Status store_material_measurements(Store *store, const char *slug,
-                                   MaterialMeasurements *measurements, Problem *problem) {
-    const Key key = key_of(slug, 0);
-    return all(store, slug != NULL ? own_measurements_sql : measurements_sql,
-               slug != NULL ? &key : NULL, material_measurement_columns, sizeof *measurements->at,
-               measurements, problem);
-}
 
 Status store_material_measurement(Store *store, const char *slug, uint64_t number,
                                   MaterialMeasurement *measurement, Problem *problem) {
@@ -226,10 +189,6 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
 
 void material_measurement_clear(MaterialMeasurement *measurement) {
     row_clear(material_measurement_columns, measurement, sizeof *measurement);
-}
-
-void material_measurements_clear(MaterialMeasurements *measurements) {
-    clear_all(material_measurement_columns, sizeof *measurements->at, measurements);
 }
 
 Status store_material_trail(Store *store, const char *slug, uint64_t before, size_t most,

@@ -50,10 +50,6 @@ void material_slugs_clear(Texts *slugs);
 // `most` of them, those behind the slug `after` ("": from the first).
 Status store_material_heads(Store *store, const char *after, size_t most,
                             MaterialRevisions *materials, Problem *problem);
-// All revisions of one material, or of all (slug NULL), by slug and number. STATUS_NOT_FOUND where
-// there is no such material.
-Status store_material_revisions(Store *store, const char *slug, MaterialRevisions *revisions,
-                                Problem *problem);
 // Newest first, at most `most` of one material's, those before `before`.
 Status store_material_page(Store *store, const char *slug, uint64_t before, size_t most,
                            MaterialRevisions *revisions, Problem *problem);
@@ -70,9 +66,6 @@ typedef struct MaterialReviews {
     MaterialReview *at;
     size_t count;
 } MaterialReviews;
-// In the order in which they were given, by slug (NULL: of all materials, by slug and revision).
-Status store_material_reviews(Store *store, const char *slug, MaterialReviews *reviews,
-                              Problem *problem);
 void material_reviews_clear(MaterialReviews *reviews);
 
 typedef struct MaterialMeasurement {
@@ -82,18 +75,10 @@ typedef struct MaterialMeasurement {
     int64_t created_unix_ms;
     char *document; // the drop test, JSON
 } MaterialMeasurement;
-typedef struct MaterialMeasurements {
-    MaterialMeasurement *at;
-    size_t count;
-} MaterialMeasurements;
-// By number, with their documents; slug NULL: of all materials, by slug and number.
-Status store_material_measurements(Store *store, const char *slug,
-                                   MaterialMeasurements *measurements, Problem *problem);
 // STATUS_NOT_FOUND. `measurement` may be uninitialised.
 Status store_material_measurement(Store *store, const char *slug, uint64_t number,
                                   MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
-void material_measurements_clear(MaterialMeasurements *measurements);
 
 typedef struct MaterialDeed {
     uint64_t version;               // of the material after it; what is added gets the next

@@ -1,11 +1,9 @@
-// Materials in the database: what is added comes back, who comes second is told, nobody changes
-// what was said, and databases of before go on.
+// Materials in the database: what is added comes back, nobody changes what was said, and databases
+// of before go on.
 #include "server/store/material_rows.h"
 
-#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
-#include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +15,7 @@
 #include "server/base/embedded.h"
 #include "server/store/database.h"
 #include "server/store/row.h"
+#include "tests/support/felt.h"
 #include "tests/support/scratch.h"
 
 static char folder[SCRATCH_SIZE];
@@ -33,54 +32,10 @@ static int remove_folder(void **state) {
     return 0;
 }
 
-static Store *open_store(const char *directory) {
-    Store *store;
-    static Problem problem;
-    problem_clear(&problem);
-    if (store_open(directory, &store, &problem) != STATUS_OK)
-        fail_msg("%s", problem.detail);
-    return store;
-}
-
-static MaterialRevision felt(double restitution) {
-    static char lists[] = "{\"tags\": [\"lab\"]}", name[] = "Felt", source[] = "us",
-                slug[] = "felt", comment[] = "why";
-    MaterialRevision revision;
-    memset(&revision, 0, sizeof revision);
-    fields_clear(material_fields, &revision.material); // nothing is known
-    revision.slug = slug;
-    revision.comment = comment;
-    revision.lists = lists;
-    revision.created_unix_ms = 5000;
-    revision.material.name = name;
-    revision.material.source = source;
-    revision.material.restitution = restitution;
-    return revision;
-}
-
-static Status review(Store *store, uint64_t revision, const char *status, char *reviewer,
-                     uint64_t version) {
-    const MaterialReview asked = {.slug = "felt",
-                                  .revision = revision,
-                                  .status = (char *)status,
-                                  .reason = "because",
-                                  .reviewer = reviewer,
-                                  .created_unix_ms = 6000};
-    return store_material_review(store, &asked, version, NULL);
-}
-
-static uint64_t head_of(Store *store) {
-    MaterialRevision found;
-    const Status status = store_material(store, "felt", 0, &found, NULL);
-    const uint64_t revision = status == STATUS_OK ? found.revision : 0;
-    material_revision_clear(&found);
-    return revision;
-}
-
 static void a_revision_comes_back_as_it_went(void **state) {
     (void)state;
-    Store *store = open_store(folder);
-    MaterialRevision whole = felt(0.5), found;
+    Store *store = felt_store(folder);
+    MaterialRevision whole = felt_saying(0.5), found;
     Material *said = &whole.material;
     said->kind = "foam";
     said->hardness = "Shore A 40";
@@ -102,13 +57,13 @@ static void a_revision_comes_back_as_it_went(void **state) {
     whole.author = "ann";
     assert_int_equal(store_material_add(store, &whole, NULL), STATUS_OK);
     assert_int_equal(store_material_add(store, &whole, NULL), STATUS_CONFLICT);
-    MaterialRevision bare = felt(0.4);
+    MaterialRevision bare = felt_saying(0.4);
     bare.lists = NULL;
     assert_int_equal(store_material_revise(store, &bare, 1, NULL), STATUS_OK);
     assert_int_equal(bare.revision, 2);
     store_close(store);
 
-    store = open_store(folder);
+    store = felt_store(folder);
     assert_int_equal(store_material(store, "felt", 1, &found, NULL), STATUS_OK);
     assert_string_equal(found.material.notes, said->notes);
     assert_string_equal(found.material.hardness, said->hardness);
@@ -132,135 +87,6 @@ static void a_revision_comes_back_as_it_went(void **state) {
     assert_true(isnan(found.material.contact_time) && isnan(found.material.base_mass));
     assert_int_equal(found.material.base, CHOICE_ABSENT);
     material_revision_clear(&found);
-    store_close(store);
-}
-
-static void who_has_not_seen_the_present_version_is_told(void **state) {
-    (void)state;
-    Store *store = open_store(NULL);
-    MaterialRevision one = felt(0.5);
-    MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{}"};
-    static Problem problem;
-    problem_clear(&problem);
-    assert_int_equal(store_material_revise(store, &one, ANY_VERSION, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    assert_int_equal(store_material_revise(store, &one, 1, NULL), STATUS_OK);
-    assert_int_equal(store_material_revise(store, &one, 1, &problem), STATUS_STALE);
-    assert_non_null(strstr(problem.detail, "version 2"));
-    assert_int_equal(store_material_measure(store, &drop, 1, NULL), STATUS_STALE);
-    assert_int_equal(review(store, 1, "approved", NULL, 3), STATUS_STALE);
-    assert_int_equal(store_material_measure(store, &drop, 2, NULL), STATUS_OK);
-    assert_int_equal(store_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
-    assert_int_equal(drop.measurement, 2);
-    MaterialState now;
-    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
-    assert_int_equal(now.latest, 2);
-    assert_int_equal(now.version, 4);
-    assert_int_equal(now.measurements, 2);
-    assert_int_equal(store_material_state(store, "wood", &now, NULL), STATUS_NOT_FOUND);
-    store_close(store);
-}
-
-static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) {
-    (void)state;
-    Store *store = open_store(NULL);
-    MaterialRevision one = felt(0.5);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    for (int i = 0; i < 3; i++)
-        assert_int_equal(store_material_revise(store, &one, ANY_VERSION, NULL), STATUS_OK);
-    const uint64_t generation = store_generation(store);
-    assert_int_equal(head_of(store), 4);
-    assert_int_equal(review(store, 2, "approved", NULL, ANY_VERSION), STATUS_OK);
-    assert_true(store_generation(store) > generation);
-    assert_int_equal(head_of(store), 2);
-    assert_int_equal(review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
-    assert_int_equal(head_of(store), 2);
-    assert_int_equal(review(store, 2, "approved", NULL, ANY_VERSION), STATUS_CONFLICT);
-    assert_int_equal(review(store, 2, "deprecated", NULL, ANY_VERSION), STATUS_OK);
-    assert_int_equal(head_of(store), 1);
-    assert_int_equal(review(store, 2, "approved", NULL, ANY_VERSION), STATUS_OK);
-    assert_int_equal(head_of(store), 2);
-    for (uint64_t i = 1; i <= 4; i++)
-        assert_int_equal(review(store, i, "deprecated", NULL, ANY_VERSION), STATUS_OK);
-    assert_int_equal(head_of(store), 0);
-    assert_int_equal(review(store, 5, "deprecated", NULL, ANY_VERSION), STATUS_NOT_FOUND);
-    MaterialDeeds deeds;
-    assert_int_equal(store_material_trail(store, "felt", 100, 100, &deeds, NULL), STATUS_OK);
-    assert_int_equal(deeds.count, 12);
-    assert_int_equal(deeds.at[0].version, 12);
-    assert_string_equal(deeds.at[7].action, "approve");
-    assert_string_equal(deeds.at[7].why, "because");
-    assert_int_equal(deeds.at[7].revision, 2);
-    material_deeds_clear(&deeds);
-    assert_int_equal(store_material_trail(store, "felt", 3, 1, &deeds, NULL), STATUS_OK);
-    assert_int_equal(deeds.count, 1);
-    assert_int_equal(deeds.at[0].version, 2);
-    material_deeds_clear(&deeds);
-    store_close(store);
-}
-
-static void nobody_approves_their_own(void **state) {
-    (void)state;
-    Store *store = open_store(NULL);
-    MaterialRevision one = felt(0.5);
-    one.author = "ann";
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    assert_int_equal(review(store, 1, "approved", "ann", ANY_VERSION), STATUS_FORBIDDEN);
-    assert_int_equal(review(store, 1, "approved", "ann", 1), STATUS_FORBIDDEN);
-    assert_int_equal(review(store, 1, "approved", "anne", 1), STATUS_OK);
-    assert_int_equal(review(store, 1, "deprecated", "ann", 2), STATUS_OK);
-    assert_int_equal(review(store, 1, "approved", NULL, 3), STATUS_OK);
-    store_close(store);
-}
-
-typedef struct Writer {
-    Store *store;
-    int taken, told, other;
-    atomic_int *of_version; // how many were taken that had seen it
-} Writer;
-
-static void *write_much(void *context) {
-    Writer *own = context;
-    for (int i = 0; i < 200; i++) {
-        MaterialRevision one = felt(0.5);
-        MaterialState now;
-        Status status = store_material_state(own->store, "felt", &now, NULL);
-        if (status == STATUS_OK)
-            status = store_material_revise(own->store, &one, now.version, NULL);
-        own->taken += status == STATUS_OK;
-        if (status == STATUS_OK)
-            atomic_fetch_add(&own->of_version[now.version], 1);
-        own->told += status == STATUS_STALE;
-        own->other += status != STATUS_OK && status != STATUS_STALE;
-    }
-    return NULL;
-}
-
-static void of_eight_writers_each_is_taken_or_told(void **state) {
-    (void)state;
-    Store *store = open_store(folder);
-    MaterialRevision one = felt(0.5);
-    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
-    static atomic_int of_version[8 * 200 + 2];
-    pthread_t threads[8];
-    Writer writers[8];
-    for (int i = 0; i < 8; i++) {
-        writers[i] = (Writer){store, 0, 0, 0, of_version};
-        assert_int_equal(pthread_create(&threads[i], NULL, write_much, &writers[i]), 0);
-    }
-    uint64_t taken = 0;
-    for (int i = 0; i < 8; i++) {
-        pthread_join(threads[i], NULL);
-        assert_int_equal(writers[i].other, 0);
-        assert_int_equal(writers[i].taken + writers[i].told, 200);
-        taken += (uint64_t)writers[i].taken;
-    }
-    MaterialState now;
-    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
-    assert_int_equal(now.latest, taken + 1);
-    assert_int_equal(now.version, taken + 1);
-    for (uint64_t version = 1; version <= taken; version++)
-        assert_int_equal(atomic_load(&of_version[version]), 1);
     store_close(store);
 }
 
@@ -343,12 +169,12 @@ static void no_sql_changes_what_was_said(void **state) {
         "UPDATE material_states SET restitution = 0.9",
         "DELETE FROM material_states",
         "INSERT INTO material_states (slug) VALUES ('felt')"};
-    Store *store = open_store(folder);
-    MaterialRevision one = felt(0.5);
+    Store *store = felt_store(folder);
+    MaterialRevision one = felt_saying(0.5);
     MaterialMeasurement drop = {.slug = "felt", .comment = "c", .document = "{\"a\": 1}"};
     assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
     assert_int_equal(store_material_measure(store, &drop, ANY_VERSION, NULL), STATUS_OK);
-    assert_int_equal(review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
+    assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_OK);
     store_close(store);
 
     Database *database = open_database();
@@ -417,7 +243,7 @@ static void check_migrated(Store *store) {
     assert_int_equal(total, 1);
     assert_string_equal(results.at[0].id, "r-1");
     free(results.at);
-    MaterialRevision next = felt(0.5);
+    MaterialRevision next = felt_saying(0.5);
     next.slug = "sponge";
     assert_int_equal(store_material_revise(store, &next, 5, NULL), STATUS_OK);
     assert_int_equal(next.revision, 3);
@@ -446,10 +272,10 @@ static void a_database_of_each_step_before_goes_on(void **state) {
         assert_int_equal(database_migrate(database, files, NULL), STATUS_OK);
         assert_int_equal(database_execute(database, data_of_before, NULL), STATUS_OK);
         database_close(database);
-        Store *store = open_store(folder);
+        Store *store = felt_store(folder);
         check_migrated(store);
         store_close(store);
-        store_close(open_store(folder));
+        store_close(felt_store(folder));
         scratch_remove(folder);
     }
 }
@@ -459,10 +285,6 @@ static void a_database_of_each_step_before_goes_on(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         IN_FOLDER(a_revision_comes_back_as_it_went),
-        cmocka_unit_test(who_has_not_seen_the_present_version_is_told),
-        cmocka_unit_test(the_head_is_the_newest_approved_then_the_newest_draft),
-        cmocka_unit_test(nobody_approves_their_own),
-        IN_FOLDER(of_eight_writers_each_is_taken_or_told),
         IN_FOLDER(no_sql_changes_what_was_said),
         cmocka_unit_test(a_database_of_each_step_before_goes_on),
     };

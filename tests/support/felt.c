@@ -1,0 +1,44 @@
+#include "tests/support/felt.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+Store *felt_store(const char *directory) {
+    Store *store;
+    static Problem problem;
+    problem_clear(&problem);
+    if (store_open(directory, &store, &problem) != STATUS_OK)
+        fail_msg("%s", problem.detail);
+    return store;
+}
+
+MaterialRevision felt_saying(double restitution) {
+    static char lists[] = "{\"tags\": [\"lab\"]}", name[] = "Felt", source[] = "us",
+                slug[] = "felt", comment[] = "why";
+    MaterialRevision revision;
+    memset(&revision, 0, sizeof revision);
+    fields_clear(material_fields, &revision.material); // nothing is known
+    revision.slug = slug;
+    revision.comment = comment;
+    revision.lists = lists;
+    revision.created_unix_ms = 5000;
+    revision.material.name = name;
+    revision.material.source = source;
+    revision.material.restitution = restitution;
+    return revision;
+}
+
+Status felt_review(Store *store, uint64_t revision, const char *status, const char *reviewer,
+                   uint64_t version) {
+    const MaterialReview asked = {.slug = "felt",
+                                  .revision = revision,
+                                  .status = (char *)status,
+                                  .reason = "because",
+                                  .reviewer = (char *)reviewer,
+                                  .created_unix_ms = 6000};
+    return store_material_review(store, &asked, version, NULL);
+}

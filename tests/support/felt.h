@@ -1,0 +1,17 @@
+// A material of a lab's for tests of the store, and how it is judged. Used by tests of store/.
+#ifndef TESTS_SUPPORT_FELT_H
+#define TESTS_SUPPORT_FELT_H
+
+#include "server/store/material_rows.h"
+
+// A store in `directory` (NULL: in memory); fails the test if it cannot be opened.
+Store *felt_store(const char *directory);
+
+// What one says of "felt" with that restitution; texts are borrowed.
+MaterialRevision felt_saying(double restitution);
+
+// Gives a revision of it that status; `reviewer` may be NULL.
+Status felt_review(Store *store, uint64_t revision, const char *status, const char *reviewer,
+                   uint64_t version);
+
+#endif
