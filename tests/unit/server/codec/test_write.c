@@ -129,8 +129,15 @@ static void a_full_buffer_only_fails(void **state) {
 static void problems_are_problem_documents(void **state) {
     (void)state;
     Problem problem = {0};
-    const Fault mass = {"/structure/mass", "must be above 0 kg, is -1", "-1", "kg", ""};
-    const Fault key = {"/structur", "unknown key", "", "", "structure"};
+    const Fault mass = {.pointer = "/structure/mass",
+                        .detail = "must be above 0 kg, is -1",
+                        .value = "-1",
+                        .unit = "kg"};
+    const Fault key = {.pointer = "/structur",
+                       .detail = "unknown key",
+                       .did_you_mean = "structure",
+                       .row = 3,
+                       .column = "name"};
     problem_put(&problem, STATUS_INVALID, &mass);
     Bytes text = {0};
     write_problem(&text, &problem, 422, NULL);
@@ -149,7 +156,7 @@ static void problems_are_problem_documents(void **state) {
                  " \"errors\": [{\"pointer\": \"/structure/mass\", \"value\": -1,"
                  " \"detail\": \"must be above 0 kg, is -1\", \"unit\": \"kg\"},"
                  " {\"pointer\": \"/structur\", \"value\": null, \"detail\": \"unknown key\","
-                 " \"did_you_mean\": \"structure\"}]}");
+                 " \"did_you_mean\": \"structure\", \"row\": 3, \"column\": \"name\"}]}");
     bytes_clear(&text);
     problem_clear(&problem);
     problem_set(&problem, STATUS_NOT_FOUND, "no job \"%s\"", "j-1");

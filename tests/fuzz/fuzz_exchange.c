@@ -1,0 +1,202 @@
+// Files of materials, tables and documents, mutated: whatever comes in, reading ends with what can
+// be imported or with faults that have a place, in a table a row and a column; what is judged and
+// exported again reads as the same. Meant for the instrumented build:
+// build-debug/tests/fuzz_exchange SECONDS [SEED]. What breaks the rule is printed.
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "server/encode/exchange_text.h"
+#include "server/materials/exchange_csv.h"
+#include "server/materials/exchange_json.h"
+
+enum { TEXT_MOST = 4096, MUTATIONS_MOST = 6, ROUNDS_TIMED = 64, ROUND_EACH = 200 };
+
+static const char *const seeds[] = {
+    "slug,name,restitution,contact_time [s],source\nfelt,Felt,0.5,0.02,own\ncork,\"Cork, 3 "
+    "mm\",0.4,3e-3,=1+1\n",
+    "row,slug,number,name,table,source,measurements,author,created,reviews,test\r\n"
+    "revision,felt,1,Felt,\"[{\"\"approach_speed\"\": 0.1, \"\"restitution\"\": 0.5}, "
+    "{\"\"approach_speed\"\": 0.2, \"\"restitution\"\": 0.4}]\",s,[1],,2026-01-01T00:00:00.000Z,"
+    "\"[{\"\"status\"\": \"\"approved\"\", \"\"reason\"\": \"\"r\"\"}]\",\r\n"
+    "measurement,felt,1,,,,,anna,,,\"{\"\"drops\"\": [{\"\"drop_height\"\": 1, "
+    "\"\"rebound_height\"\": 0.2}]}\"\r\n",
+    "\xEF\xBB\xBFslug,number,name,restitution,source,tags,notes,reverts\nsponge,1,Sponge,0.61,"
+    "x,\"[\"\"a\"\"]\",\"two\nlines\",\nfelt,1,F,0.1,s,,\"\",\nfelt,2,F,0.1,s,,,1\n",
+    "{\"format\": \"impactd-materials\", \"version\": 1, \"materials\": [{\"slug\": \"felt\", "
+    "\"revisions\": [{\"revision\": 1, \"name\": \"Felt\", \"restitution\": 0.5, \"source\": "
+    "\"s\", \"author\": null, \"reviews\": [{\"status\": \"approved\", \"reason\": \"r\"}]}], "
+    "\"measurements\": [{\"measurement\": 1, \"test\": {\"drops\": [{\"contact_time\": "
+    "0.01}]}}]}]}",
+};
+
+static const char *const pieces[] = {
+    ",",       "\"",         "\"\"",        "\n",
+    "\r\n",    "\r",         ";",           "[",
+    "]",       "{",          "}",           ":",
+    "null",    "1e999",      "-1",          "0",
+    "NaN",     "\xff",       "\xEF",        "slug",
+    "number",  "revision",   "measurement", "test",
+    "row",     "[s]",        "[ms]",        "restitution",
+    "felt",    "sponge",     "2",           "99999999999999999999",
+    "\\u0061", "2026",       "approved",    "author",
+    "[1,2]",   "{\"a\": 1}", "=1+1",        "\xEF\xBB\xBF",
+};
+
+static uint64_t state;
+
+// Vigna's splitmix64.
+static size_t draw(size_t count) {
+    uint64_t z = state += 0x9E3779B97F4A7C15u;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return count == 0 ? 0 : (size_t)((z ^ (z >> 31)) % count);
+}
+
+static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
+    if (size + length > TEXT_MOST)
+        return size;
+    memmove(text + at + length, text + at, size - at);
+    memcpy(text + at, piece, length);
+    return size + length;
+}
+
+static size_t mutate(char *text, size_t size) {
+    char copy[64];
+    const size_t at = draw(size + 1);
+    size_t length = draw(sizeof copy);
+    length = length < size - at ? length : size - at;
+    switch (draw(5)) {
+    case 0: // another byte
+        if (at < size)
+            text[at] = (char)draw(256);
+        return size;
+    case 1: // something left out
+        memmove(text + at, text + at + length, size - at - length);
+        return size - length;
+    case 2: // something once more, elsewhere
+        memcpy(copy, text + at, length);
+        return put(text, size, draw(size + 1), copy, length);
+    default: { // something known
+        const char *piece = pieces[draw(COUNT(pieces))];
+        return put(text, size, at, piece, strlen(piece));
+    }
+    }
+}
+
+static const char *judge_faults(Status status, bool is_table, const Problem *problem) {
+    if (status != STATUS_INVALID && status != STATUS_UNREADABLE)
+        return "failed for no fault of the text's";
+    if (problem->count == 0)
+        return "failed without a fault";
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
+        const Fault *fault = &problem->faults[i];
+        if (fault->detail[0] == '\0')
+            return "a fault says nothing";
+        if (is_table && fault->row == 0 && fault->pointer[0] != '\0')
+            return "a fault of a table has no row";
+    }
+    return NULL;
+}
+
+// What was brought in comes out of another database as it went in.
+static const char *judge_round(Store *store, Problem *problem) {
+    Bytes texts[2] = {{.most = 0}, {.most = 0}};
+    Exchange exchange = {.revision_room = 0};
+    ImportTally tally = {0};
+    Store *other = NULL, *stores[2] = {store, NULL};
+    const char *wrong = NULL;
+    if (store_open(NULL, &other, problem) != STATUS_OK)
+        return "no second database";
+    stores[1] = other;
+    for (int i = 0; i < 2 && wrong == NULL; i++) {
+        ExchangeText text;
+        bool is_last = false;
+        Status status = exchange_text_open(stores[i], false, &text, problem);
+        while (status == STATUS_OK && !is_last)
+            status = exchange_text_next(&text, &texts[i], &is_last, problem);
+        if (status != STATUS_OK)
+            wrong = "cannot be exported";
+        else if (i == 0 && (exchange_read_json(texts[0].at, texts[0].count, &exchange, problem) !=
+                                STATUS_OK ||
+                            exchange_import(&exchange, other, NULL, true, false, &tally, problem) !=
+                                STATUS_OK))
+            wrong = "its export cannot be imported";
+    }
+    if (wrong == NULL && strcmp(texts[0].at, texts[1].at) != 0)
+        wrong = "comes back as something else";
+    exchange_clear(&exchange);
+    bytes_clear(&texts[0]);
+    bytes_clear(&texts[1]);
+    store_close(other);
+    return wrong;
+}
+
+// Reads a text and imports it.
+static Status bring(Store *store, const char *text, size_t size, bool is_table, bool is_dry,
+                    Problem *problem) {
+    Exchange exchange = {.revision_room = 0};
+    ImportTally tally;
+    Status status =
+        (is_table ? exchange_read_csv : exchange_read_json)(text, size, &exchange, problem);
+    if (status == STATUS_OK || status == STATUS_INVALID)
+        status = exchange_import(&exchange, store, NULL, true, is_dry, &tally, problem);
+    exchange_clear(&exchange);
+    if (is_table)
+        exchange_place_faults(problem);
+    return status;
+}
+
+static const char *judge_import(const char *text, size_t size, bool is_table, Problem *problem) {
+    Store *store = NULL;
+    if (store_open(NULL, &store, problem) != STATUS_OK)
+        return "no database";
+    const char *wrong = bring(store, text, size, is_table, false, problem) == STATUS_OK
+                            ? judge_round(store, problem)
+                            : "judged as good, and refused";
+    store_close(store);
+    return wrong;
+}
+
+int main(int argc, char **argv) {
+    static Problem problem;
+    const double seconds = argc > 1 ? atof(argv[1]) : 10;
+    state = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
+    const time_t start = time(NULL);
+    unsigned long long rounds = 0, passed = 0;
+    Store *store = NULL; // of the paper's five alone
+    if (store_open(NULL, &store, &problem) != STATUS_OK)
+        return 1;
+    while (difftime(time(NULL), start) < seconds)
+        for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
+            char text[TEXT_MOST];
+            const char *seed = seeds[draw(COUNT(seeds))];
+            size_t size = strlen(seed);
+            memcpy(text, seed, size);
+            for (size_t mutations = draw(MUTATIONS_MOST + 1); mutations > 0; mutations--)
+                size = mutate(text, size);
+            // Of its own size, so that a byte read behind it is seen.
+            char *own = malloc(size > 0 ? size : 1);
+            if (own == NULL)
+                return 1;
+            memcpy(own, text, size);
+            const bool is_table = seed[0] != '{';
+            problem = (Problem){.count = 0};
+            const Status status = bring(store, own, size, is_table, true, &problem);
+            const char *wrong = status != STATUS_OK ? judge_faults(status, is_table, &problem)
+                                : passed++ % ROUND_EACH == 0
+                                    ? judge_import(own, size, is_table, &problem)
+                                    : NULL;
+            free(own);
+            if (wrong != NULL) {
+                fprintf(stderr, "%s: %s; the text:\n", wrong, problem.detail);
+                (void)fwrite(text, 1, size, stderr);
+                return 1;
+            }
+        }
+    printf("%llu texts, %llu of them good\n", rounds, passed);
+    store_close(store);
+    return 0;
+}

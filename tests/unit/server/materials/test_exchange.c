@@ -1,0 +1,178 @@
+// Files of materials against a database of the paper's five: what is added, what is the same, what
+// is told.
+#include "server/materials/exchange.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "server/encode/exchange_text.h"
+#include "server/materials/exchange_csv.h"
+#include "server/materials/exchange_json.h"
+
+static Problem problem;
+
+static Status bring(Store *store, const char *text, const char *who, bool may_all,
+                    ImportTally *tally) {
+    Exchange exchange = {.revision_room = 0};
+    problem_clear(&problem);
+    Status status = (text[0] == '{' ? exchange_read_json : exchange_read_csv)(text, strlen(text),
+                                                                              &exchange, &problem);
+    if (status == STATUS_OK || status == STATUS_INVALID)
+        status = exchange_import(&exchange, store, who, may_all, false, tally, &problem);
+    exchange_clear(&exchange);
+    return status;
+}
+
+static Store *open_store(void) {
+    Store *store;
+    assert_int_equal(store_open(NULL, &store, NULL), STATUS_OK);
+    return store;
+}
+
+static char *export_all(Store *store, bool is_table) {
+    Bytes bytes = {.most = 0};
+    ExchangeText text;
+    bool is_last = false;
+    assert_int_equal(exchange_text_open(store, is_table, &text, NULL), STATUS_OK);
+    while (!is_last)
+        assert_int_equal(exchange_text_next(&text, &bytes, &is_last, NULL), STATUS_OK);
+    char *whole = bytes_take(&bytes, NULL);
+    assert_non_null(whole);
+    return whole;
+}
+
+static void faults_are_told_at_their_places_and_nothing_is_written(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *place;
+    } cases[] = {
+        {"slug,name,source,restitution\nx,X,s,1.5", "/2/restitution"},
+        {"slug,name,source,restitution\n\nX,X,s,1", "/3/slug"},
+        {"slug,name,source,restitution\nimport,X,s,1", "/2/slug"},
+        {"slug,name,source,restitution,contact_time [ms]\nx,X,s,1,5", "/1/contact_time"},
+        {"slug,name,source,restitution,restitution\nx,X,s,1,1", "/1/restitution"},
+        {"slug,name,source,restitution\nx,X,s,1\nx,X,s,0", "/3/slug"},
+        {"slug,name,source,restitution\nx,X,s,1,5", "/2/5"},
+        {"slug,name,source,restitution,number\nx,X,s,1,2", "/2/number"},
+        {"slug,name,source,restitution,number\nx,X,s,1,1\nx,X,s,1,1", "/3/number"},
+        {"slug,name,source,restitution,number\nx,X,s,1,1\nx,X,s,1,3", "/3/number"},
+        {"slug,name,source,restitution,reverts\nx,X,s,1,1", "/2/reverts"},
+        {"slug,name,source,restitution,number,reverts\nx,X,s,1,1,\nx,X,s,0,2,1", "/3/reverts"},
+        {"slug,name,source,restitution,measurements\nx,X,s,1,[1]", "/2/measurements/0"},
+        {"slug,row,test\nx,measurement,\"{\"\"drops\"\": [{\"\"contact_time\"\": 1}]}\"",
+         "/2/slug"},
+        {"slug,name,source,restitution,reviews\nx,X,s,1,\"[{\"\"status\"\": \"\"deprecated\"\", "
+         "\"\"reason\"\": \"\"r\"\"}, {\"\"status\"\": \"\"deprecated\"\", \"\"reason\"\": "
+         "\"\"r\"\"}]\"",
+         "/2/reviews/1/status"},
+        {"slug,row,name\nx,measurement,X", "/2/name"},
+        {"{\"format\": \"other\", \"version\": 1, \"materials\": []}", "/format"},
+    };
+    Store *store = open_store();
+    char *before = export_all(store, false);
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        ImportTally tally;
+        const uint64_t generation = store_generation(store);
+        assert_int_equal(bring(store, cases[i].text, NULL, true, &tally), STATUS_INVALID);
+        bool is_told = false;
+        for (size_t k = 0; k < problem.count; k++)
+            is_told = is_told || strcmp(problem.faults[k].pointer, cases[i].place) == 0;
+        if (!is_told)
+            print_error("%s: %s\n", cases[i].text, problem.detail);
+        assert_true(is_told);
+        assert_true(problem.count <= 2);
+        assert_true(store_generation(store) == generation);
+    }
+    char *after = export_all(store, false);
+    assert_string_equal(before, after);
+    free(after);
+    free(before);
+    store_close(store);
+}
+
+static void an_unknown_number_is_the_next_unless_the_newest_says_the_same(void **state) {
+    (void)state;
+    Store *store = open_store();
+    ImportTally tally;
+    const uint64_t generation = store_generation(store);
+    static const char first[] = "slug,name,source,restitution\nx,X,s,0.5\n",
+                      second[] = "slug,name,source,restitution,comment\nx,X,s,0.6,better\n";
+    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(tally.revisions.added, 1);
+    assert_true(store_generation(store) > generation);
+    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(tally.revisions.same, 1);
+    assert_int_equal(bring(store, second, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(bring(store, second, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(tally.revisions.same, 1);
+    // What an older one says is new all the same.
+    assert_int_equal(bring(store, first, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(tally.revisions.added, 1);
+    MaterialRevision newest = {0};
+    assert_int_equal(store_material(store, "x", 3, &newest, NULL), STATUS_OK);
+    assert_true(newest.material.restitution == 0.5);
+    assert_string_equal(newest.comment, "imported");
+    assert_null(newest.author);
+    material_revision_clear(&newest);
+    store_close(store);
+}
+
+static void who_may_not_speak_for_others_is_told_so(void **state) {
+    (void)state;
+    Store *store = open_store();
+    ImportTally tally;
+    static const char by_bert[] = "slug,name,source,restitution,author\nx,X,s,0.5,bert\n",
+                      by_nobody[] = "slug,name,source,restitution,author\nx,X,s,0.5,\n";
+    assert_int_equal(bring(store, by_bert, "anna", false, &tally), STATUS_FORBIDDEN);
+    assert_string_equal(problem.faults[0].pointer, "/2/author");
+    assert_int_equal(bring(store, by_nobody, "anna", false, &tally), STATUS_OK);
+    MaterialRevision found = {0};
+    assert_int_equal(store_material(store, "x", 1, &found, NULL), STATUS_OK);
+    assert_string_equal(found.author, "anna");
+    material_revision_clear(&found);
+    store_close(store);
+}
+
+static void both_kinds_of_exports_are_imports(void **state) {
+    (void)state;
+    Store *store = open_store(), *others[2] = {open_store(), open_store()};
+    ImportTally tally;
+    static const char text[] =
+        "row,slug,name,source,table,notes,test,reviews\r\n"
+        "revision,x,\"a,\"\"b\"\"\",\"s\r\n2\",\"[{\"\"approach_speed\"\": 0.1, "
+        "\"\"restitution\"\": "
+        "0.5}, {\"\"approach_speed\"\": 0.2, \"\"restitution\"\": "
+        "0.4}]\",\"\",,\"[{\"\"status\"\": "
+        "\"\"approved\"\", \"\"reason\"\": \"\"=1+1\"\"}]\"\r\n"
+        "measurement,x,,,,,\"{\"\"drops\"\": [{\"\"contact_time\"\": 0.01}]}\",\r\n";
+    assert_int_equal(bring(store, text, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(tally.measurements.added, 1);
+    assert_int_equal(tally.reviews.added, 1);
+    for (int i = 0; i < 2; i++) {
+        char *whole = export_all(store, i == 1), *document = export_all(store, false);
+        assert_int_equal(bring(others[i], whole, NULL, true, &tally), STATUS_OK);
+        assert_int_equal(tally.revisions.same, 5);
+        char *back = export_all(others[i], false);
+        assert_string_equal(document, back);
+        free(back);
+        free(document);
+        free(whole);
+        store_close(others[i]);
+    }
+    store_close(store);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(faults_are_told_at_their_places_and_nothing_is_written),
+        cmocka_unit_test(an_unknown_number_is_the_next_unless_the_newest_says_the_same),
+        cmocka_unit_test(who_may_not_speak_for_others_is_told_so),
+        cmocka_unit_test(both_kinds_of_exports_are_imports),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
