@@ -237,11 +237,13 @@ static Status warn_of_status(const MaterialRevision *found, const char *name, co
                              Warnings *warnings) {
     if (strcmp(found->status, "draft") == 0)
         return warnings_add(warnings, pointer, "%s is a draft that nobody has approved", name);
-    if (strcmp(found->status, "deprecated") == 0)
-        return warnings_add(warnings, pointer, "%s is deprecated%s%.200s", name,
-                            found->reason != NULL ? ": " : "",
-                            found->reason != NULL ? found->reason : "");
-    return STATUS_OK;
+    if (strcmp(found->status, "deprecated") != 0)
+        return STATUS_OK;
+    char reason[200] = "";
+    if (found->reason != NULL)
+        text_fit(reason, sizeof reason, found->reason);
+    return warnings_add(warnings, pointer, "%s is deprecated%s%s", name,
+                        reason[0] != '\0' ? ": " : "", reason);
 }
 
 static Status fill(Buffer *buffer, MaterialRevision *found, const char *pointer, Warnings *warnings,

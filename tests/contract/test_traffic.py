@@ -28,9 +28,9 @@ for ITEM in DOCUMENT["paths"].values():
 
 # Tests that together see every operation.
 SOURCES = ("test_openapi.py", "test_auth.py", "test_bad_requests.py", "test_cache.py", "test_compare.py", "test_crowds.py",
-           "test_exchange.py", "test_formats.py", "test_full_disk.py", "test_http.py", "test_jobs.py", "test_materials.py",
-           "test_measurements.py", "test_metrics.py", "test_records.py", "test_sensitivity.py", "test_serving.py",
-           "test_sweep.py")
+           "test_exchange.py", "test_formats.py", "test_full_disk.py", "test_http.py", "test_jobs.py", "test_material_use.py",
+           "test_materials.py", "test_measurements.py", "test_metrics.py", "test_records.py", "test_sensitivity.py",
+           "test_serving.py", "test_sweep.py")
 
 # The base path that test_serving.py gives its daemon; paths are taken with and without it.
 BASE = "/impactd"
