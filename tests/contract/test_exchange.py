@@ -49,9 +49,13 @@ def test_round_trips_are_the_same_bytes():
         made = daemon.request("POST", "/v1/materials/sponge/revisions", headers={"If-Match": sponge.headers["etag"]},
                               json={"name": "Sponge", "restitution": 0.6, "source": "again", "comment": "measured anew"})
         assert made.status == 201, made
+        made = daemon.request("POST", "/v1/materials/sponge/measurements", json={
+            "comment": "by hand", "impactor": "ball, \"30 mm\"", "drops": [{"drop_height": 0.05, "rebound_height": 0.018}]})
+        assert made.status == 201, made
         text, table = export(daemon), export(daemon, "csv")
     back = said(json.loads(text))
     assert back["sponge"]["revisions"][1]["comment"] == "measured anew"
+    assert back["sponge"]["measurements"][0]["test"]["impactor"] == 'ball, "30 mm"'
     for one in document["materials"]:
         there = back[one["slug"]]
         assert len(there["revisions"]) == len(one["revisions"])
