@@ -388,6 +388,10 @@ def test_imports_beside_revisions():
         with concurrent.futures.ThreadPoolExecutor(8) as pool:
             revised = list(pool.map(revise, range(100)))
             works = [pool.submit(add if i % 2 else revise, i) for i in range(100, 300)]
+            # An export amid them is of one moment: nothing in it is new, and no number is missing.
+            for kind in ("json", "csv") * 4:
+                whole = bring(daemon, export(daemon, kind), dry=True).json()
+                assert whole["revisions"]["added"] == 0, whole
             told = [work.result() for work in works]
         assert set(revised) <= {201, 412} and set(told) <= {200, 201, 412, 422}, (set(revised), set(told))
         done = sum(code in (200, 201) for code in revised + told)
