@@ -156,6 +156,14 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
                                           .speed = rows[i].approach_speed,
                                           .row = i};
     TRY(quantity_make(readings, count, "contact time", " s", &evaluation->contact_time, problem));
+    // The fit of a single pulse knows its interval better than two deviations tell it.
+    Quantity *of = &evaluation->contact_time;
+    const EvaluationRow *only = count == 1 ? &rows[readings[0].row] : NULL;
+    if (only != NULL && only->contact_time_by == CONTACT_TIME_BY_PULSE &&
+        !isnan(only->least_contact_time) && !isnan(only->most_contact_time)) {
+        of->low = only->least_contact_time;
+        of->high = only->most_contact_time;
+    }
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].contact_time_score = readings[i].score;
         rows[readings[i].row].contact_time_is_outlier = readings[i].is_outlier;
@@ -163,8 +171,31 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
     return STATUS_OK;
 }
 
+size_t evaluation_samples(const Measurement *tests, size_t count) {
+    size_t samples = 0;
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < tests[i].test->traces.count; k++)
+            samples += tests[i].test->traces.at[k].force.count;
+    return samples;
+}
+
+// Fits take time: a million samples some ten seconds.
+static Status check_size(const Measurement *tests, size_t count, Problem *problem) {
+    const size_t samples = evaluation_samples(tests, count);
+    if (samples <= EVALUATION_SAMPLES_MOST)
+        return STATUS_OK;
+    if (count == 1 && tests[0].number == COUNT_ABSENT)
+        return problem_add(problem, STATUS_LIMIT, "/traces",
+                           "must have at most %d samples in all, have %zu: cut them to the "
+                           "contacts, or send them as several measurements",
+                           EVALUATION_SAMPLES_MOST, samples);
+    return problem_set(problem, STATUS_LIMIT,
+                       "more than %d samples in traces, %zu: evaluate fewer measurements at a time",
+                       EVALUATION_SAMPLES_MOST, samples);
+}
+
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       Evaluation *evaluation, Problem *problem) {
+                       const Watch *watch, Evaluation *evaluation, Problem *problem) {
     const double none = (double)NAN;
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
@@ -172,8 +203,9 @@ Status evaluation_make(const Measurement *tests, size_t count, Separation separa
                                .most_speed = none,
                                .least_temperature = none,
                                .most_temperature = none};
+    TRY(check_size(tests, count, problem));
     for (size_t i = 0; i < count; i++)
-        TRY(rows_add(&tests[i], i, evaluation, problem));
+        TRY(rows_add(&tests[i], i, watch, evaluation, problem));
     TRY(rows_unpull(tests, count, evaluation, problem));
     choose_restitutions(evaluation);
     find_ranges(tests, count, evaluation);

@@ -8,7 +8,7 @@
 #include "core/measure/trace.h"
 #include "core/plan/plan.h"
 
-enum { EVALUATION_ROWS_MOST = 20000 };
+enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 1 << 20 };
 #define EVALUATION_CONFIDENCE 0.95
 
 // One test, by its number of the material; COUNT_ABSENT: it has none yet. Borrowed.
@@ -98,10 +98,14 @@ typedef struct Evaluation {
 
 extern const Field evaluation_fields[]; // without the warnings
 
+// Samples in all traces: what an evaluation's time goes by.
+size_t evaluation_samples(const Measurement *tests, size_t count);
+
 // `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
-// STATUS_LIMIT: too many rows. Cleared by evaluation_clear in any case.
+// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody) says
+// so. Cleared by evaluation_clear in any case.
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       Evaluation *evaluation, Problem *problem);
+                       const Watch *watch, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
 
 #endif

@@ -164,8 +164,8 @@ static Status add_silent(const Measurement *of, size_t index, size_t i, const ch
                : no_memory(problem);
 }
 
-static Status add_trace(const Measurement *of, size_t index, size_t i, Evaluation *evaluation,
-                        Problem *problem) {
+static Status add_trace(const Measurement *of, size_t index, size_t i, const Watch *watch,
+                        Evaluation *evaluation, Problem *problem) {
     const DropTest *test = of->test;
     const Trace *trace = &test->traces.at[i];
     const TraceWay way = {
@@ -175,6 +175,7 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, Evaluatio
         .gravity = test->gravity > 0 ? test->gravity : 0,
         .approach_speeds = trace->approach_speed.at,
         .approach_speed_count = trace->approach_speed.count,
+        .watch = watch,
     };
     char place[sizeof((Fault){0}.pointer)], pointer[sizeof((Fault){0}.pointer)];
     row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i}, place,
@@ -194,11 +195,12 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, Evaluatio
     return status;
 }
 
-Status rows_add(const Measurement *of, size_t index, Evaluation *evaluation, Problem *problem) {
+Status rows_add(const Measurement *of, size_t index, const Watch *watch, Evaluation *evaluation,
+                Problem *problem) {
     for (size_t i = 0; i < of->test->drops.count; i++)
         TRY(add_drop(of, index, i, evaluation, problem));
     for (size_t i = 0; i < of->test->traces.count; i++)
-        TRY(add_trace(of, index, i, evaluation, problem));
+        TRY(add_trace(of, index, i, watch, evaluation, problem));
     return STATUS_OK;
 }
 

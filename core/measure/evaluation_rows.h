@@ -7,7 +7,8 @@
 #include "core/measure/evaluation.h"
 
 // Appends the rows of test `index` of those given. Ends as evaluation_make does.
-Status rows_add(const Measurement *of, size_t index, Evaluation *evaluation, Problem *problem);
+Status rows_add(const Measurement *of, size_t index, const Watch *watch, Evaluation *evaluation,
+                Problem *problem);
 
 // Takes gravity out of all drops whose test says what pulls; traces have had it taken out by their
 // fit. A drop that tells only one of e and T_c borrows the mean of the other from the readings of

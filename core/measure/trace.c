@@ -120,8 +120,6 @@ static void fill_window(const TraceFound *found, const TraceRun *run, const Stre
         for (size_t i = 0; i < m; i++)
             sum += force[i] / run->peak;
         const double mean = sum / (double)m;
-        for (size_t i = 0; i < m; i++)
-            window->scatter += (force[i] / run->peak - mean) * (force[i] / run->peak - mean);
         window->mean[k] = mean;
         window->sum += mean;
         window->square += mean * mean;
@@ -168,24 +166,27 @@ static double left_over(const TraceWindow *window, const TraceFit *fit, size_t *
     return sqrt(sum / fmax((double)*count - 4, 1));
 }
 
-static void withdraw(TraceContact *contact) {
+// No figure: an interval that holds also what counting samples leaves open.
+static void withdraw(const TraceContact *counted, TraceContact *contact) {
+    contact->least_contact_time = fmin(contact->least_contact_time, counted->least_contact_time);
+    contact->most_contact_time = fmax(contact->most_contact_time, counted->most_contact_time);
     contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
 // `noise` is that of `count` means during contact, over the peak, and known from so many samples.
 static Status judge(const TraceInterval *likely, double noise, size_t count, double known_from,
-                    int separation, TraceContact *contact) {
+                    int separation, const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     if (!(width < widest * contact->contact_time)) {
-        withdraw(contact);
+        withdraw(counted, contact);
         return tell(&contact->why,
                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
                     "more samples in contact would tell them apart",
                     contact->least_contact_time, contact->most_contact_time);
     }
     if (likely->decay.mean + 2 * likely->decay.deviation > faintest) {
-        withdraw(contact);
+        withdraw(counted, contact);
         return tell(&contact->why, "the force fades away without an end that could be told: pulses "
                                    "with a restitution of next to nothing fit the trace as well");
     }
@@ -236,6 +237,7 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
                     separation_names[window->separation], 100 * contact->misfit_share);
     TraceInterval likely;
     TRY(trace_interval(window, fits, count, &likely));
+    const TraceContact counted = *contact;
     contact->start = (origin + likely.start.mean) * interval;
     contact->end = (origin + likely.end.mean) * interval;
     contact->contact_time = likely.contact_time.mean * interval;
@@ -245,7 +247,7 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->restitution = fmin(exp(-likely.decay.mean), 1);
     contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
     return judge(&likely, noise, means, fmax(found->noise_count - 1, 1), window->separation,
-                 contact);
+                 &counted, contact);
 }
 
 // g / v0, which without v0 is m_e g over the fitted m_e v0, and that hangs on g / v0 but little.
@@ -324,6 +326,10 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         reading->noise = found.noise;
         reading->threshold = found.threshold;
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
+            if (!watch_advance(way->watch, (double)i / (double)found.count)) {
+                status = STATUS_CANCELLED;
+                break;
+            }
             reading->contacts.count++;
             status = read_contact(interval, way, &found, force->count, i, window,
                                   &reading->contacts.at[i]);

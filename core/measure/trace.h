@@ -5,6 +5,7 @@
 #define CORE_MEASURE_TRACE_H
 
 #include "core/base/field.h"
+#include "core/base/watch.h"
 #include "core/contact/contact.h"
 
 enum { TRACE_CONTACTS_MOST = 200, TRACE_WHY_MOST = 400 };
@@ -20,6 +21,7 @@ typedef struct TraceWay {
     double effective_mass;
     const double *approach_speeds;
     size_t approach_speed_count;
+    const Watch *watch; // asked before each contact whether to go on; NULL: nobody watches
 } TraceWay;
 
 // One contact. What is not known is NAN; uncertainties are standard ones.
@@ -57,7 +59,7 @@ typedef struct TraceReading {
 extern const Field trace_contact_fields[];
 
 // Faults only where the trace cannot be read at all (STATUS_INVALID at `pointer`),
-// STATUS_NO_MEMORY. Cleared by trace_reading_clear in any case.
+// STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear in any case.
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
                   TraceReading *reading, Problem *problem);
 void trace_reading_clear(TraceReading *reading);

@@ -84,8 +84,9 @@ static void take_off(TraceFound *found, const Reals *force, const double *c) {
     found->baseline = c[0];
 }
 
-// A polynomial through the samples outside contacts, by least squares.
-static void refine(const Reals *force, const bool *is_inside, size_t terms, double *c) {
+// A polynomial of so many terms added to c, through the samples outside contacts, by least squares;
+// the sum of squares that it leaves.
+static double refine(const Reals *force, const bool *is_inside, size_t terms, double *c) {
     double a[TERMS][TERMS + 1] = {{0}};
     for (size_t i = 0; i < force->count; i++) {
         if (is_inside[i])
@@ -109,6 +110,32 @@ static void refine(const Reals *force, const bool *is_inside, size_t terms, doub
     for (size_t j = 0; j < terms; j++)
         if (isfinite(a[j][TERMS] / a[j][j]))
             c[j] += a[j][TERMS] / a[j][j];
+    double sum = 0;
+    for (size_t i = 0; i < force->count; i++) {
+        const double u = place_of(i, force->count);
+        const double left = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
+        sum += is_inside[i] ? 0 : left * left;
+    }
+    return sum;
+}
+
+// A level, and a slope and a bend where they explain more than chance does. Returns the variance of
+// what is left.
+static double refine_best(const Reals *force, const bool *is_inside, size_t outside, double *c) {
+    double best = refine(force, is_inside, 1, c);
+    double variance = best / ((double)outside - 1);
+    for (size_t terms = 2; terms <= TERMS && outside >= 6 * terms; terms++) {
+        double other[TERMS];
+        memcpy(other, c, sizeof other);
+        const double left = refine(force, is_inside, terms, other);
+        const double freedom = (double)(outside - terms);
+        if (!(best - left > 12 * left / freedom))
+            continue;
+        memcpy(c, other, sizeof other);
+        best = left;
+        variance = left / freedom;
+    }
+    return variance;
 }
 
 // Marks what is above the threshold, with half its length and a little about it; how many are not.
@@ -165,12 +192,8 @@ static Status find_baseline(const Reals *force, TraceFound *found) {
         const size_t outside = mark(found, n, fmax(4 * noise, 1e-6 * largest), is_inside);
         if (outside < 2)
             break;
-        refine(force, is_inside, outside > 300 ? 3 : outside > 60 && is_line ? 2 : 1, c);
+        noise = sqrt(refine_best(force, is_inside, outside, c));
         take_off(found, force, c);
-        double sum = 0;
-        for (size_t i = 0; i < n; i++)
-            sum += is_inside[i] ? 0 : found->force[i] * found->force[i];
-        noise = sqrt(sum / (double)(outside - 1));
         found->noise_count = (double)outside;
     }
     found->noise = noise;

@@ -53,6 +53,17 @@ static bool members(const TraceWindow *window, const TracePoint *point, const Tr
     return *first >= 0 && *last <= end && *first <= *last;
 }
 
+// The mean of so many values about s, `step` from one to the next: by the second difference over
+// their width, which is all that matters of a pulse over a block.
+static double mean_about(const TraceShape *shape, double s, double step, long count) {
+    const double middle = trace_shape_force(shape, s), half = step * (double)count / 2;
+    if (count == 1)
+        return middle;
+    const double about =
+        (trace_shape_force(shape, s - half) + trace_shape_force(shape, s + half)) / 2;
+    return middle + (about - middle) * (1 - 1 / ((double)count * (double)count)) / 3;
+}
+
 // The pulse of size 1 over blocks; those from *from to *to are other than 0.
 static bool pulse(const TraceWindow *window, const TracePoint *point, long first, long last,
                   double *f, size_t *from, size_t *to) {
@@ -65,9 +76,9 @@ static bool pulse(const TraceWindow *window, const TracePoint *point, long first
     *from = (size_t)begin;
     *to = (size_t)end;
     // In whole blocks the pulse's oscillation follows from the two blocks before.
-    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step,
-                 fall = exp(-shape.decay * step);
-    const double turn = 2 * fall * (shape.turn > 0 ? cos(x) : cosh(x)), back = fall * fall;
+    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step;
+    const double fall = exp(-shape.decay * step), back = fall * fall;
+    const double turn = 2 * fall * (shape.turn > 0 ? cos(x) : cosh(x));
     double before = 0, here = 0;
     for (long k = begin; k <= end; k++) {
         const long lowest = k * m > first ? k * m : first;
@@ -78,7 +89,8 @@ static bool pulse(const TraceWindow *window, const TracePoint *point, long first
             value = turn * here - back * before + shape.pull;
         } else {
             const double centre = (double)lowest + (double)(highest - lowest) / 2;
-            value = trace_shape_force(&shape, (centre - point->part[START]) / T);
+            value =
+                mean_about(&shape, (centre - point->part[START]) / T, 1 / T, highest - lowest + 1);
         }
         before = here;
         here = value - shape.pull;
@@ -116,8 +128,7 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
     } else {
         left += all;
     }
-    return (TraceResidue){
-        .sum = m * left + window->scatter, .amplitude = A, .baseline = b, .model_square = m * ff};
+    return (TraceResidue){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
 
 TraceResidue trace_residue(const TraceWindow *window, const TracePoint *point,
@@ -263,14 +274,14 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
 }
 
 double trace_variance(const TraceWindow *window, double sum) {
-    const double n = (double)(window->blocks * window->per_block) + window->noise_freedom;
+    const double n = (double)window->blocks + window->noise_freedom;
     // Rounding of the data and of the model is noise as well.
-    return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-24;
+    return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-16;
 }
 
 double trace_likelihood(const TraceWindow *window, double sum) {
-    const double n = (double)(window->blocks * window->per_block) + window->noise_freedom;
-    return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-24);
+    const double n = (double)window->blocks + window->noise_freedom;
+    return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-16);
 }
 
 // Coarsely over starts and ends, for one L.

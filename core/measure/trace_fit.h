@@ -14,7 +14,6 @@ enum { TRACE_BLOCKS_MOST = 512, TRACE_PARTS = 3, TRACE_FITS_MOST = 6 };
 typedef struct TraceWindow {
     double mean[TRACE_BLOCKS_MOST]; // [peak]
     size_t blocks, per_block;
-    double scatter;     // sum of squares about those means
     double sum, square; // of the means, and of their squares
     // What the rest of the trace says of the noise: sum of squares and degrees of freedom.
     double noise_square, noise_freedom;
@@ -30,7 +29,7 @@ typedef struct TracePoint {
 } TracePoint;
 
 typedef struct TraceResidue {
-    double sum;       // of squares that the fit leaves, the scatter included
+    double sum;       // of squares that the fit leaves, of as many samples as there are means
     double amplitude; // m_e v0 / T_c
     double baseline;
     double model_square; // of the model about its mean, for unit amplitude

@@ -3,6 +3,7 @@
 #ifndef SERVER_API_MATERIALS_H
 #define SERVER_API_MATERIALS_H
 
+#include "core/measure/evaluation.h"
 #include "server/api/app.h"
 #include "server/base/bytes.h"
 #include "server/store/material_rows.h"
@@ -33,6 +34,11 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
 // The separation rule that drop tests are to be read by: the query's, else the material's, else
 // zero penetration.
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem);
+
+// evaluation_make for a request: it ends when the daemon does, or takes too long, and of those that
+// may take long only so many go at once. STATUS_BUSY, STATUS_LIMIT.
+Status material_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                         Evaluation *evaluation, Reply *reply, Problem *problem);
 
 // A text and a time as members behind others: NULL and 0 are null.
 void material_put_text(Bytes *bytes, const char *name, const char *text);

@@ -17,6 +17,11 @@
 #include "server/materials/measurement.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
+enum { PAGE_MOST = 32 << 20 }; // bytes of documents that are read for one page
+
+// Of evaluations: samples in traces that take a moment, and how many longer ones go at once.
+enum { SAMPLES_QUICK = 20000, LONG_MOST = 4 };
+static const double patience_most = 30; // [s]
 
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem) {
     const char *slug = request->parameters[0];
@@ -43,6 +48,50 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
         return STATUS_OK;
     material_revision_clear(revision);
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
+}
+
+typedef struct Patience {
+    App *app;
+    int64_t until_ns; // monotonic
+} Patience;
+
+static bool is_patient(void *context, double fraction) {
+    const Patience *patience = context;
+    (void)fraction;
+    return !atomic_load(&patience->app->is_stopping) && clock_monotonic_ns() < patience->until_ns;
+}
+
+static Status evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                       Evaluation *evaluation, Problem *problem) {
+    Patience patience = {app, clock_monotonic_ns() + (int64_t)(1e9 * patience_most)};
+    const Watch watch = {&patience, is_patient};
+    const Status status =
+        evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
+    if (status != STATUS_CANCELLED)
+        return status;
+    if (atomic_load(&app->is_stopping))
+        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+    return problem_set(problem, STATUS_LIMIT,
+                       "to find all contacts of these traces takes more than %g s: cut the traces, "
+                       "or take in fewer measurements at a time",
+                       patience_most);
+}
+
+Status material_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+                         Evaluation *evaluation, Reply *reply, Problem *problem) {
+    *evaluation = (Evaluation){.separation = separation};
+    if (evaluation_samples(tests, count) <= SAMPLES_QUICK)
+        return evaluate(app, tests, count, separation, evaluation, problem);
+    Status status = STATUS_BUSY;
+    if (atomic_fetch_add(&app->evaluations, 1) < LONG_MOST) {
+        status = evaluate(app, tests, count, separation, evaluation, problem);
+    } else {
+        reply->retry_after = 10;
+        (void)problem_set(problem, STATUS_BUSY,
+                          "other long force traces are being evaluated: ask again");
+    }
+    atomic_fetch_sub(&app->evaluations, 1);
+    return status;
 }
 
 // The body, judged. Cleared by fields_clear in any case.
@@ -94,8 +143,11 @@ static Status tell(App *app, const MaterialMeasurement *row, const DropTest *tes
     return reply_bytes(reply, code, type_json, &bytes, problem);
 }
 
-static Status keep(App *app, const Request *request, const MeasurementBody *body, uint64_t seen,
-                   const Evaluation *evaluation, Reply *reply, Problem *problem) {
+// The tag that is told is that of the writer's own state: of what others have written since they
+// know nothing.
+static Status keep(App *app, const Request *request, const MeasurementBody *body,
+                   const MaterialState *state, uint64_t seen, const Evaluation *evaluation,
+                   Reply *reply, Problem *problem) {
     Bytes document = {0};
     write_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
     char *text = bytes_take(&document, NULL);
@@ -109,23 +161,27 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
                                .document = text};
     Status status = store_material_measure(app->store, &row, seen, problem);
     free(text);
-    return status == STATUS_OK ? tell(app, &row, &body->test, evaluation, 201, reply, problem)
-                               : status;
+    if (status != STATUS_OK)
+        return status;
+    char tag[MATERIAL_TAG];
+    material_tag(row.slug, state->latest, state->version + 1, tag);
+    snprintf(reply->etag, sizeof reply->etag, "\"%s\"", tag);
+    return tell(app, &row, &body->test, evaluation, 201, reply, problem);
 }
 
-static Status create(App *app, const Request *request, const MeasurementBody *body, uint64_t seen,
-                     Reply *reply, Problem *problem) {
+static Status create(App *app, const Request *request, const MeasurementBody *body,
+                     const MaterialState *state, uint64_t seen, Reply *reply, Problem *problem) {
     size_t is_dry;
     int separation;
     TRY(request_count(request, "dry_run", 0, 1, 0, &is_dry, problem));
     TRY(material_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    Status status = evaluation_make(&test, 1, (Separation)separation, &evaluation, problem);
+    Status status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
     if (status == STATUS_OK && is_dry == 1)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
-        status = keep(app, request, body, seen, &evaluation, reply, problem);
+        status = keep(app, request, body, state, seen, &evaluation, reply, problem);
     evaluation_clear(&evaluation);
     return status;
 }
@@ -138,7 +194,7 @@ Status measurements_create(App *app, const Request *request, Reply *reply, Probl
     TRY(material_condition(app, request, request->parameters[0], false, &seen, &state, problem));
     Status status = read_body(request, &body, problem);
     if (status == STATUS_OK)
-        status = create(app, request, &body, seen, reply, problem);
+        status = create(app, request, &body, &state, seen, reply, problem);
     fields_clear(measurement_body_fields, &body);
     return status;
 }
@@ -160,12 +216,14 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %zu, \"measurements\": [", slug, count);
     Status status = STATUS_OK;
-    for (size_t i = beyond - 1; i >= least && status == STATUS_OK; i--) {
+    size_t next = beyond, size = 0;
+    while (next > least && status == STATUS_OK && size < PAGE_MOST) {
         StoredTest stored = {.row = {.slug = NULL}};
-        status = stored_test_load(app->store, slug, i, &stored, problem);
+        status = stored_test_load(app->store, slug, --next, &stored, problem);
+        bytes_text(&bytes, next + 1 < beyond ? ",\n " : "");
         if (status == STATUS_OK)
             measurement_write_brief(&bytes, &stored);
-        bytes_text(&bytes, i > least ? ",\n " : "");
+        size += stored.row.document != NULL ? strlen(stored.row.document) : 0;
         stored_test_clear(&stored);
     }
     bytes_text(&bytes, "]}\n");
@@ -174,8 +232,8 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
         return status;
     }
     char number[24];
-    snprintf(number, sizeof number, "%zu", least);
-    if (least > 1)
+    snprintf(number, sizeof number, "%zu", next);
+    if (next > 1)
         query_link_next(request, reply, "before", number);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
@@ -202,7 +260,7 @@ Status measurements_show(App *app, const Request *request, Reply *reply, Problem
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
         Evaluation evaluation;
-        status = evaluation_make(&test, 1, (Separation)separation, &evaluation, problem);
+        status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
         if (status == STATUS_OK)
             status = tell(app, &stored.row, &stored.test, &evaluation, 200, reply, problem);
         evaluation_clear(&evaluation);

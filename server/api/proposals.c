@@ -45,7 +45,13 @@ static Status take(App *app, const char *slug, uint64_t number, Taken *taken, Pr
                            TESTS_MOST);
     StoredTest *stored = &taken->stored[taken->count];
     taken->tests[taken->count++] = (Measurement){number, &stored->test};
-    return stored_test_load(app->store, slug, number, stored, problem);
+    TRY(stored_test_load(app->store, slug, number, stored, problem));
+    // Before there are more of them in memory.
+    if (evaluation_samples(taken->tests, taken->count) <= EVALUATION_SAMPLES_MOST)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_LIMIT,
+                       "more than %d samples in traces: take in fewer measurements at a time",
+                       EVALUATION_SAMPLES_MOST);
 }
 
 // "1,2,5"; all of them without it.
@@ -157,7 +163,7 @@ static Status propose(App *app, const Request *request, const Material *before, 
     Evaluation evaluation;
     Proposal proposal = {.why = NULL};
     Status status =
-        evaluation_make(taken->tests, taken->count, (Separation)separation, &evaluation, problem);
+        material_evaluate(app, taken->tests, taken->count, separation, &evaluation, reply, problem);
     if (status == STATUS_OK)
         status = proposal_make(&evaluation, taken->tests, taken->count, before, (ProposalForm)form,
                                &proposal, problem);

@@ -79,27 +79,18 @@ bool query_range_has(const QueryRange *range, double value) {
     return !range->is_asked || (value >= range->least && value <= range->most);
 }
 
-static void put_escaped(Bytes *bytes, const char *text) {
-    for (; *text != '\0'; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
-            strchr("-._~", c) != NULL)
-            bytes_put(bytes, text, 1);
-        else
-            bytes_format(bytes, "%%%02X", (unsigned)c);
-    }
-}
-
 void query_link_next(const Request *request, Reply *reply, const char *name, const char *value) {
     Bytes bytes = {.most = sizeof reply->link - 1};
     bytes_format(&bytes, "<%s?", request->path);
     for (size_t i = 0; i < request->query_count; i++)
         if (strcmp(request->queries[i].name, name) != 0) {
             bytes_format(&bytes, "%s=", request->queries[i].name);
-            put_escaped(&bytes, request->queries[i].value);
+            bytes_percent(&bytes, request->queries[i].value);
             bytes_text(&bytes, "&");
         }
-    bytes_format(&bytes, "%s=%s>; rel=\"next\"", name, value);
+    bytes_format(&bytes, "%s=", name);
+    bytes_percent(&bytes, value);
+    bytes_text(&bytes, ">; rel=\"next\"");
     if (!bytes.is_failed)
         snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
     bytes_clear(&bytes);

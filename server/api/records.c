@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/api/query.h"
 #include "server/api/records_upload.h"
 #include "server/api/tables.h"
 #include "server/base/clock.h"
@@ -12,7 +13,7 @@
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
-enum { LIST_INITIAL = 50, LIST_MOST = 500, TEXT_MOST = 200 };
+enum { LIST_INITIAL = 50, LIST_MOST = 500 };
 
 // clang-format off
 static const Field row_fields[] = {
@@ -110,40 +111,13 @@ Status records_create(App *app, const Request *request, Reply *reply, Problem *p
     return status;
 }
 
-static void link_next(const Request *request, Reply *reply, const char *last) {
-    Bytes bytes = {.most = sizeof reply->link - 1};
-    bytes_text(&bytes, "</v1/records?");
-    for (size_t i = 0; i < request->query_count; i++)
-        if (strcmp(request->queries[i].name, "after") != 0) {
-            bytes_format(&bytes, "%s=", request->queries[i].name);
-            bytes_percent(&bytes, request->queries[i].value);
-            bytes_text(&bytes, "&");
-        }
-    bytes_format(&bytes, "after=%s>; rel=\"next\"", last);
-    if (!bytes.is_failed)
-        snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
-    bytes_clear(&bytes);
-}
-
-static Status read_text(const Request *request, const char *name, const char **text,
-                        Problem *problem) {
-    *text = request_query(request, name);
-    if (*text != NULL && strlen(*text) > TEXT_MOST)
-        return problem_set(problem, STATUS_USAGE,
-                           "the query parameter \"%s\" may have %d bytes, has %zu", name, TEXT_MOST,
-                           strlen(*text));
-    if (*text != NULL && **text == '\0')
-        *text = NULL;
-    return STATUS_OK;
-}
-
 Status records_list(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *words, *after;
     size_t limit;
     RecordRows rows;
     TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
-    TRY(read_text(request, "q", &words, problem));
-    TRY(read_text(request, "after", &after, problem));
+    TRY(query_text(request, "q", &words, problem));
+    TRY(query_text(request, "after", &after, problem));
     // One more than asked for tells whether there is a next page.
     TRY(store_records(app->store, words, after != NULL ? after : "", limit + 1, &rows, problem));
     Bytes bytes = {.most = app->reply_most};
@@ -155,7 +129,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     }
     bytes_text(&bytes, "]}\n");
     if (rows.count > limit)
-        link_next(request, reply, rows.at[limit - 1].name);
+        query_link_next(request, reply, "after", rows.at[limit - 1].name);
     record_rows_clear(&rows);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -5,6 +5,7 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "server/command/bar.h"
 #include "server/command/data_folder.h"
@@ -46,11 +47,14 @@ static bool advance(void *bar, double fraction) {
 
 static int backup(void *of, const Options *options, Problem *problem) {
     BackupSettings *settings = of;
-    if (options->operand_count != 1) {
+    if (options->operand_count != 1)
         (void)problem_set(problem, STATUS_USAGE, "takes one file to write, is given %zu",
                           options->operand_count);
+    else if (strcmp(options->operands[0], "-") == 0)
+        (void)problem_set(problem, STATUS_USAGE,
+                          "writes a file, not standard output: it appears whole or not at all");
+    if (problem->status != STATUS_OK)
         return command_refuse("backup", problem);
-    }
     const char *path = options->operands[0];
     Backup made = {0};
     Bar bar;

@@ -67,6 +67,7 @@ static const struct Action {
     {"diff",      "SLUG, and perhaps two revisions",       1, 3, materials_diff_act},
     {"used-by",   "SLUG or SLUG@REVISION",                 1, 1, materials_used_by_act},
     {"measure",   "SLUG TEST.json",                        2, 2, materials_measure_act},
+    {"measurements", "SLUG",                               1, 1, materials_measurements_act},
     {"propose",   "SLUG",                                  1, 1, materials_propose_act},
     {"derived",   "SLUG or SLUG@REVISION",                 1, 1, materials_derived_act},
     {"export",    "FILE.json or FILE.csv",                 1, 1, materials_export_act},
@@ -127,8 +128,8 @@ static int run(int argc, char *const *argv) {
 const Command command_materials = {
     .name = "materials",
     .operands =
-        "list|show|add|revise|revert|approve|deprecate|history|diff|used-by|measure|propose|"
-        "derived|export|import [...]",
+        "list|show|add|revise|revert|approve|deprecate|history|diff|used-by|measure|measurements|"
+        "propose|derived|export|import [...]",
     .summary = "the lab's materials: measure, revise, approve, trace, share",
     .help =
         "  impactd materials list --kind rubber --e 0.4..0.7      what there is\n"
@@ -136,6 +137,7 @@ const Command command_materials = {
         "  impactd materials add foam.json                        a new material, a draft\n"
         "  impactd materials measure foam test.json --trace a.csv a drop test, and what it comes "
         "to\n"
+        "  impactd materials measurements foam                    those that are kept, by number\n"
         "  impactd materials propose foam                         what all its tests come to\n"
         "  impactd materials propose foam --confirm --comment 'six drops'   and a revision of it\n"
         "  impactd materials show foam --editable > foam.json     to change by hand what it says\n"

@@ -73,7 +73,7 @@ MaterialsAct materials_list_act, materials_show_act, materials_history_act, mate
     materials_used_by_act, materials_derived_act;
 MaterialsAct materials_add_act, materials_revise_act, materials_revert_act, materials_approve_act,
     materials_deprecate_act;
-MaterialsAct materials_measure_act, materials_propose_act;
+MaterialsAct materials_measure_act, materials_measurements_act, materials_propose_act;
 MaterialsAct materials_export_act, materials_import_act;
 
 // A JSON object from a file, with the comment in it if there is one.

@@ -1,5 +1,5 @@
-// impactd materials measure, propose: a drop test goes in, and what all tests come to becomes a
-// revision once somebody says so.
+// impactd materials measure, measurements, propose: a drop test goes in, and what all tests come to
+// becomes a revision once somebody says so.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +17,7 @@ static const OutlineTable tables[] = {
      {"measurement", "from", "approach_speed", "restitution", "restitution_uncertainty",
       "contact_time", "contact_time_uncertainty", "restitution_is_outlier",
       "contact_time_is_outlier", "excluded", "note"}},
+    {"measurements", {"measurement", "created", "author", "comment", "drops", "traces"}},
     {"warnings", {"pointer", "detail"}},
     {NULL, {NULL}},
 };
@@ -70,6 +71,19 @@ Status materials_measure_act(MaterialsCall *call, Problem *problem) {
         status = materials_print(call, &answer, tables, problem);
     http_answer_clear(&answer);
     bytes_clear(&body);
+    return status;
+}
+
+Status materials_measurements_act(MaterialsCall *call, Problem *problem) {
+    Bytes path;
+    HttpAnswer answer = {0};
+    TRY(materials_name(call->operands[0], false, problem));
+    materials_path(&path, call->operands[0], "/measurements");
+    materials_query(&path, "limit", "100"); // the document tells how many there are
+    Status status = materials_ask(call, "GET", &path, NULL, NULL, &answer, problem);
+    if (status == STATUS_OK)
+        status = materials_print(call, &answer, tables, problem);
+    http_answer_clear(&answer);
     return status;
 }
 

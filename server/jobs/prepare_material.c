@@ -33,27 +33,25 @@ static bool split_name(const char *name, char slug[128], uint64_t *revision) {
 static Status refuse_unknown(Store *store, const char *name, const char *slug, const char *pointer,
                              Problem *problem) {
     Fault fault = {.detail = ""};
-    MaterialRevisions known = {NULL, 0};
+    Texts known;
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);
     char short_name[80], list[200] = "";
     text_fit(short_name, sizeof short_name, name);
-    if (store_materials(store, &known, NULL) == STATUS_OK && known.count > 0) {
+    if (store_material_slugs(store, &known, NULL) == STATUS_OK) {
+        // One more, for the NULL behind the last one.
         const char **slugs = calloc(known.count + 1, sizeof *slugs);
-        size_t used = 0;
         for (size_t i = 0; i < known.count; i++) {
             if (slugs != NULL)
-                slugs[i] = known.at[i].slug;
-            if (used < sizeof list)
-                used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "",
-                                         known.at[i].slug);
+                slugs[i] = known.at[i];
+            text_list(list, sizeof list, known.at[i]);
         }
         const char *nearest = slugs == NULL ? NULL : texts_nearest(slugs, slug);
         if (nearest != NULL)
             text_fit(fault.did_you_mean, sizeof fault.did_you_mean, nearest);
         free(slugs);
+        material_slugs_clear(&known);
     }
-    material_revisions_clear(&known);
     snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s", short_name,
              list[0] != '\0' ? "; there are " : "", list);
     return problem_put(problem, STATUS_INVALID, &fault);

@@ -1,6 +1,6 @@
 // Names of ground-motion records in scenes become what they stand for: samples that all who named
-// them share. Not where records are kept: that is store/record_rows.h. Used by prepare.c and
-// sweep_rows.c.
+// them share. Not where records are kept: that is store/record_rows.h. Used by prepare.c, uses.c
+// and sweep_rows.c.
 #ifndef SERVER_JOBS_PREPARE_RECORD_H
 #define SERVER_JOBS_PREPARE_RECORD_H
 

@@ -120,8 +120,18 @@ static Status all(Store *store, const char *sql, const Key *key, const RowColumn
     return status;
 }
 
-Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem) {
-    return store_material_heads(store, "", SIZE_MAX, materials, problem);
+Status store_material_slugs(Store *store, Texts *slugs, Problem *problem) {
+    static const char sql[] = "SELECT slug FROM materials ORDER BY slug";
+    // A row of one text is that text.
+    static const RowColumn columns[] = {{.name = "slug", .kind = COLUMN_TEXT}, ROW_END};
+    return all(store, sql, NULL, columns, sizeof *slugs->at, slugs, problem);
+}
+
+void material_slugs_clear(Texts *slugs) {
+    for (size_t i = 0; i < slugs->count; i++)
+        free(slugs->at[i]);
+    free(slugs->at);
+    *slugs = (Texts){NULL, 0};
 }
 
 Status store_material_heads(Store *store, const char *after, size_t most,

@@ -43,9 +43,11 @@ Status store_material_state(Store *store, const char *slug, MaterialState *state
 // also where all are deprecated.
 Status store_material(Store *store, const char *slug, uint64_t revision, MaterialRevision *material,
                       Problem *problem);
-// The head of every material, by slug; of those that are all deprecated the newest revision.
-Status store_materials(Store *store, MaterialRevisions *materials, Problem *problem);
-// At most `most` of them, those behind the slug `after` ("": from the first).
+// The slugs of all materials, by name.
+Status store_material_slugs(Store *store, Texts *slugs, Problem *problem);
+void material_slugs_clear(Texts *slugs);
+// The heads of materials, by slug; of those that are all deprecated the newest revision. At most
+// `most` of them, those behind the slug `after` ("": from the first).
 Status store_material_heads(Store *store, const char *after, size_t most,
                             MaterialRevisions *materials, Problem *problem);
 // All revisions of one material, or of all (slug NULL), by slug and number. STATUS_NOT_FOUND where

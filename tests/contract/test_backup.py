@@ -202,7 +202,7 @@ def test_a_file_that_is_there_is_kept():
         code, said = backup(path, daemon.data, "--force")
         assert code == 0 and sqlite3.connect(path).execute("SELECT count(*) FROM materials").fetchone() == (5,)
         assert daemon.get("/v1/materials").status == 200
-        for arguments in ((), (path, path)):
+        for arguments in ((), (path, path), ("-",)):
             assert program.run("backup", *arguments, "--data", daemon.data)[0] == 2
         assert backup(os.path.join(folder, "x.db"), os.path.join(folder, "nowhere"))[0] == 4
         assert sorted(os.listdir(folder)) == ["copy.db", "link.db"]

@@ -41,6 +41,8 @@ def test_a_full_disk_stops_writes_alone():
         with program.daemon("--workers", "2", data=folder) as daemon:
             before = daemon.submit(scene(0)).json()
             endless = daemon.submit(long_scene(0, 2000), headers=ASYNC).json()
+            shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 2, -1]}
+            assert daemon.request("POST", "/v1/records", json=shake).status == 201
             ballast = fill(folder)
             refused = None
             for number in range(1, 400):
@@ -52,16 +54,18 @@ def test_a_full_disk_stops_writes_alone():
             problem = refused.json()
             assert problem["type"] == "/problems/no-room", problem
             assert folder in problem["detail"] and "bytes are free" in problem["detail"], problem
-            for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}"):
+            for path in (f"/v1/results/{before['result']}", f"/v1/jobs/{endless['id']}", "/v1/records/shake"):
                 assert daemon.request("DELETE", path).status == 507, path
+            assert daemon.request("POST", "/v1/records", json={**shake, "name": "more"}).status == 507
             felt = {"name": "Felt", "restitution": 0.3, "source": "here", "comment": "x"}
             for path, body in (("", {"slug": "felt", **felt}), ("/sponge/revisions", felt), ("/sponge/revert", {"to": 1, "comment": "x"}),
-                               ("/sponge@1/review", {"status": "deprecated", "reason": "x"})):
+                               ("/sponge@1/review", {"status": "deprecated", "reason": "x"}),
+                               ("/sponge/measurements", {"drops": [{"contact_time": 0.001}]})):
                 assert daemon.request("POST", "/v1/materials" + path, json=body, headers={"If-Match": "*"}).status == 507, path
             assert daemon.get("/v1/materials/sponge/history").json()["version"] == 2
             for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
                          f"/v1/results/{before['result']}/series.npy", f"/v1/results/{before['result']}/psd.json",
-                         "/health/live"):
+                         "/health/live", "/v1/records/shake", "/v1/records/shake/samples.csv"):
                 assert daemon.get(path).status == 200, path
             os.remove(ballast)
             assert until(lambda: daemon.submit(scene(1000)).status == 200), "no recovery"

@@ -222,6 +222,9 @@ def test_measurements_become_a_revision():
         assert all(abs(a - float(f"{b:.7g}")) == 0 for a, b in zip(trace["force"], forces))
         good(daemon.url, "measure", "foam", test, "--trace", bare, "--interval", "2e-4", "--trace", timed)
         assert [t["force"] for t in daemon.get("/v1/materials/foam/measurements/2").json()["test"]["traces"]] == 2 * [trace["force"]]
+        listed = [columns(line) for line in good(daemon.url, "measurements", "foam").splitlines()]
+        assert ["count", "2"] in listed and [row[0] for row in listed[-2:]] == ["2", "1"], listed
+        assert "two ways" in listed[-1], listed
         for arguments, expected, words in (((bare,), 3, "--interval"), ((timed, "--interval", "1"), 3, "tells an interval"), ((test,), 3, "no line of numbers"),
                                            ((os.path.join(folder, "no.csv"),), 4, "no.csv")):
             code, out, errors = materials(daemon.url, "measure", "foam", test, "--trace", *arguments)

@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
 """Drop tests over HTTP: kept as they were sent, evaluated, proposed as a revision and confirmed; what a material comes to for a pair."""
 
+import http.client
+import json
 import math
 import os
 import random
 import re
 import sys
+import threading
+import time
 import xml.etree.ElementTree as xml
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
@@ -27,8 +31,8 @@ def drops(restitutions, contact_time=0.025, **more):
     return {"impactor": "steel ball, 30 mm", "impactor_mass": 0.11, "base": "fixed", "gravity": 0, "drops": made, **more}
 
 
-def post(daemon, body, target=SPONGE, **options):
-    return daemon.request("POST", f"{target}/measurements", json=body, **options)
+def post(daemon, test, target=SPONGE, **options):
+    return daemon.request("POST", f"{target}/measurements", json=test, **options)
 
 
 def test_a_measurement_is_kept_as_it_was_sent_and_evaluated():
@@ -209,6 +213,55 @@ def test_large_tests_are_taken():
         assert answer["evaluation"]["contact_time"]["count"] >= 1200, answer["evaluation"]["contact_time"]
 
 
+def test_more_than_can_be_taken_is_told():
+    """A body over the limit: 413; more readings than are evaluated at a time: 422, and fewer measurements go."""
+    many = {"gravity": 0, "drops": [{"approach_speed": 1, "rebound_speed": 0.5}] * 1000}
+    with program.daemon() as daemon:
+        large = daemon.request("POST", f"{SPONGE}/measurements", body=b" " * (1 << 24) + b"x", headers={"Content-Type": "application/json"})
+        asking.problem(large, 413)
+        asking.problem(daemon.request("POST", f"{SPONGE}/measurements", body=b"{}", headers={"Content-Type": "text/csv"}), 415)
+        for _ in range(21):
+            assert post(daemon, many).status == 201
+        for target in ("proposal", "proposal.json"):
+            assert "fewer measurements" in asking.problem(daemon.get(f"{SPONGE}/{target}"), 422)["detail"]
+        silence = json.dumps({"traces": [{"interval": 1e-6, "force": [0] * 600000}]})
+        for _ in range(2):
+            made = post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120)
+            assert made.status == 201, made
+        assert "samples in traces" in asking.problem(daemon.get(f"{SPONGE}/proposal?measurements=22,23"), 422)["detail"]
+        silence = json.dumps({"traces": [{"interval": 1e-6, "force": [0] * 600000}] * 2})
+        asking.problem(post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120), 422, "/traces")
+        some = daemon.get(f"{SPONGE}/proposal?measurements=1,2").json()
+        assert some["evaluation"]["restitution"]["count"] == 2000, some["evaluation"]["restitution"]
+
+
+def test_long_traces_do_not_keep_the_daemon():
+    """While a trace of hundreds of contacts is evaluated others are answered, and SIGTERM ends the daemon in its time."""
+    pulse = [80 * math.exp(-0.0008 * i) * math.sin(math.pi * i / 600) for i in range(601)]
+    noise = random.Random(2)
+    force = [round(noise.gauss(0, 0.8), 2) for _ in range(1000)] * 1000
+    for at in range(250, len(force) - 700, 1100):
+        force[at:at + 601] = [round(a + b, 2) for a, b in zip(force[at:at + 601], pulse)]
+    body = json.dumps({"gravity": 0, "traces": [{"interval": 1e-6, "force": force}]})
+    answers = []
+
+    def ask():
+        try:
+            answers.append(post(daemon, None, body=body, headers={"Content-Type": "application/json"}, timeout=300).status)
+        except (OSError, http.client.HTTPException):
+            answers.append(None)
+
+    with program.daemon() as daemon:
+        asked = threading.Thread(target=ask)
+        asked.start()
+        for _ in range(100):
+            assert daemon.get(SPONGE).status == 200
+            time.sleep(0.02)
+    # That the daemon ended within its time is what program.daemon() asserts.
+    asked.join(60)
+    assert answers in ([201], [422], [503], [None]), answers
+
+
 def test_measurements_come_in_pages():
     """Newest first, Link to the next page, each once."""
     with program.daemon() as daemon:
@@ -228,7 +281,8 @@ def test_writers_that_have_seen_an_older_state_are_told():
     """If-Match is honoured where it is sent: 412 where the material has changed, 201 with its tag, and without it."""
     with program.daemon() as daemon:
         tag = daemon.get(SPONGE).headers["etag"]
-        assert post(daemon, drops([0.6]), headers={"If-Match": tag}).status == 201
+        made = post(daemon, drops([0.6]), headers={"If-Match": tag})
+        assert made.status == 201 and made.headers["etag"] == daemon.get(SPONGE).headers["etag"] != tag, made
         asking.problem(post(daemon, drops([0.6]), headers={"If-Match": tag}), 412)
         assert post(daemon, drops([0.6])).status == 201
         assert daemon.get(f"{SPONGE}/measurements").json()["count"] == 2
@@ -278,7 +332,8 @@ def test_figures_for_a_pair_are_those_of_the_plan():
                 assert contact[name]["uncertainty"] is None, contact
         assert {contact["separation"] for contact in figures["contacts"]} == {"zero_penetration", "zero_force"}
         assert any("test are not known" in warning["detail"] for warning in figures["warnings"]), figures
-        asking.problem(daemon.get(f"{SPONGE}/derived?damper_mass=0.1&identified_for=rig"), 422, "/identified_for")
+        for target in (SPONGE, f"{SPONGE}@1"):
+            asking.problem(daemon.get(f"{target}/derived?damper_mass=0.1&identified_for=rig"), 422, "/identified_for")
         post(daemon, drops([0.59, 0.61, 0.63]))
         asked = daemon.get(f"{SPONGE}/proposal")
         revision = {**asked.json()["revision"], "contact_time_deviation": 0.0005}

@@ -101,7 +101,8 @@ def test_lines():
             file.write("time [s],acceleration [m/s^2]\n" + "".join(f"{0.001 * i:.3f},{0.1 * (i % 7)}\n" for i in range(40)))
         cork = {"slug": "cork", "name": "Cork", "restitution": 0.4, "contact_time": 0.01, "source": "a guess"}
         drops = {"gravity": 0, "drops": [{"drop_height": 0.1, "rebound_height": 0.0001 * height} for height in (158, 161, 164)]}
-        for name, document in (("cork", cork), ("test", drops)):
+        revision = {"name": "Sponge", "restitution": 0.6, "contact_time": 0.025, "source": "six drops", "comment": "measured anew"}
+        for name, document in (("cork", cork), ("test", drops), ("drops", drops), ("revision", revision)):
             with open(os.path.join(folder, name + ".json"), "w", encoding="utf-8") as file:
                 json.dump(document, file)
         with open(os.path.join(folder, "force.csv"), "w", encoding="utf-8") as file:

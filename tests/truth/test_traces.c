@@ -30,7 +30,7 @@ static void print_score(const TraceCell *cell, const TraceScore *score) {
 static void without_noise_five_samples_give_e_and_contact_time(void **state) {
     (void)state;
     static const double restitutions[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 1};
-    static const double samples[] = {5, 5.3, 5.9, 6.5, 8, 11.2, 20, 33.3, 100, 700, 5000};
+    static const double samples[] = {5, 5.3, 5.9, 8, 11.2, 20, 33.3, 100, 5000};
     static const double times[] = {1e-4, 3e-2};
     double worst = 0;
     for (int separation = 0; separation < 2; separation++)
@@ -45,7 +45,7 @@ static void without_noise_five_samples_give_e_and_contact_time(void **state) {
                     .offset = 0.7,
                     .scale = i % 2 == 0 ? 40 : -0.02,
                 };
-                const size_t trials = samples[j] < 200 ? 8 : 1;
+                const size_t trials = samples[j] < 50 ? 6 : 1;
                 const TraceScore score = traces_score(&cell, 3, trials);
                 if (!(score.figures == trials && score.doubtful == 0 && score.worst < 0.002 &&
                       score.worst_restitution < 0.01 && score.covered_all == 1)) {
@@ -64,10 +64,10 @@ static void stated_intervals_cover_the_truth(void **state) {
         int separation;
         double restitution, samples, noise;
     } cells[] = {
-        {0, 0.3, 8.4, 0.01},  {0, 0.5, 8, 0.02},    {0, 0.5, 20, 0.02},   {0, 0.7, 12.3, 0.05},
-        {0, 0.95, 8, 0.05},   {0, 0.8, 60.5, 0.03}, {0, 0.1, 20.6, 0.02}, {1, 0.3, 8, 0.02},
-        {1, 0.5, 8.6, 0.05},  {1, 0.5, 20, 0.01},   {1, 0.7, 15.2, 0.03}, {1, 0.95, 20, 0.05},
-        {1, 0.3, 40.3, 0.05}, {1, 0.1, 50, 0.01},
+        {0, 0.3, 8.4, 0.01}, {0, 0.5, 8, 0.02},    {0, 0.5, 20, 0.02},   {0, 0.7, 12.3, 0.05},
+        {0, 0.95, 8, 0.05},  {0, 0.8, 40.5, 0.03}, {0, 0.1, 20.6, 0.05}, {1, 0.3, 8, 0.02},
+        {1, 0.5, 8.6, 0.05}, {1, 0.5, 20, 0.01},   {1, 0.7, 15.2, 0.03}, {1, 0.95, 20, 0.05},
+        {1, 0.1, 30, 0.01},
     };
     for (size_t i = 0; i < COUNT(cells); i++) {
         const TraceCell cell = {
@@ -105,29 +105,33 @@ static void too_few_samples_give_an_interval_that_holds_the_truth(void **state) 
                         .before = 12,
                     };
                     const TraceScore score = traces_score(&cell, 11, 100);
-                    if (score.figures > 0 || score.covered_all < 0.95) {
+                    // Now and then nothing is seen at all.
+                    if (score.figures > 0 ||
+                        score.covered_all < 0.98 * (double)score.found / (double)score.trials) {
                         print_score(&cell, &score);
-                        fail_msg("%zu figures", score.figures);
+                        fail_msg("%zu figures, %.3f below, %.3f above, %zu found", score.figures,
+                                 score.below, score.above, score.found);
                     }
                 }
 }
 
-// The contact force of the first impact on the stop of a structure so slow that its spring does
-// nothing in a contact, by the exact solver.
+// The contact force of the first impact on the stop of a structure so slow that its spring
+// does nothing in a contact, by the exact solver.
 static void simulate(double restitution, double contact_time, int separation, Closeup *closeup) {
     Simulation simulation;
     scene_with_damper(&simulation, restitution, contact_time);
     Scene *scene = &simulation.scene;
     StructureSdof *sdof = (StructureSdof *)(void *)scene->structure;
-    const double omega = 2 * 3.14159265358979 / (1000 * contact_time);
+    const double omega = 2 * 3.14159265358979 / (1e5 * contact_time);
     sdof->stiffness = sdof->mass * omega * omega;
     sdof->damping = 0;
-    scene->dampers.at[0].buffer.contact.separation = separation;
-    scene->duration = 250 * contact_time;
-    scene->sample_rate = 2 / contact_time;
+    scene_choose(&scene->contact, &contact_kinds, "spring_damper");
+    ((Contact *)(void *)scene->contact)->separation = separation;
+    scene->duration = 25000 * contact_time;
+    scene->sample_rate = 0.02 / contact_time;
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(simulation_complete(&simulation, NULL, &problem), STATUS_OK);
+    assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(closeup_make(&simulation, 1, 20001, NULL, NULL, NULL, closeup, &problem),
                      STATUS_OK);
     fields_clear(simulation_fields, &simulation);
@@ -177,7 +181,10 @@ static void what_the_core_simulates_is_read_back(void **state) {
                         fail_msg("%s, e %g, T_c %g at %g samples: %g, %g", rule(separation),
                                  restitutions[i], times[j], rates[k], contact->contact_time,
                                  contact->restitution);
-                    assert_true(fabs(fabs(contact->impulse) / closeup.impact.impulse - 1) < 0.005);
+                    if (!(fabs(fabs(contact->impulse) / closeup.impact.impulse - 1) < 0.005))
+                        fail_msg("%s, e %g, T_c %g at %g samples: impulse %g is %g",
+                                 rule(separation), restitutions[i], times[j], rates[k],
+                                 closeup.impact.impulse, contact->impulse);
                     worst = fmax(worst, off);
                     trace_reading_clear(&reading);
                 }

@@ -25,7 +25,7 @@ static void assert_near(double is, double should, double within) {
 static void evaluate(const DropTest *test, Separation separation) {
     const Measurement one = {COUNT_ABSENT, test};
     problem_clear(&problem);
-    const Status status = evaluation_make(&one, 1, separation, &evaluation, &problem);
+    const Status status = evaluation_make(&one, 1, separation, NULL, &evaluation, &problem);
     if (status != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
@@ -304,7 +304,7 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
          "[{\"contact_time\": 0.002}]}",
          &other);
     const Measurement tests[] = {{4, &one}, {7, &other}};
-    assert_int_equal(evaluation_make(tests, 2, SEPARATION_ZERO_FORCE, &evaluation, &problem),
+    assert_int_equal(evaluation_make(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
                      STATUS_OK);
     assert_true(is_warned("/measurements/7", "another pair of masses"));
     assert_int_equal(evaluation.rows.at[1].measurement, 7);
@@ -317,8 +317,9 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
     for (size_t i = 0; i < COUNT(all); i++)
         all[i] = (Measurement){i + 1, &many};
     problem_clear(&problem);
-    assert_int_equal(evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, &evaluation, &problem),
-                     STATUS_LIMIT);
+    assert_int_equal(
+        evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+        STATUS_LIMIT);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &one);
     fields_clear(drop_test_fields, &other);

@@ -185,6 +185,62 @@ static void no_trend_is_shown_in_one_of_twenty_without_one(void **state) {
     }
 }
 
+static void sure_readings_weigh_more(void **state) {
+    (void)state;
+    const double values[] = {0.60, 0.62, 0.70, 0.59, 0.66}, u[] = {0.01, 0.02, 0.1, 0.02, 0.08};
+    double weights = 0, sum = 0;
+    for (size_t i = 0; i < 5; i++) {
+        readings[i] = (Reading){.value = values[i], .uncertainty = u[i], .speed = (double)NAN};
+        weights += 1 / (u[i] * u[i]);
+        sum += values[i] / (u[i] * u[i]);
+    }
+    assert_int_equal(quantity_make(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
+    assert_near(quantity.scatter, 0, 0);
+    assert_near(quantity.mean, sum / weights, 1e-15);
+    assert_near(quantity.unweighted_mean, 3.17 / 5, 1e-15);
+    quantity_clear(&quantity);
+    // Readings that differ by far more than they state: the scatter is their own, all weigh alike.
+    for (size_t i = 0; i < 5; i++)
+        readings[i].uncertainty = 1e-4 * (double)(1 + i);
+    assert_int_equal(quantity_make(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
+    assert_near(quantity.mean, quantity.unweighted_mean, 1e-5);
+    assert_near(quantity.scatter, quantity.deviation, 1e-4);
+    quantity_clear(&quantity);
+    // Below four there is too little to tell scatter by.
+    assert_int_equal(quantity_make(readings, 3, "e", "", &quantity, &problem), STATUS_OK);
+    assert_near(quantity.mean, 1.92 / 3, 1e-15);
+    assert_true(isnan(quantity.scatter));
+    quantity_clear(&quantity);
+}
+
+// Noise that is ten times larger for the slow ones, as a ruler has it, and stated.
+static void uneven_noise_makes_no_trends(void **state) {
+    (void)state;
+    static const size_t counts[] = {6, 20};
+    uint64_t next = 0;
+    for (size_t c = 0; c < COUNT(counts); c++) {
+        int shown = 0, held = 0;
+        for (int trial = 0; trial < 1000; trial++) {
+            for (size_t i = 0; i < counts[c]; i++) {
+                const double speed = 0.3 + 0.7 * (double)i / (double)counts[c];
+                const double noise = 0.005 / (speed * speed);
+                readings[i] = (Reading){.value = 0.6 + noise * drops_noise(13, &next),
+                                        .uncertainty = noise,
+                                        .speed = speed};
+            }
+            assert_int_equal(quantity_make(readings, counts[c], "e", "", &quantity, &problem),
+                             STATUS_OK);
+            shown += quantity.trend.verdict == TREND_NOT_CONSTANT ? 1 : 0;
+            held += quantity.low <= 0.6 && 0.6 <= quantity.high ? 1 : 0;
+            quantity_clear(&quantity);
+        }
+        print_message("%zu uneven readings: a trend in %d, the mean held in %d of 1000\n",
+                      counts[c], shown, held);
+        assert_in_range(shown, 25, 80);
+        assert_in_range(held, 920, 980);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mean_and_interval_are_those_of_the_t_test),
@@ -196,6 +252,8 @@ int main(void) {
         cmocka_unit_test(a_trend_makes_no_outliers),
         cmocka_unit_test(good_samples_seldom_have_outliers),
         cmocka_unit_test(no_trend_is_shown_in_one_of_twenty_without_one),
+        cmocka_unit_test(sure_readings_weigh_more),
+        cmocka_unit_test(uneven_noise_makes_no_trends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -54,7 +54,7 @@ static void propose(const char *const *texts, size_t count, ProposalForm form) {
         tests[i] = (Measurement){10 + i, &tests_read[i]};
     }
     assert_int_equal(
-        evaluation_make(tests, count, SEPARATION_ZERO_PENETRATION, &evaluation, &problem),
+        evaluation_make(tests, count, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
     assert_int_equal(proposal_make(&evaluation, tests, count, &before, form, &proposal, &problem),
                      STATUS_OK);

@@ -13,6 +13,7 @@
 #include "core/study/inquiry.h"
 #include "core/study/sensitivity.h"
 #include "core/study/sensitivity_change.h"
+#include "core/study/sensitivity_spread.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
@@ -179,6 +180,63 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     inquiry_clear(&inquiry);
 }
 
+// Two stops, each with a material of its own.
+static Inquiry inquiry_of_materials(void) {
+    Inquiry inquiry = inquiry_make(0.6, 0.025, 1);
+    Damper *damper = &inquiry.simulation.scene.dampers.at[0];
+    assert_int_equal(fields_copy(buffer_fields, &damper->buffer, &damper->left_buffer), STATUS_OK);
+    buffer_move(&damper->right_buffer, &damper->buffer);
+    damper->left_buffer.material = strdup("felt@2");
+    damper->right_buffer.material = strdup("cork@1");
+    damper->left_buffer.test.restitution_deviation = 0.05;
+    damper->right_buffer.test.contact_time_deviation = 0.2;
+    return inquiry;
+}
+
+static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_of_materials();
+    SensitivityStudy *study = study_of(&inquiry);
+    study->runs = 40;
+    complete(&inquiry);
+    assert_true(isnan(study->restitution_deviation) && isnan(study->contact_time_deviation));
+    assert_int_equal(study->spread.count, 2);
+    Sensitivity *answer = make(&inquiry);
+    double most[2] = {0};
+    for (size_t i = 0; i < answer->table.count; i++) {
+        const SensitivityDraw *draw = &answer->table.at[i];
+        assert_int_equal(draw->restitution.count, 2);
+        assert_true(draw->contact_time.at[0] == 1 && draw->restitution.at[1] == 1); // they are sure
+        most[0] = fmax(most[0], fabs(draw->restitution.at[0] - 1));
+        most[1] = fmax(most[1], fabs(draw->contact_time.at[1] - 1));
+    }
+    assert_true(most[0] > 0.05 && most[0] < 0.25 && most[1] > 0.2 && most[1] < 1);
+    assert_int_equal(answer->spread.count, 2);
+    assert_string_equal(answer->spread.at[0].source, "felt@2");
+    assert_int_equal(answer->spread.at[1].buffer, SENSITIVITY_RIGHT);
+    // And so are what follows for k_b and c_b.
+    const SensitivityStop *left = &answer->contact.at[0], *right = &answer->contact.at[1];
+    assert_near(left->stiffness_deviation, fabs(left->stiffness_by_restitution) * 0.05, 1e-15);
+    assert_near(right->stiffness_deviation, fabs(right->stiffness_by_contact_time) * 0.2, 1e-15);
+    clear(&inquiry, answer);
+}
+
+static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
+    (void)state;
+    Inquiry inquiry = inquiry_of_materials();
+    SensitivityStudy *study = study_of(&inquiry);
+    study->restitution_deviation = 0;
+    study->contact_time_deviation = 0.01;
+    complete(&inquiry);
+    assert_int_equal(study->spread.count, 0);
+    for (int place = SENSITIVITY_LEFT; place <= SENSITIVITY_RIGHT; place++) {
+        const SensitivityBuffer buffer = (SensitivityBuffer)place;
+        assert_true(spread_of(study, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
+        assert_true(spread_of(study, 0, buffer, SENSITIVITY_CONTACT_TIME) == 0.01);
+    }
+    inquiry_clear(&inquiry);
+}
+
 static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     (void)state;
     Inquiry inquiry = inquiry_make(0.61, 0.025, 2);
@@ -337,6 +395,8 @@ int main(void) {
         cmocka_unit_test(slopes_are_central_differences_of_the_summary),
         cmocka_unit_test(chaos_is_told_and_its_slopes_do_not_settle),
         cmocka_unit_test(draws_have_the_stated_spread_and_stay_below_one),
+        cmocka_unit_test(each_buffer_is_drawn_by_what_its_material_tells),
+        cmocka_unit_test(a_number_for_all_buffers_wins_over_their_materials),
         cmocka_unit_test(a_drawn_run_is_the_scene_with_its_numbers),
         cmocka_unit_test(the_papers_errors_move_the_response_as_it_is_stated),
         cmocka_unit_test(what_has_no_closed_form_says_why),

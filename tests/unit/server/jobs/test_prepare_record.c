@@ -24,7 +24,7 @@ static Store *store;
 static int store_make(void **state) {
     (void)state;
     scratch_make(folder);
-    return store_open(folder, &store, &problem);
+    return store_open(folder, &store, &problem) == STATUS_OK ? 0 : 1;
 }
 
 static int store_end(void **state) {
@@ -166,7 +166,7 @@ static void without_a_daemon_there_are_no_records(void **state) {
 }
 
 static int fill(void **state) {
-    if (store_make(state) != STATUS_OK)
+    if (store_make(state) != 0)
         return 1;
     add("a", 1);
     add("b", 2);

@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -215,6 +216,7 @@ static void nobody_approves_their_own(void **state) {
 typedef struct Writer {
     Store *store;
     int taken, told, other;
+    atomic_int *of_version; // how many were taken that had seen it
 } Writer;
 
 static void *write_much(void *context) {
@@ -226,6 +228,8 @@ static void *write_much(void *context) {
         if (status == STATUS_OK)
             status = store_material_revise(own->store, &one, now.version, NULL);
         own->taken += status == STATUS_OK;
+        if (status == STATUS_OK)
+            atomic_fetch_add(&own->of_version[now.version], 1);
         own->told += status == STATUS_STALE;
         own->other += status != STATUS_OK && status != STATUS_STALE;
     }
@@ -237,10 +241,11 @@ static void of_eight_writers_each_is_taken_or_told(void **state) {
     Store *store = open_store(folder);
     MaterialRevision one = felt(0.5);
     assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    static atomic_int of_version[8 * 200 + 2];
     pthread_t threads[8];
     Writer writers[8];
     for (int i = 0; i < 8; i++) {
-        writers[i] = (Writer){store, 0, 0, 0};
+        writers[i] = (Writer){store, 0, 0, 0, of_version};
         assert_int_equal(pthread_create(&threads[i], NULL, write_much, &writers[i]), 0);
     }
     uint64_t taken = 0;
@@ -254,6 +259,8 @@ static void of_eight_writers_each_is_taken_or_told(void **state) {
     assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
     assert_int_equal(now.latest, taken + 1);
     assert_int_equal(now.version, taken + 1);
+    for (uint64_t version = 1; version <= taken; version++)
+        assert_int_equal(atomic_load(&of_version[version]), 1);
     store_close(store);
 }
 
@@ -331,8 +338,8 @@ static void no_sql_changes_what_was_said(void **state) {
         "created_unix_ms, document) SELECT material, measurement, 'x', 0, '[]' FROM "
         "material_measurements",
         "INSERT OR REPLACE INTO materials (slug) VALUES ('felt')",
-        "INSERT OR REPLACE INTO material_trail (material, version, action, why, created_unix_ms) "
-        "SELECT material, version, 'revise', 'x', 0 FROM material_trail",
+        ("INSERT OR REPLACE INTO material_trail (material, version, action, why, created_unix_ms) "
+         "SELECT material, version, 'revise', 'x', 0 FROM material_trail"),
         "UPDATE material_states SET restitution = 0.9",
         "DELETE FROM material_states",
         "INSERT INTO material_states (slug) VALUES ('felt')"};
@@ -415,11 +422,16 @@ static void check_migrated(Store *store) {
     assert_int_equal(store_material_revise(store, &next, 5, NULL), STATUS_OK);
     assert_int_equal(next.revision, 3);
     MaterialRevisions heads;
-    assert_int_equal(store_materials(store, &heads, NULL), STATUS_OK);
+    assert_int_equal(store_material_heads(store, "", 100, &heads, NULL), STATUS_OK);
     assert_int_equal(heads.count, 5);
     for (size_t i = 0; i < heads.count; i++)
         assert_string_equal(heads.at[i].status, "approved");
     material_revisions_clear(&heads);
+    Texts slugs;
+    assert_int_equal(store_material_slugs(store, &slugs, NULL), STATUS_OK);
+    assert_int_equal(slugs.count, 5);
+    assert_string_equal(slugs.at[4], "sponge");
+    material_slugs_clear(&slugs);
 }
 
 static void a_database_of_each_step_before_goes_on(void **state) {

@@ -258,7 +258,7 @@ static void there_are_only_so_many(void **state) {
     assert_int_equal(add(store, "one_more", 1, NULL, &is_there), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "20000 records"));
     for (int i = 1; i <= 3; i++) {
-        char name[8];
+        char name[16];
         snprintf(name, sizeof name, "n%d", i);
         assert_int_equal(store_record_delete(store, name, &uses, &problem), STATUS_OK);
     }
