@@ -313,7 +313,7 @@ def test_what_is_no_file_of_materials_is_refused():
         problem(bring(daemon, {"format": "impactd-materials", "version": 1, "materials": [5, {"slug": "x"}]}), 422, "/materials/0", "/materials/1")
         problem(bring(daemon, b'{"format": "impactd-materials", "version": 1, "materials": [{"slug": "x"},]}'), 400)
         problem(bring(daemon, b"{" * 40), 400)
-        assert json.loads(export(daemon))["materials"].__len__() == 5
+        assert len(json.loads(export(daemon))["materials"]) == 5
 
 
 def test_who_may_bring_what():
