@@ -49,9 +49,13 @@ def test_round_trips_are_the_same_bytes():
         made = daemon.request("POST", "/v1/materials/sponge/revisions", headers={"If-Match": sponge.headers["etag"]},
                               json={"name": "Sponge", "restitution": 0.6, "source": "again", "comment": "measured anew"})
         assert made.status == 201, made
+        made = daemon.request("POST", "/v1/materials/sponge/measurements", json={
+            "comment": "by hand", "impactor": "ball, \"30 mm\"", "drops": [{"drop_height": 0.05, "rebound_height": 0.018}]})
+        assert made.status == 201, made
         text, table = export(daemon), export(daemon, "csv")
     back = said(json.loads(text))
     assert back["sponge"]["revisions"][1]["comment"] == "measured anew"
+    assert back["sponge"]["measurements"][0]["test"]["impactor"] == 'ball, "30 mm"'
     for one in document["materials"]:
         there = back[one["slug"]]
         assert len(there["revisions"]) == len(one["revisions"])
@@ -309,7 +313,7 @@ def test_what_is_no_file_of_materials_is_refused():
         problem(bring(daemon, {"format": "impactd-materials", "version": 1, "materials": [5, {"slug": "x"}]}), 422, "/materials/0", "/materials/1")
         problem(bring(daemon, b'{"format": "impactd-materials", "version": 1, "materials": [{"slug": "x"},]}'), 400)
         problem(bring(daemon, b"{" * 40), 400)
-        assert json.loads(export(daemon))["materials"].__len__() == 5
+        assert len(json.loads(export(daemon))["materials"]) == 5
 
 
 def test_who_may_bring_what():
@@ -384,6 +388,10 @@ def test_imports_beside_revisions():
         with concurrent.futures.ThreadPoolExecutor(8) as pool:
             revised = list(pool.map(revise, range(100)))
             works = [pool.submit(add if i % 2 else revise, i) for i in range(100, 300)]
+            # An export amid them is of one moment: nothing in it is new, and no number is missing.
+            for kind in ("json", "csv") * 4:
+                whole = bring(daemon, export(daemon, kind), dry=True).json()
+                assert whole["revisions"]["added"] == 0, whole
             told = [work.result() for work in works]
         assert set(revised) <= {201, 412} and set(told) <= {200, 201, 412, 422}, (set(revised), set(told))
         done = sum(code in (200, 201) for code in revised + told)

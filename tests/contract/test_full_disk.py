@@ -62,6 +62,9 @@ def test_a_full_disk_stops_writes_alone():
                                ("/sponge@1/review", {"status": "deprecated", "reason": "x"}),
                                ("/sponge/measurements", {"drops": [{"contact_time": 0.001}]})):
                 assert daemon.request("POST", "/v1/materials" + path, json=body, headers={"If-Match": "*"}).status == 507, path
+            table = "slug,name,source,restitution\n" + "".join(f"m{i},M,s,0.5\n" for i in range(2000))
+            assert daemon.request("POST", "/v1/materials/import", body=table, headers={"Content-Type": "text/csv"}).status == 507
+            assert len(daemon.get("/v1/materials.json").json()["materials"]) == 5
             assert daemon.get("/v1/materials/sponge/history").json()["version"] == 2
             for path in (f"/v1/jobs/{before['id']}", "/v1/jobs", f"/v1/results/{before['result']}",
                          f"/v1/results/{before['result']}/series.npy", f"/v1/results/{before['result']}/psd.json",

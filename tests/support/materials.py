@@ -41,7 +41,7 @@ def revision_of(draw, number, measurements):
     if draw.random() < 0.5:
         said["kind"] = draw.choice(["foam", "rubber"])
     if draw.random() < 0.5:
-        said["tags"] = [draw.choice(ODD) for _ in range(draw.randint(1, 4))]
+        said["tags"] = ["%s%d" % (draw.choice(ODD), i) for i in range(draw.randint(1, 4))]
     if draw.random() < 0.4:
         said["table"] = [{"approach_speed": 0.1 * (i + 1), "restitution": draw.random(), "contact_time": draw.uniform(1e-4, 1e-2)}
                          for i in range(draw.randint(2, 5))]

@@ -70,7 +70,7 @@ static void faults_are_told_at_their_places_and_nothing_is_written(void **state)
          "\"\"reason\"\": \"\"r\"\"}, {\"\"status\"\": \"\"deprecated\"\", \"\"reason\"\": "
          "\"\"r\"\"}]\"",
          "/2/reviews/1/status"},
-        {"slug,row,name\nx,measurement,X", "/2/name"},
+        {"slug,row,name\nsponge,measurement,X", "/2/name"},
         {"{\"format\": \"other\", \"version\": 1, \"materials\": []}", "/format"},
     };
     Store *store = open_store();
