@@ -62,8 +62,8 @@ __attribute__((format(printf, 2, 3))) static Status tell(char **why, const char 
 static double hidden(double level, int separation, double *before) {
     double most = 0;
     *before = 0;
-    for (int i = 0; i <= 12; i++) {
-        const TraceShape shape = trace_shape(i / 4.0, 0, separation);
+    for (int i = 0; i <= 4; i++) {
+        const TraceShape shape = trace_shape(i * 0.75, 0, separation);
         const TraceVisible visible = trace_shape_visible(&shape, fmin(level, 0.95));
         const double seen = fmax(visible.to - visible.from, 0.02);
         most = fmax(most, (1 - seen) / seen);

@@ -109,11 +109,13 @@ double trace_shape_impulse(const TraceShape *shape) {
 TraceVisible trace_shape_visible(const TraceShape *shape, double level) {
     enum { PLACES = 400 };
     TraceVisible visible = {.from = shape->length};
-    double peak = 0;
-    for (int i = 0; i <= PLACES; i++)
-        peak = fmax(peak, trace_shape_force(shape, shape->length * i / PLACES));
+    double forces[PLACES + 1], peak = 0;
     for (int i = 0; i <= PLACES; i++) {
-        const double s = shape->length * i / PLACES, force = trace_shape_force(shape, s);
+        forces[i] = trace_shape_force(shape, shape->length * i / PLACES);
+        peak = fmax(peak, forces[i]);
+    }
+    for (int i = 0; i <= PLACES; i++) {
+        const double s = shape->length * i / PLACES, force = forces[i];
         if (fabs(force) < level * peak)
             continue;
         visible.from = fmin(visible.from, s);

@@ -9,24 +9,32 @@
 #include "core/contact/identify.h"
 #include "core/measure/trace.h"
 
-double traces_force(double restitution, double contact_time, int separation, double time) {
+static double force_of(const Identified *pair, double contact_time, double time) {
     if (time < 0 || time > contact_time)
         return 0;
-    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
-    const double w = sqrt(pair.stiffness), Z = pair.damping_ratio;
+    const double w = sqrt(pair->stiffness), Z = pair->damping_ratio;
     const double root = w * sqrt(fabs(1 - Z * Z)), fall = exp(-Z * w * time);
     const double sine = Z < 1 ? sin(root * time) : sinh(root * time);
     const double cosine = Z < 1 ? cos(root * time) : cosh(root * time);
     const double y = fall * sine / root, speed = fall * (cosine - Z * w / root * sine);
-    return pair.stiffness * y + pair.damping * speed;
+    return pair->stiffness * y + pair->damping * speed;
+}
+
+static double peak_of(const Identified *pair, double contact_time) {
+    double peak = 0;
+    for (int i = 0; i <= 2000; i++)
+        peak = fmax(peak, force_of(pair, contact_time, contact_time * i / 2000));
+    return peak;
+}
+
+double traces_force(double restitution, double contact_time, int separation, double time) {
+    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
+    return force_of(&pair, contact_time, time);
 }
 
 double traces_peak(double restitution, double contact_time, int separation) {
-    double peak = 0;
-    for (int i = 0; i <= 2000; i++)
-        peak = fmax(peak,
-                    traces_force(restitution, contact_time, separation, contact_time * i / 2000));
-    return peak;
+    const Identified pair = identify_measured(1, restitution, contact_time, (Separation)separation);
+    return peak_of(&pair, contact_time);
 }
 
 static double uniform(uint64_t seed, uint64_t trial, uint32_t which) {
@@ -49,11 +57,12 @@ double *traces_draw(const TraceCell *cell, uint64_t seed, uint64_t trial, size_t
     // Just before the sample, so that an end on a sample is over there.
     const double phase = cell->is_on_grid ? -1e-9 : uniform(seed, trial, 1);
     const double start = (ceil(before) + phase) * interval;
-    const double peak = traces_peak(cell->restitution, cell->contact_time, cell->separation);
+    const Identified pair =
+        identify_measured(1, cell->restitution, cell->contact_time, (Separation)cell->separation);
+    const double peak = peak_of(&pair, cell->contact_time);
     const double scale = cell->scale != 0 ? cell->scale : 1;
     for (size_t i = 0; i < *count; i++) {
-        const double pulse = traces_force(cell->restitution, cell->contact_time, cell->separation,
-                                          (double)i * interval - start);
+        const double pulse = force_of(&pair, cell->contact_time, (double)i * interval - start);
         force[i] = scale * (cell->noise * force[i] + pulse / peak + cell->offset +
                             cell->drift * (double)i / (double)*count);
     }
