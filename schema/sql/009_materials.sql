@@ -63,10 +63,10 @@ CREATE TABLE material_measurements (
     author           TEXT,
     comment          TEXT    NOT NULL,
     created_unix_ms  INTEGER NOT NULL,
-    -- For lists, which do not read the document, large as it may be: they lie before it.
-    drops            INTEGER NOT NULL AS (coalesce(json_array_length(document, '$.drops'), 0)) STORED,
-    traces           INTEGER NOT NULL AS (coalesce(json_array_length(document, '$.traces'), 0)) STORED,
-    head             TEXT    NOT NULL AS (json_remove(document, '$.drops', '$.traces')) STORED,
+    -- Of the document, for lists that do not read it, large as it may be: they lie before it.
+    drops            INTEGER NOT NULL,
+    traces           INTEGER NOT NULL,
+    head             TEXT    NOT NULL,
     document         TEXT    NOT NULL,
     UNIQUE (material, measurement)
 ) STRICT;
