@@ -57,7 +57,7 @@ const Field drop_test_fields[] = {
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one contact time"),
     FIELD_LIST(DropTest, drops, drop_fields, DROPS_MOST, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
-    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
     FIELD_END
 };
 // clang-format on

@@ -321,13 +321,51 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
         evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
         STATUS_LIMIT);
     evaluation_clear(&evaluation);
+    // Two tests of the most samples go together, many do not; what is there is not looked at.
+    double nothing[8] = {0};
+    Trace trace = {.interval = 1e-3, .force = {nothing, TRACE_SAMPLES_MOST}};
+    const DropTest large = {.traces = {&trace, 1}};
+    assert_int_equal(drop_test_samples(&large), TRACE_SAMPLES_MOST);
+    for (size_t i = 0; i < COUNT(all); i++)
+        all[i].test = &large;
+    assert_true(evaluation_samples(all, 2) <= EVALUATION_SAMPLES_MOST);
+    problem_clear(&problem);
+    assert_int_equal(
+        evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+        STATUS_LIMIT);
+    evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &one);
     fields_clear(drop_test_fields, &other);
     fields_clear(drop_test_fields, &many);
 }
 
+static bool refuse_third(void *context, double fraction) {
+    (void)fraction;
+    return ++*(int *)context < 3;
+}
+
+static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
+    (void)state;
+    DropTest test;
+    read("{\"gravity\": 9.81, \"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.5, "
+         "\"contact_time\": 0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5, "
+         "\"contact_time\": "
+         "0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5}]}",
+         &test);
+    int asked = 0;
+    const Watch watch = {&asked, refuse_third};
+    const Measurement one = {COUNT_ABSENT, &test};
+    assert_int_equal(
+        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, &watch, &evaluation, &problem),
+        STATUS_CANCELLED);
+    assert_int_equal(asked, 3);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &test);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gravity_is_taken_out_only_while_somebody_waits),
         cmocka_unit_test(simulated_drops_give_back_e_and_contact_time),
         cmocka_unit_test(gravity_is_taken_out_of_drops_that_say_it),
         cmocka_unit_test(the_effect_of_gravity_is_told_where_it_is_left_in),
