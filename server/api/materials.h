@@ -40,8 +40,4 @@ Status material_separation(App *app, const Request *request, int *separation, Pr
 Status material_evaluate(Patience *patience, const Measurement *tests, size_t count, int separation,
                          Evaluation *evaluation, Reply *reply, Problem *problem);
 
-// A text and a time as members behind others: NULL and 0 are null.
-void material_put_text(Bytes *bytes, const char *name, const char *text);
-void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
-
 #endif

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
+#include "server/materials/catalogue.h"
 
 void stored_test_clear(StoredTest *stored) {
     material_measurement_clear(&stored->row);
@@ -36,19 +36,12 @@ Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredT
     return status;
 }
 
-static void put_text(Bytes *bytes, const char *name, const char *text) {
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, text);
-}
-
 void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row) {
-    char created[32];
-    clock_rfc3339(row->created_unix_ms, created);
     bytes_format(bytes, "\"slug\": \"%s\", \"measurement\": %llu", row->slug,
                  (unsigned long long)row->measurement);
-    put_text(bytes, "author", row->author);
-    put_text(bytes, "comment", row->comment);
-    put_text(bytes, "created", created);
+    material_put_text(bytes, "author", row->author);
+    material_put_text(bytes, "comment", row->comment);
+    material_put_time(bytes, "created", row->created_unix_ms);
 }
 
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {

@@ -29,8 +29,6 @@ typedef struct MaterialRevisions {
     size_t count;
 } MaterialRevisions;
 void material_revision_clear(MaterialRevision *revision);
-// STATUS_NO_MEMORY, and then it is clear. `copy` may be uninitialised.
-Status material_revision_copy(const MaterialRevision *revision, MaterialRevision *copy);
 
 // How far a material has come.
 typedef struct MaterialState {
@@ -143,8 +141,8 @@ Status store_result_uses(Store *store, const char *name, size_t most, int64_t be
 // The first revision of a new material. STATUS_CONFLICT where the slug is taken. Slug, material,
 // lists, author, comment and created_unix_ms are read.
 Status store_material_add(Store *store, const MaterialRevision *first, Problem *problem);
-// Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above.
-// STATUS_INVALID where a measurement that it names is not there is its caller's to find.
+// Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above. That
+// the measurements that it names are there is for the caller to see to.
 Status store_material_revise(Store *store, MaterialRevision *revision, uint64_t version,
                              Problem *problem);
 // STATUS_CONFLICT where the revision has that status already; STATUS_FORBIDDEN where its author,

@@ -233,5 +233,7 @@ static Status measure(Database *database, const void *work, Problem *problem) {
 
 Status store_material_measure(Store *store, MaterialMeasurement *measurement, uint64_t version,
                               Problem *problem) {
-    return write(store, measure, &(Measure){measurement, version}, problem);
+    TRY(store_write(store, measure, &(Measure){measurement, version}, problem));
+    store_material_measured(store);
+    return STATUS_OK;
 }
