@@ -8,7 +8,7 @@
 
 enum { DROPS_MOST = 1000, TRACES_MOST = 100, TRACE_SAMPLES_MOST = 1 << 20 };
 
-// What a height's speed is worth where a test does not say what pulls [m/s^2].
+// By which a height is worth a speed, whatever pulls during contact [m/s^2].
 #define STANDARD_GRAVITY 9.80665
 
 // One impact as it was read: heights or speeds, a duration, or some of them. Not known: NAN.
@@ -64,7 +64,7 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
 
 // What a drop says of its speeds [m/s]: as read, else by its heights; relative to the base. NAN
 // where nothing tells. A free base takes part of a rebound: heights then need both masses.
-double drop_approach(const DropTest *test, const Drop *drop);
+double drop_approach(const Drop *drop);
 double drop_rebound(const DropTest *test, const Drop *drop);
 
 // Of the test's pair; NAN where its masses are not known [kg].
