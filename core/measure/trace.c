@@ -312,10 +312,9 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
     if (way->gravity > 0)
         pull_window(way, number, interval, fabs(run->peak), window);
     TRY(fit_contact(window, found, run, &stretch, interval, contact));
-    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time)) {
+    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
                                    "nor the masses are known");
-    }
     return STATUS_OK;
 }
 
