@@ -144,6 +144,9 @@ def test_a_force_trace_gives_back_what_was_simulated():
             assert revision["separation"] == rule and revision["least_speed"] == 0.5, revision
             row = asked["evaluation"]["rows"][0]
             assert row["from"] == "trace 1, contact 1" and row["contact_time_by"] == "pulse", row
+            seen = row["contact"]
+            assert row["trace"] == 1 and len(seen["pulse"]) == 33 and seen["start"] < seen["end"], seen
+            assert 0 < seen["crossing_time"] <= 1.05 * row["contact_time"] and 0 <= seen["crossing_shortfall"] < 0.6, seen
             assert row["least_contact_time"] < row["contact_time"] < row["most_contact_time"], row
 
 
