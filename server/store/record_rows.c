@@ -106,13 +106,9 @@ static Status first(Database *database, const char *sql, const Key *key, const R
     return status;
 }
 
-static bool same(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 // In what a record that is there differs from one that is to be; NULL: in nothing.
 static const char *difference(const RecordRow *there, const RecordRow *row) {
-    if (!same(there->digest, row->digest))
+    if (!text_same(there->digest, row->digest))
         return "samples or another interval";
     const struct {
         const char *what, *there, *given;
@@ -128,7 +124,7 @@ static const char *difference(const RecordRow *there, const RecordRow *row) {
         {"stated unit", there->stated_unit, row->stated_unit},
     };
     for (size_t i = 0; i < COUNT(words); i++)
-        if (!same(words[i].there, words[i].given))
+        if (!text_same(words[i].there, words[i].given))
             return words[i].what;
     return NULL;
 }

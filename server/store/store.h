@@ -53,6 +53,10 @@ void store_settle(Store *store);
 // is durable.
 uint64_t store_generation(Store *store);
 void store_catalogue_changed(Store *store);
+// Rises with that, and when a material was measured: its version is another one then, what its name
+// means is not.
+uint64_t store_deeds(Store *store);
+void store_material_measured(Store *store);
 
 // What was written since the start; counted on.
 typedef struct StoreTotals {
