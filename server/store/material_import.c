@@ -254,7 +254,10 @@ Status store_material_import(Store *store, const MaterialImport *import, bool is
         return judge_all(store, &walk, problem);
     walk.writes = true;
     TRY(store_write(store, write_all, &walk, problem));
-    store_catalogue_changed(store);
+    if (tally->revisions.added + tally->reviews.added > 0)
+        store_catalogue_changed(store);
+    else if (tally->measurements.added > 0)
+        store_material_measured(store);
     return STATUS_OK;
 }
 
