@@ -188,6 +188,34 @@ static Status check_drops(const DropTest *test, const char *pointer, Problem *pr
     return status;
 }
 
+size_t drop_test_samples(const DropTest *test) {
+    size_t samples = 0;
+    for (size_t i = 0; i < test->traces.count; i++)
+        samples += test->traces.at[i].force.count;
+    return samples;
+}
+
+static Status check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    for (size_t i = 0; i < test->traces.count; i++) {
+        const Trace *of = &test->traces.at[i];
+        pointer_index(trace, sizeof trace, traces, i);
+        pointer_join(place, sizeof place, trace, "force");
+        if (of->excluded == NULL && !problem_concerns(problem, trace) &&
+            trace_check(of->interval, &of->force, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    const size_t samples = drop_test_samples(test);
+    if (samples > TRACE_SAMPLES_MOST)
+        status = problem_add(problem, STATUS_INVALID, traces,
+                             "must have at most %d samples in all, have %zu: cut them to the "
+                             "contacts, or send them as several measurements",
+                             TRACE_SAMPLES_MOST, samples);
+    return status;
+}
+
 static Status check_base(const DropTest *test, const char *pointer, Problem *problem) {
     if (has(test->base_mass) && test->base != MATERIAL_BASE_FREE)
         return add(problem, pointer, "base_mass", test->base_mass, "kg",
@@ -219,6 +247,8 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
         status = problem_put(problem, STATUS_INVALID, &fault);
     }
     if (check_base(test, pointer, problem) != STATUS_OK)
+        status = STATUS_INVALID;
+    if (check_traces(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;
     return check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
 }

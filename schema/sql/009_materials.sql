@@ -63,6 +63,10 @@ CREATE TABLE material_measurements (
     author           TEXT,
     comment          TEXT    NOT NULL,
     created_unix_ms  INTEGER NOT NULL,
+    -- Of the document, for lists that do not read it, large as it may be: they lie before it.
+    drops            INTEGER NOT NULL,
+    traces           INTEGER NOT NULL,
+    head             TEXT    NOT NULL,
     document         TEXT    NOT NULL,
     UNIQUE (material, measurement)
 ) STRICT;

@@ -174,6 +174,20 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
                        (unsigned long long)number, slug);
 }
 
+Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
+                             MaterialBriefs *briefs, Problem *problem) {
+    static const char sql[] =
+        "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head, t.drops, "
+        "t.traces FROM material_measurements t JOIN materials m ON m.number = t.material WHERE "
+        "m.slug = :slug AND t.measurement < :number ORDER BY t.measurement DESC LIMIT :most";
+    const Key key = key_of_page(slug, before, most);
+    return all(store, sql, &key, material_brief_columns, sizeof *briefs->at, briefs, problem);
+}
+
+void material_briefs_clear(MaterialBriefs *briefs) {
+    clear_all(material_brief_columns, sizeof *briefs->at, briefs);
+}
+
 void material_measurement_clear(MaterialMeasurement *measurement) {
     row_clear(material_measurement_columns, measurement, sizeof *measurement);
 }

@@ -78,6 +78,20 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
                                   MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
 
+// A measurement without its readings, which are counted. `document` is the drop test but for them.
+typedef struct MaterialBrief {
+    MaterialMeasurement row;
+    uint64_t drops, traces;
+} MaterialBrief;
+typedef struct MaterialBriefs {
+    MaterialBrief *at;
+    size_t count;
+} MaterialBriefs;
+// Newest first, at most `most` of one material's, those before `before`.
+Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
+                             MaterialBriefs *briefs, Problem *problem);
+void material_briefs_clear(MaterialBriefs *briefs);
+
 typedef struct MaterialDeed {
     uint64_t version;               // of the material after it; what is added gets the next
     char *action;                   // "create", "revise" ...: schema/sql/009_materials.sql

@@ -134,8 +134,10 @@ Status material_measurement_add(Database *database, const MaterialMeasurement *m
                                 Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_measurements (material, measurement, author, comment, "
-        "created_unix_ms, document) SELECT number, :measurement, :author, :comment, "
-        ":created_unix_ms, :document FROM materials WHERE slug = :slug";
+        "created_unix_ms, drops, traces, head, document) SELECT number, :measurement, :author, "
+        ":comment, :created_unix_ms, coalesce(json_array_length(:document, '$.drops'), 0), "
+        "coalesce(json_array_length(:document, '$.traces'), 0), json_remove(:document, '$.drops', "
+        "'$.traces'), :document FROM materials WHERE slug = :slug";
     TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
                        "measurements", problem));
     TRY(take_room(database, length(measurement->comment) + length(measurement->document), problem));
