@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/date.h"
 #include "core/contact/identify.h"
 #include "core/measure/trace.h"
 #include "core/scene/material.h"
@@ -90,59 +91,6 @@ double drop_rebound(const DropTest *test, const Drop *drop) {
         return rise;
     const double m = test->impactor_mass, M = test->base_mass;
     return (m * drop_approach(test, drop) + (m + M) * rise) / M;
-}
-
-// The days of a month, from 1.
-static int days_of(int year, int month) {
-    static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
-    const bool is_leap = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
-    return days[month - 1] + (month == 2 && is_leap ? 1 : 0);
-}
-
-// `size` digits as a number; -1 if they are none.
-static int digits(const char *text, size_t size) {
-    int value = 0;
-    for (size_t i = 0; i < size; i++) {
-        if (text[i] < '0' || text[i] > '9')
-            return -1;
-        value = 10 * value + (text[i] - '0');
-    }
-    return value;
-}
-
-static bool is_clock(const char *text) { // "09:30", on its own or with what follows
-    if (digits(text, 2) < 0 || digits(text, 2) > 23 || text[2] != ':')
-        return false;
-    return digits(text + 3, 2) >= 0 && digits(text + 3, 2) < 60;
-}
-
-// RFC 3339: a date, or one with a time of day and its distance from UTC.
-static bool is_date(const char *text) {
-    const int year = digits(text, 4);
-    if (year < 0 || text[4] != '-')
-        return false;
-    const int month = digits(text + 5, 2);
-    if (month < 1 || month > 12 || text[7] != '-')
-        return false;
-    const int day = digits(text + 8, 2);
-    if (day < 1 || day > days_of(year, month))
-        return false;
-    text += 10;
-    if (*text == '\0')
-        return true;
-    if ((*text != 'T' && *text != ' ') || !is_clock(text + 1) || text[6] != ':' ||
-        digits(text + 7, 2) < 0 || digits(text + 7, 2) > 60)
-        return false;
-    text += 9;
-    if (*text == '.') {
-        const size_t size = strspn(text + 1, "0123456789");
-        if (size == 0)
-            return false;
-        text += 1 + size;
-    }
-    if (*text == 'Z')
-        return text[1] == '\0';
-    return (*text == '+' || *text == '-') && is_clock(text + 1) && text[6] == '\0';
 }
 
 static Status add(Problem *problem, const char *pointer, const char *name, double value,
@@ -240,6 +188,34 @@ static Status check_drops(const DropTest *test, const char *pointer, Problem *pr
     return status;
 }
 
+size_t drop_test_samples(const DropTest *test) {
+    size_t samples = 0;
+    for (size_t i = 0; i < test->traces.count; i++)
+        samples += test->traces.at[i].force.count;
+    return samples;
+}
+
+static Status check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    for (size_t i = 0; i < test->traces.count; i++) {
+        const Trace *of = &test->traces.at[i];
+        pointer_index(trace, sizeof trace, traces, i);
+        pointer_join(place, sizeof place, trace, "force");
+        if (of->excluded == NULL && !problem_concerns(problem, trace) &&
+            trace_check(of->interval, &of->force, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    const size_t samples = drop_test_samples(test);
+    if (samples > TRACE_SAMPLES_MOST)
+        status = problem_add(problem, STATUS_INVALID, traces,
+                             "must have at most %d samples in all, have %zu: cut them to the "
+                             "contacts, or send them as several measurements",
+                             TRACE_SAMPLES_MOST, samples);
+    return status;
+}
+
 static Status check_base(const DropTest *test, const char *pointer, Problem *problem) {
     if (has(test->base_mass) && test->base != MATERIAL_BASE_FREE)
         return add(problem, pointer, "base_mass", test->base_mass, "kg",
@@ -261,7 +237,9 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
                              "is required unless there are traces: at least one drop");
     }
     pointer_join(place, sizeof place, pointer, "date");
-    if (test->date != NULL && !problem_concerns(problem, place) && !is_date(test->date)) {
+    int64_t unix_ms;
+    if (test->date != NULL && !problem_concerns(problem, place) &&
+        !date_read(test->date, &unix_ms)) {
         Fault fault = {.detail = "must be a date as 2026-11-21, or one with a time of day as "
                                  "2026-11-21T09:30:00Z"};
         text_fit(fault.pointer, sizeof fault.pointer, place);
@@ -269,6 +247,8 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
         status = problem_put(problem, STATUS_INVALID, &fault);
     }
     if (check_base(test, pointer, problem) != STATUS_OK)
+        status = STATUS_INVALID;
+    if (check_traces(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;
     return check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
 }

@@ -174,21 +174,15 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
 size_t evaluation_samples(const Measurement *tests, size_t count) {
     size_t samples = 0;
     for (size_t i = 0; i < count; i++)
-        for (size_t k = 0; k < tests[i].test->traces.count; k++)
-            samples += tests[i].test->traces.at[k].force.count;
+        samples += drop_test_samples(tests[i].test);
     return samples;
 }
 
-// Fits take time: a million samples some ten seconds.
+// They are all in memory.
 static Status check_size(const Measurement *tests, size_t count, Problem *problem) {
     const size_t samples = evaluation_samples(tests, count);
     if (samples <= EVALUATION_SAMPLES_MOST)
         return STATUS_OK;
-    if (count == 1 && tests[0].number == COUNT_ABSENT)
-        return problem_add(problem, STATUS_LIMIT, "/traces",
-                           "must have at most %d samples in all, have %zu: cut them to the "
-                           "contacts, or send them as several measurements",
-                           EVALUATION_SAMPLES_MOST, samples);
     return problem_set(problem, STATUS_LIMIT,
                        "more than %d samples in traces, %zu: evaluate fewer measurements at a time",
                        EVALUATION_SAMPLES_MOST, samples);
@@ -206,7 +200,7 @@ Status evaluation_make(const Measurement *tests, size_t count, Separation separa
     TRY(check_size(tests, count, problem));
     for (size_t i = 0; i < count; i++)
         TRY(rows_add(&tests[i], i, watch, evaluation, problem));
-    TRY(rows_unpull(tests, count, evaluation, problem));
+    TRY(rows_unpull(tests, count, watch, evaluation, problem));
     choose_restitutions(evaluation);
     find_ranges(tests, count, evaluation);
     Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);

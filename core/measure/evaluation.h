@@ -8,7 +8,7 @@
 #include "core/measure/trace.h"
 #include "core/plan/plan.h"
 
-enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 1 << 20 };
+enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 4 * TRACE_SAMPLES_MOST };
 #define EVALUATION_CONFIDENCE 0.95
 
 // One test, by its number of the material; COUNT_ABSENT: it has none yet. Borrowed.
@@ -98,12 +98,13 @@ typedef struct Evaluation {
 
 extern const Field evaluation_fields[]; // without the warnings
 
-// Samples in all traces: what an evaluation's time goes by.
+// Samples in all traces of all tests.
 size_t evaluation_samples(const Measurement *tests, size_t count);
 
 // `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
-// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody) says
-// so. Cleared by evaluation_clear in any case.
+// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody), asked
+// before each contact and each drop that gravity is taken out of, says so. Cleared by
+// evaluation_clear in any case.
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
                        const Watch *watch, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);

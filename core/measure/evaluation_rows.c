@@ -285,13 +285,16 @@ static Status unpull_one(const Pull *pull, double restitution, double contact_ti
     return STATUS_OK;
 }
 
-Status rows_unpull(const Measurement *tests, size_t count, Evaluation *evaluation,
-                   Problem *problem) {
+Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
+                   Evaluation *evaluation, Problem *problem) {
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         EvaluationRow *row = &evaluation->rows.at[i];
+        if (!is_pulled(tests, row) || !has(row->restitution) || !has(row->contact_time))
+            continue;
+        if (!watch_advance(watch, 1))
+            return STATUS_CANCELLED;
         const Pull pull = pull_of(tests, row, evaluation->separation);
-        if (is_pulled(tests, row) && has(row->restitution) && has(row->contact_time))
-            TRY(unpull(&pull, row, problem));
+        TRY(unpull(&pull, row, problem));
     }
     for (size_t test = 0; test < count; test++) {
         double restitution, contact_time;
@@ -301,6 +304,8 @@ Status rows_unpull(const Measurement *tests, size_t count, Evaluation *evaluatio
             if (row->test != test || !is_pulled(tests, row) ||
                 (has(row->restitution) && has(row->contact_time)))
                 continue;
+            if (!watch_advance(watch, 1))
+                return STATUS_CANCELLED;
             const Pull pull = pull_of(tests, row, evaluation->separation);
             TRY(unpull_one(&pull, restitution, contact_time, row, problem));
         }

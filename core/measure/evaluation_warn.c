@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/measure/evaluation_rows.h"
+#include "core/measure/evaluation_same.h"
 #include "core/measure/gravity.h"
 
 enum { OUTLIERS_TOLD = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -174,6 +175,7 @@ Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evalu
     for (size_t i = 0; i < count; i++)
         TRY(warn_of_gravity(&tests[i], i, evaluation));
     TRY(warn_of_pairs(tests, count, evaluation));
+    TRY(evaluation_warn_same(tests, count, evaluation));
     TRY(warn_of_pulses(evaluation, is_left_out));
     TRY(warn_of_interval(evaluation));
     TRY(warn_of_doubt(evaluation));

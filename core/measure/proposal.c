@@ -44,10 +44,6 @@ static Status describe(const Material *before, Material *material) {
     return STATUS_OK;
 }
 
-static bool is_same_text(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 static bool is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
@@ -59,7 +55,7 @@ static Status take_pair(const Measurement *tests, size_t count, Material *materi
     bool is_one = true;
     for (size_t i = 1; i < count; i++) {
         const DropTest *test = tests[i].test;
-        is_one = is_one && is_same_text(test->impactor, first->impactor) &&
+        is_one = is_one && text_same(test->impactor, first->impactor) &&
                  is_same(test->impactor_mass, first->impactor_mass) && test->base == first->base &&
                  is_same(test->base_mass, first->base_mass);
     }
@@ -77,7 +73,7 @@ static Status take_pair(const Measurement *tests, size_t count, Material *materi
 
 static bool stands_before(const Measurement *tests, size_t index) {
     for (size_t i = 0; i < index; i++)
-        if (is_same_text(tests[i].test->source, tests[index].test->source))
+        if (text_same(tests[i].test->source, tests[index].test->source))
             return true;
     return false;
 }

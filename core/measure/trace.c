@@ -333,9 +333,7 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
     return STATUS_OK;
 }
 
-Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
-                  TraceReading *reading, Problem *problem) {
-    *reading = (TraceReading){.baseline = (double)NAN};
+Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem) {
     if (!(interval > 0) || !isfinite(interval))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "its interval must be above 0 s, is %g", interval);
@@ -346,6 +344,13 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         if (!(fabs(force->at[i]) < 1e150))
             return problem_add(problem, STATUS_INVALID, pointer,
                                "its sample %zu must be a force below 1e150 N", i);
+    return STATUS_OK;
+}
+
+Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
+                  TraceReading *reading, Problem *problem) {
+    *reading = (TraceReading){.baseline = (double)NAN};
+    TRY(trace_check(interval, force, pointer, problem));
     TraceFound found;
     TraceWindow *window = malloc(sizeof *window);
     Status status = trace_find(force, way->threshold, &found);

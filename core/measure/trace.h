@@ -58,8 +58,11 @@ typedef struct TraceReading {
 
 extern const Field trace_contact_fields[];
 
-// Faults only where the trace cannot be read at all (STATUS_INVALID at `pointer`),
-// STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear in any case.
+// Whether the trace can be read at all: STATUS_INVALID with the fault at `pointer`.
+Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem);
+
+// STATUS_INVALID as trace_check, STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear
+// in any case.
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
                   TraceReading *reading, Problem *problem);
 void trace_reading_clear(TraceReading *reading);

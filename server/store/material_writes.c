@@ -82,8 +82,10 @@ Status material_measurement_add(Database *database, const MaterialMeasurement *m
                                 Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_measurements (material, measurement, author, comment, "
-        "created_unix_ms, document) SELECT number, :measurement, :author, :comment, "
-        ":created_unix_ms, :document FROM materials WHERE slug = :slug";
+        "created_unix_ms, drops, traces, head, document) SELECT number, :measurement, :author, "
+        ":comment, :created_unix_ms, coalesce(json_array_length(:document, '$.drops'), 0), "
+        "coalesce(json_array_length(:document, '$.traces'), 0), json_remove(:document, '$.drops', "
+        "'$.traces'), :document FROM materials WHERE slug = :slug";
     return database_change(database, sql, material_measurement_columns, measurement, NULL, problem);
 }
 
@@ -231,5 +233,7 @@ static Status measure(Database *database, const void *work, Problem *problem) {
 
 Status store_material_measure(Store *store, MaterialMeasurement *measurement, uint64_t version,
                               Problem *problem) {
-    return write(store, measure, &(Measure){measurement, version}, problem);
+    TRY(store_write(store, measure, &(Measure){measurement, version}, problem));
+    store_material_measured(store);
+    return STATUS_OK;
 }

@@ -64,6 +64,22 @@ static void who_has_not_seen_the_present_version_is_told(void **state) {
     store_close(store);
 }
 
+static void a_measurement_changes_what_is_told_but_not_what_a_name_means(void **state) {
+    (void)state;
+    Store *store = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5), head;
+    MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
+    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(head_of(store), 1); // and is remembered
+    const uint64_t generation = store_generation(store);
+    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(store_generation(store), generation);
+    assert_int_equal(store_material(store, "felt", 0, &head, NULL), STATUS_OK);
+    assert_int_equal(head.version, 2);
+    material_revision_clear(&head);
+    store_close(store);
+}
+
 static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) {
     (void)state;
     Store *store = felt_store(NULL);
@@ -172,6 +188,7 @@ static void of_eight_writers_each_is_taken_or_told(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(who_has_not_seen_the_present_version_is_told),
+        cmocka_unit_test(a_measurement_changes_what_is_told_but_not_what_a_name_means),
         cmocka_unit_test(the_head_is_the_newest_approved_then_the_newest_draft),
         cmocka_unit_test(nobody_approves_their_own),
         IN_FOLDER(of_eight_writers_each_is_taken_or_told),
