@@ -283,7 +283,7 @@ static size_t fit_pulled(const TraceWay *way, size_t number, double interval, do
     size_t count = trace_fit(window, fits);
     if (is_known || !(way->effective_mass > 0))
         return count;
-    for (int round = 0; round < 4 && count > 0 && *is_settled; round++) {
+    for (int round = 0; round < 4 && count > 0; round++) {
         TraceFit best = fits[0];
         const double before = window->pull_rate;
         *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
@@ -322,8 +322,9 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
     TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time)) {
         contact->is_doubtful = true;
-        return tell(&contact->why, "gravity is taken into account in part only: the approach speed "
-                                   "does not follow from the masses and this force, so give it");
+        return tell(&contact->why,
+                    "gravity is taken into account in part only: the masses and this "
+                    "force do not lead to one approach speed; check them, or give it");
     }
     if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time)) {
         contact->is_doubtful = true;
