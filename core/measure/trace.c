@@ -174,11 +174,20 @@ static void withdraw(const TraceContact *counted, TraceContact *contact) {
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
-// `noise` is that of `count` means during contact, over the peak, and known from so many samples.
-static Status judge(const TraceInterval *likely, double noise, size_t count, double known_from,
-                    int separation, const TraceContact *counted, TraceContact *contact) {
+static Status judge(const TraceInterval *likely, bool is_form_sure, double noise, int separation,
+                    const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
-    if (!(width < widest * contact->contact_time)) {
+    const bool is_wide = !(width < widest * contact->contact_time);
+    if (!is_form_sure) {
+        if (is_wide)
+            withdraw(counted, contact);
+        contact->is_doubtful = !is_wide;
+        return tell(&contact->why,
+                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
+                    separation_names[separation], 100 * contact->misfit_share, 100 * noise);
+    }
+    if (is_wide) {
         withdraw(counted, contact);
         return tell(&contact->why,
                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
@@ -189,16 +198,6 @@ static Status judge(const TraceInterval *likely, double noise, size_t count, dou
         withdraw(counted, contact);
         return tell(&contact->why, "the force fades away without an end that could be told: pulses "
                                    "with a restitution of next to nothing fit the trace as well");
-    }
-    // So much is seldom left by chance.
-    const double freedom = fmax((double)count - 4, 1);
-    if (contact->misfit_share > 0.01 &&
-        contact->misfit_share > noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
-        contact->is_doubtful = true;
-        return tell(&contact->why,
-                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
-                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                    separation_names[separation], 100 * contact->misfit_share, 100 * noise);
     }
     return STATUS_OK;
 }
@@ -234,8 +233,13 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
                     "the trace is no pulse of the model's under the separation rule %s: the best "
                     "one leaves %.2g %% of the peak",
                     separation_names[window->separation], 100 * contact->misfit_share);
+    // So much is seldom left by chance, of so many means and of a noise known from so many samples.
+    const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
+    const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
+    const bool is_form_sure =
+        !(contact->misfit_share > 0.01 && contact->misfit_share > noise * chance);
     TraceInterval likely;
-    TRY(trace_interval(window, fits, count, &likely));
+    TRY(trace_interval(window, fits, count, is_form_sure, &likely));
     const TraceContact counted = *contact;
     contact->start = (origin + likely.start.mean) * interval;
     contact->end = (origin + likely.end.mean) * interval;
@@ -245,8 +249,7 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->most_contact_time = likely.most * interval;
     contact->restitution = fmin(exp(-likely.decay.mean), 1);
     contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
-    return judge(&likely, noise, means, fmax(found->noise_count - 1, 1), window->separation,
-                 &counted, contact);
+    return judge(&likely, is_form_sure, noise, window->separation, &counted, contact);
 }
 
 // Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
