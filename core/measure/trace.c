@@ -170,11 +170,19 @@ static void withdraw(const TraceContact *counted, TraceContact *contact) {
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
-// `noise` is that of `count` means during contact, over the peak, and known from so many samples.
-static Status judge(const TraceInterval *likely, double noise, size_t count, double known_from,
-                    int separation, const TraceContact *counted, TraceContact *contact) {
+static Status judge(const TraceInterval *likely, bool is_form_sure, double noise, int separation,
+                    const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
-    if (!(width < widest * contact->contact_time)) {
+    const bool is_wide = !(width < widest * contact->contact_time);
+    if (!is_form_sure) {
+        if (is_wide)
+            withdraw(counted, contact);
+        return tell(&contact->why,
+                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
+                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
+    }
+    if (is_wide) {
         withdraw(counted, contact);
         return tell(&contact->why,
                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
@@ -185,16 +193,6 @@ static Status judge(const TraceInterval *likely, double noise, size_t count, dou
         withdraw(counted, contact);
         return tell(&contact->why, "the force fades away without an end that could be told: pulses "
                                    "with a restitution of next to nothing fit the trace as well");
-    }
-    // So much is seldom left by chance.
-    const double freedom = fmax((double)count - 4, 1);
-    if (contact->seen.misfit_share > 0.01 &&
-        contact->seen.misfit_share >
-            noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
-        return tell(&contact->why,
-                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
-                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
     }
     return STATUS_OK;
 }
@@ -213,9 +211,8 @@ static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFoun
 }
 
 static Status fit_contact(TraceWindow *window, const TraceFound *found, const TraceRun *run,
-                          const Stretch *stretch, double interval, TraceContact *contact) {
-    TraceFit fits[TRACE_FITS_MOST];
-    const size_t count = trace_fit(window, fits);
+                          const Stretch *stretch, double interval, const TraceFit *fits,
+                          size_t count, TraceContact *contact) {
     if (count == 0)
         return tell(&contact->why, "no pulse of the model's fits");
     const TraceFit *fit = &fits[0];
@@ -244,8 +241,13 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
                     "the trace is no pulse of the model's under the separation rule %s: the best "
                     "one leaves %.2g %% of the peak",
                     separation_names[window->separation], 100 * contact->seen.misfit_share);
+    // So much is seldom left by chance, of so many means and of a noise known from so many samples.
+    const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
+    const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
+    const bool is_form_sure =
+        !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
     TraceInterval likely;
-    TRY(trace_interval(window, fits, count, &likely));
+    TRY(trace_interval(window, fits, count, is_form_sure, &likely));
     TRY(draw(fit, &shape, found, run, &contact->seen.pulse));
     const TraceContact counted = *contact;
     contact->seen.start = (origin + likely.start.mean) * interval;
@@ -256,30 +258,53 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->most_contact_time = likely.most * interval;
     contact->restitution = fmin(exp(-likely.decay.mean), 1);
     contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
-    return judge(&likely, noise, means, fmax(found->noise_count - 1, 1), window->separation,
-                 &counted, contact);
+    return judge(&likely, is_form_sure, noise, window->separation, &counted, contact);
 }
 
-// g / v0, which without v0 is m_e g over the fitted m_e v0, and that hangs on g / v0 but little.
-static void pull_window(const TraceWay *way, size_t number, double interval, double peak,
-                        TraceWindow *window) {
-    if (number < way->approach_speed_count && way->approach_speeds[number] > 0) {
-        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
-        return;
-    }
-    for (int round = 0; round < 20 && way->effective_mass > 0; round++) {
-        TraceFit fits[TRACE_FITS_MOST];
+// Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
+// is m_e g over the fitted m_e v0, and that hangs on the pull but little.
+static bool settle(double weight, double unit, TraceWindow *window, TraceFit *fit) {
+    double rate_before = 0, gap_before = 0;
+    for (int round = 0; round < 12; round++) {
         TraceShape shape;
         double T;
-        if (trace_fit(window, fits) == 0 || !trace_point_shape(window, &fits->at, &shape, &T))
-            return;
-        const double momentum = fits->residue.amplitude * T * peak * interval;
-        const double rate = way->effective_mass * way->gravity / momentum * interval;
-        const bool is_there = fabs(rate - window->pull_rate) < 1e-6 * rate;
-        window->pull_rate = rate;
-        if (is_there)
-            return;
+        if (!isfinite(fit->residue.sum) || !trace_point_shape(window, &fit->at, &shape, &T))
+            return false;
+        const double rate = window->pull_rate;
+        const double gap = weight / (fit->residue.amplitude * T * unit) - rate;
+        if (fabs(gap) < 1e-4 * rate)
+            return true;
+        // Under a strong pull the gap only halves from one to the next: so by the secant.
+        const double slope = round > 0 ? (gap - gap_before) / (rate - rate_before) : -1;
+        rate_before = rate;
+        gap_before = gap;
+        window->pull_rate = fmax(rate - gap / fmin(slope, -0.1), 0);
+        trace_refit(window, fit);
     }
+    return false;
+}
+
+// The fits under the pull. By g / v0; without v0 from the best fit on, until it is the best under
+// the pull that follows from it; *is_settled is false where there is no such.
+static size_t fit_pulled(const TraceWay *way, size_t number, double interval, double peak,
+                         TraceWindow *window, TraceFit *fits, bool *is_settled) {
+    const bool is_known = number < way->approach_speed_count && way->approach_speeds[number] > 0;
+    *is_settled = true;
+    if (is_known)
+        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+    size_t count = trace_fit(window, fits);
+    if (is_known || !(way->effective_mass > 0))
+        return count;
+    for (int round = 0; round < 4 && count > 0; round++) {
+        TraceFit best = fits[0];
+        const double before = window->pull_rate;
+        *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
+        if (*is_settled && window->pull_rate == before)
+            return count;
+        count = trace_fit(window, fits);
+    }
+    *is_settled = false;
+    return count;
 }
 
 static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
@@ -309,9 +334,16 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    if (way->gravity > 0)
-        pull_window(way, number, interval, fabs(run->peak), window);
-    TRY(fit_contact(window, found, run, &stretch, interval, contact));
+    TraceFit fits[TRACE_FITS_MOST];
+    bool is_settled = true;
+    const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
+                                                       window, fits, &is_settled)
+                                          : trace_fit(window, fits);
+    TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
+    if (!is_settled && !isnan(contact->contact_time))
+        return tell(&contact->why,
+                    "gravity is taken into account in part only: the masses and this "
+                    "force do not lead to one approach speed; check them, or give it");
     if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
                                    "nor the masses are known");

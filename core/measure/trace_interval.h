@@ -1,5 +1,5 @@
-// How sure the figures of a fitted pulse are: the likelihood over all starts, ends and e that the
-// trace leaves open, which gaps between samples they lie in included. Not the fit (trace_fit.h).
+// How sure the figures of a fitted pulse are: by the form, over all gaps between samples that the
+// trace leaves open for its start and end. Not the fit (trace_fit.h).
 // Used by trace.c.
 #ifndef CORE_MEASURE_TRACE_INTERVAL_H
 #define CORE_MEASURE_TRACE_INTERVAL_H
@@ -15,8 +15,8 @@ typedef struct TraceInterval {
     double least, most; // of contact_time
 } TraceInterval;
 
-// From what trace_fit found. STATUS_NO_MEMORY.
+// From what trace_fit found; is_form_sure: it leaves no more than noise. STATUS_NO_MEMORY.
 Status trace_interval(const TraceWindow *window, const TraceFit *fits, size_t count,
-                      TraceInterval *interval);
+                      bool is_form_sure, TraceInterval *interval);
 
 #endif
