@@ -198,12 +198,11 @@ static Status import_all(Walk *walk, Database *database, Problem *problem) {
         Group group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
                        .revisions = &import->revisions[r],
                        .measurements = &import->measurements[m]};
-        for (; r < import->revision_count &&
-               import_is_same(import->revisions[r].said.slug, group.slug);
+        for (; r < import->revision_count && text_same(import->revisions[r].said.slug, group.slug);
              r++)
             group.revision_count++;
         for (; m < import->measurement_count &&
-               import_is_same(import->measurements[m].made.slug, group.slug);
+               text_same(import->measurements[m].made.slug, group.slug);
              m++)
             group.measurement_count++;
         walk->tally->materials++;

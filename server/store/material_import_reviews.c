@@ -51,9 +51,8 @@ static Status load_reviews(Database *database, const char *slug, uint64_t revisi
 
 static bool is_review(const ImportReview *ours, const MaterialReview *there) {
     const MaterialReview *review = &ours->review;
-    return import_is_same(review->status, there->status) &&
-           import_is_same(review->reason, there->reason) &&
-           (!ours->has_reviewer || import_is_same(review->reviewer, there->reviewer)) &&
+    return text_same(review->status, there->status) && text_same(review->reason, there->reason) &&
+           (!ours->has_reviewer || text_same(review->reviewer, there->reviewer)) &&
            (!ours->has_created || review->created_unix_ms == there->created_unix_ms);
 }
 
@@ -64,10 +63,10 @@ static Status judge_review(const Walk *walk, const char *place, const ImportRevi
     const MaterialReview *review = &ours->review;
     const bool is_known = ours->has_reviewer && review->reviewer != NULL;
     const char *reviewer = is_known ? review->reviewer : walk->import->who;
-    if (import_is_same(review->status, before))
+    if (text_same(review->status, before))
         return import_fault(walk, place, "status", "is %s already", before);
     if (strcmp(review->status, "approved") == 0 && reviewer != NULL &&
-        import_is_same(reviewer, said->author))
+        text_same(reviewer, said->author))
         return import_fault(walk, place, "reviewer",
                             "%s the revision's author, %.64s, and nobody approves their own",
                             is_known ? "is" : "must be told, else it is", said->author);

@@ -25,7 +25,7 @@ static Status compare_measurement(const Walk *walk, Database *database,
     const ImportOrigin is = {ours->made.author, ours->made.comment, ours->made.created_unix_ms},
                        was = {there.author, there.comment, there.created_unix_ms};
     import_compare_origin(walk, mark, "measurement", &is, &was);
-    if (ours->made.document != NULL && !import_is_same(ours->made.document, there.document))
+    if (ours->made.document != NULL && !text_same(ours->made.document, there.document))
         (void)import_fault(walk, mark->place, "test",
                            "is not the measurement %llu that is there, and those never change",
                            (unsigned long long)ours->made.measurement);

@@ -34,10 +34,6 @@ void import_deny(Walk *walk, const char *place, const char *name, const char *wh
     walk->denied_why = why;
 }
 
-bool import_is_same(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 Status import_load(Database *database, const char *sql, const char *slug, uint64_t number,
                    const RowColumn *columns, void *item, Problem *problem) {
     const ImportKey key = {(char *)slug, number};
@@ -54,9 +50,9 @@ Status import_load(Database *database, const char *sql, const char *slug, uint64
 void import_compare_origin(const Walk *walk, const ImportMark *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there) {
     static const char never[] = "is not that of the %s that is there, and those never change";
-    if (mark->has_author && !import_is_same(ours->author, there->author))
+    if (mark->has_author && !text_same(ours->author, there->author))
         (void)import_fault(walk, mark->place, "author", never, what);
-    if (mark->has_comment && !import_is_same(ours->comment, there->comment))
+    if (mark->has_comment && !text_same(ours->comment, there->comment))
         (void)import_fault(walk, mark->place, "comment", never, what);
     if (mark->has_created && ours->created_unix_ms != there->created_unix_ms)
         (void)import_fault(walk, mark->place, "created", never, what);
@@ -94,8 +90,7 @@ void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
 void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
                          int64_t created_unix_ms) {
     const bool may_all = walk->import->may_all;
-    if (!may_all && mark->has_author && author != NULL &&
-        !import_is_same(author, walk->import->who))
+    if (!may_all && mark->has_author && author != NULL && !text_same(author, walk->import->who))
         import_deny(walk, mark->place, "author", "is somebody else");
     if (!may_all && mark->has_created)
         import_deny(walk, mark->place, "created", "is a time of the file's own");

@@ -35,7 +35,6 @@ Status import_fault(const Walk *walk, const char *place, const char *name, const
 // Counts what the importer may not bring.
 void import_deny(Walk *walk, const char *place, const char *name, const char *why);
 
-bool import_is_same(const char *a, const char *b); // both may be NULL
 const char *import_author(const Walk *walk, const ImportMark *mark, const char *author);
 // Of a row that is not there yet: who wrote it, and when.
 void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
