@@ -276,7 +276,7 @@ double trace_likelihood(const TraceWindow *window, double sum) {
 
 // Coarsely over starts and ends, for one L.
 static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
-    enum { PLACES = 14 };
+    enum { PLACES = 7 };
     const long lead = window->first - window->least_start, tail = window->most_end - window->last;
     const long lead_step = lead / PLACES + 1, tail_step = tail / PLACES + 1;
     fit->residue.sum = (double)INFINITY;

@@ -26,6 +26,9 @@ enum { CONTACT_TIME = TRACE_PARTS, FIGURES };
 // by, over the noise that remains; and where T_c is told worse than so, by how much it may.
 static const double good = 0.01, bias_most = 0.35, bad = 0.04, bias_most_of_bad = 0.6;
 
+// Of the contact, to which the pulse changes evenly with its start.
+static const double step_most = 0.1;
+
 // What one pair of gaps says: normal distributions.
 typedef struct Piece {
     double weight; // its log, first
@@ -105,10 +108,14 @@ static bool slopes(const TraceWindow *window, const TracePoint *point, double *c
 static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit *fit,
                   Piece *piece) {
     double inverse[3][3], curvature[3][3], det, gain = 0, T;
+    const double variance = trace_variance(window, fit->residue.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
     *piece = (Piece){.slope = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-    if (!invert(curvature, inverse, &det) ||
-        !slopes(window, &fit->at, &T, piece->slope[CONTACT_TIME]))
+    if (!slopes(window, &fit->at, &T, piece->slope[CONTACT_TIME]))
+        return false;
+    // A step leads no further than a part of the contact: there the pulse is another.
+    curvature[START][START] += variance / pow(1 + step_most * T, 2);
+    if (!invert(curvature, inverse, &det))
         return false;
     piece->mean[CONTACT_TIME] = T;
     for (int i = 0; i < TRACE_PARTS; i++) {
@@ -119,15 +126,14 @@ static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit
         piece->mean[CONTACT_TIME] += piece->slope[CONTACT_TIME][i] * step;
         gain -= fit->slope[i] * step;
     }
-    const double left = fmax(fit->residue.sum - gain, 0);
-    const double variance = trace_variance(window, left);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             piece->spread[i][j] = inverse[i][j] * variance;
     memcpy(piece->least, box->least, sizeof piece->least);
     memcpy(piece->most, box->most, sizeof piece->most);
-    piece->weight = trace_likelihood(window, left) - log(det / pow(variance, 3)) / 2 -
-                    piece->mean[DECAY] - log(fit->residue.model_square) / 2 +
+    piece->weight = trace_likelihood(window, fit->residue.sum) + gain / variance / 2 -
+                    log(det / pow(variance, 3)) / 2 - piece->mean[DECAY] -
+                    log(fit->residue.model_square) / 2 +
                     log(share_in(box, piece->mean, piece->spread));
     return isfinite(piece->weight);
 }

@@ -46,7 +46,9 @@ double *traces_draw(const TraceCell *cell, uint64_t seed, uint64_t trial, size_t
     if (force == NULL)
         return NULL;
     noise_normal_pairs(seed, trial, 0, pairs, force);
-    const double start = (ceil(before) + uniform(seed, trial, 1)) * interval;
+    // Just before the sample, so that an end on a sample is over there.
+    const double phase = cell->is_on_grid ? -1e-9 : uniform(seed, trial, 1);
+    const double start = (ceil(before) + phase) * interval;
     const double peak = traces_peak(cell->restitution, cell->contact_time, cell->separation);
     const double scale = cell->scale != 0 ? cell->scale : 1;
     for (size_t i = 0; i < *count; i++) {

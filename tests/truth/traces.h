@@ -4,6 +4,7 @@
 #ifndef TESTS_TRUTH_TRACES_H
 #define TESTS_TRUTH_TRACES_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -15,6 +16,7 @@ typedef struct TraceCell {
     double before;        // baseline before and after the contact, in T_c
     double offset, drift; // of the baseline, over the peak; the latter over the trace
     double scale;         // of the force, either sign [N]; 0: 1
+    bool is_on_grid;      // the contact begins on a sample, which has its force already
 } TraceCell;
 
 // Shares of the trials, and means over those with a figure.
@@ -34,8 +36,8 @@ double traces_force(double restitution, double contact_time, int separation, dou
 // The largest of it.
 double traces_peak(double restitution, double contact_time, int separation);
 
-// One trace with one contact, of *count samples; freed by the caller. The phase of the first sample
-// and the noise follow from `seed` and `trial`.
+// One trace with one contact, of *count samples; freed by the caller. The phase of the first
+// sample, unless on grid, and the noise follow from `seed` and `trial`.
 double *traces_draw(const TraceCell *cell, uint64_t seed, uint64_t trial, size_t *count);
 
 TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials);
