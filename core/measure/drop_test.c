@@ -47,7 +47,7 @@ const Field drop_test_fields[] = {
     FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
     FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
     FIELD_TEXT(DropTest, geometry, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
-    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out, and heights count by 9.80665"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out; heights count by 9.80665 whatever is said here"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
     FIELD_TEXT(DropTest, instrument, TEXT_MOST, PRESENCE_OPTIONAL, 0, "that it was read with"),
     FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "when it was done: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
@@ -58,7 +58,7 @@ const Field drop_test_fields[] = {
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one contact time"),
     FIELD_LIST(DropTest, drops, drop_fields, DROPS_MOST, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
-    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
     FIELD_END
 };
 // clang-format on
@@ -67,8 +67,8 @@ static bool has(double value) {
     return !isnan(value);
 }
 
-static double fall_speed(const DropTest *test, double height) {
-    return sqrt(2 * (test->gravity > 0 ? test->gravity : STANDARD_GRAVITY) * height);
+static double fall_speed(double height) {
+    return sqrt(2 * STANDARD_GRAVITY * height);
 }
 
 double drop_test_mass(const DropTest *test) {
@@ -79,18 +79,18 @@ double drop_test_mass(const DropTest *test) {
     return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
 }
 
-double drop_approach(const DropTest *test, const Drop *drop) {
-    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(test, drop->drop_height);
+double drop_approach(const Drop *drop) {
+    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
 }
 
 double drop_rebound(const DropTest *test, const Drop *drop) {
     if (has(drop->rebound_speed))
         return drop->rebound_speed;
-    const double rise = fall_speed(test, drop->rebound_height);
+    const double rise = fall_speed(drop->rebound_height);
     if (test->base != MATERIAL_BASE_FREE)
         return rise;
     const double m = test->impactor_mass, M = test->base_mass;
-    return (m * drop_approach(test, drop) + (m + M) * rise) / M;
+    return (m * drop_approach(drop) + (m + M) * rise) / M;
 }
 
 static Status add(Problem *problem, const char *pointer, const char *name, double value,
@@ -108,9 +108,9 @@ static Status missing(Problem *problem, const char *pointer, const char *name,
 }
 
 // A speed that its height contradicts.
-static Status check_speed(const DropTest *test, double height, double speed, const char *name,
-                          const char *pointer, Problem *problem) {
-    const double falls = fall_speed(test, height);
+static Status check_speed(double height, double speed, const char *name, const char *pointer,
+                          Problem *problem) {
+    const double falls = fall_speed(height);
     if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
         return STATUS_OK;
     char sentence[160];
@@ -135,7 +135,7 @@ static Status check_rebound(const DropTest *test, const Drop *drop, const char *
         return missing(problem, pointer, "rebound_height",
                        "needs impactor_mass and base_mass on a free base, which takes part of "
                        "the rebound; or rebound_speed relative to the base in its place");
-    const double before = drop_approach(test, drop), after = drop_rebound(test, drop);
+    const double before = drop_approach(drop), after = drop_rebound(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
     char sentence[160];
@@ -161,13 +161,13 @@ static Status check_drop(const DropTest *test, const Drop *drop, const char *poi
                        has(drop->rebound_height) ? "drop_height" : "approach_speed",
                        "is required beside a rebound");
     Status status = STATUS_OK;
-    if (check_speed(test, drop->drop_height, drop->approach_speed, "approach_speed", pointer,
-                    problem) != STATUS_OK)
+    if (check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer, problem) !=
+        STATUS_OK)
         status = STATUS_INVALID;
     // On a free base the two are not of the same body.
     if (test->base != MATERIAL_BASE_FREE &&
-        check_speed(test, drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer,
-                    problem) != STATUS_OK)
+        check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer, problem) !=
+            STATUS_OK)
         status = STATUS_INVALID;
     if (status == STATUS_OK && has_after)
         status = check_rebound(test, drop, pointer, problem);

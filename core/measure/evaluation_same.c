@@ -32,7 +32,7 @@ Status evaluation_warn_same(const Measurement *tests, size_t count, Evaluation *
     Status status = sums != NULL && count_in != NULL ? STATUS_OK : STATUS_NO_MEMORY;
     for (size_t i = 0; status == STATUS_OK && i < evaluation->rows.count; i++) {
         const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->restitution_counts || row->contact_time_counts)
+        if (row_counts(row))
             count_in[row->test] = true;
     }
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {

@@ -21,27 +21,23 @@ static const double widest = 0.5, faintest = 4.2;
 static const double worst = 0.15;
 
 // clang-format off
-const Field trace_contact_fields[] = {
-    FIELD_REAL(TraceContact, start, "s", ANY, OPTIONAL, "when the fitted contact begins, after the first sample"),
-    FIELD_REAL(TraceContact, end, "s", ANY, OPTIONAL, "when the fitted contact ends"),
-    FIELD_REAL(TraceContact, first, "s", ANY, OPTIONAL, "the first sample in contact, or above the threshold where nothing is fitted"),
-    FIELD_REAL(TraceContact, last, "s", ANY, OPTIONAL, "the last such sample"),
-    FIELD_COUNT(TraceContact, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
-    FIELD_REAL(TraceContact, peak, "N", ANY, OPTIONAL, "largest force above the baseline, with its sign"),
-    FIELD_REAL(TraceContact, impulse, "N s", ANY, OPTIONAL, "of the fitted pulse"),
-    FIELD_REAL(TraceContact, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
-    FIELD_REAL(TraceContact, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceContact, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
-    FIELD_REAL(TraceContact, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair, by the fit"),
-    FIELD_REAL(TraceContact, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, least_contact_time, "s", ANY, OPTIONAL, "T_c is at least this, with most_contact_time in 95 of 100 cases"),
-    FIELD_REAL(TraceContact, most_contact_time, "s", ANY, OPTIONAL, "T_c is at most this"),
-    FIELD_REAL(TraceContact, restitution, NULL, ANY, OPTIONAL, "e by the pulse's shape"),
-    FIELD_REAL(TraceContact, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
-    FIELD_REAL(TraceContact, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
-    FIELD_FLAG(TraceContact, is_doubtful, false, "a figure is given, but the trace is hardly the model's: see why"),
-    FIELD_TEXT(TraceContact, why, TRACE_WHY_MOST, PRESENCE_OPTIONAL, 0, "why there is no figure of T_c, or why it is doubtful"),
+const Field trace_seen_fields[] = {
+    FIELD_REAL(TraceSeen, baseline, "N", ANY, OPTIONAL, "of the trace"),
+    FIELD_REAL(TraceSeen, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
+    FIELD_REAL(TraceSeen, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
+    FIELD_REAL(TraceSeen, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
+    FIELD_REAL(TraceSeen, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceSeen, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceSeen, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
+    FIELD_REAL(TraceSeen, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceSeen, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceSeen, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
+    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, or no pulse fits"),
+    FIELD_REAL(TraceSeen, end, "s", ANY, OPTIONAL, "when it ends"),
+    FIELD_REALS(TraceSeen, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
+    FIELD_REAL(TraceSeen, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceSeen, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
     FIELD_END
 };
 // clang-format on
@@ -192,13 +188,26 @@ static Status judge(const TraceInterval *likely, double noise, size_t count, dou
     }
     // So much is seldom left by chance.
     const double freedom = fmax((double)count - 4, 1);
-    if (contact->misfit_share > 0.01 &&
-        contact->misfit_share > noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
-        contact->is_doubtful = true;
+    if (contact->seen.misfit_share > 0.01 &&
+        contact->seen.misfit_share >
+            noise * (1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2))) {
         return tell(&contact->why,
                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
                     "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                    separation_names[separation], 100 * contact->misfit_share, 100 * noise);
+                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
+    }
+    return STATUS_OK;
+}
+
+// The best pulse, from where the contact is taken to begin to where it is taken to end.
+static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFound *found,
+                   const TraceRun *run, Reals *pulse) {
+    if (!reals_make(pulse, TRACE_PULSE))
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < TRACE_PULSE; i++) {
+        const double s = shape->length * (double)i / (TRACE_PULSE - 1);
+        const double force = fit->residue.amplitude * trace_shape_force(shape, s);
+        pulse->at[i] = found->baseline + run->peak * (fit->residue.baseline + force);
     }
     return STATUS_OK;
 }
@@ -209,36 +218,37 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     if (count == 0)
         return tell(&contact->why, "no pulse of the model's fits");
     const TraceFit *fit = &fits[0];
-    contact->samples = (uint64_t)(fit->last - fit->first + 1);
+    contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     const double origin = (double)stretch->from;
-    contact->first = (origin + (double)fit->first) * interval;
-    contact->last = (origin + (double)fit->last) * interval;
+    contact->seen.first = (origin + (double)fit->first) * interval;
+    contact->seen.last = (origin + (double)fit->last) * interval;
     TraceShape shape;
     double T;
     trace_point_shape(window, &fit->at, &shape, &T);
     const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
-    contact->crossing_shortfall = 1 - (visible.pressed - visible.from);
-    contact->impulse =
+    contact->seen.crossing_shortfall = 1 - (visible.pressed - visible.from);
+    contact->seen.impulse =
         fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
     size_t means;
-    contact->misfit_share = left_over(window, fit, &means);
+    contact->seen.misfit_share = left_over(window, fit, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
-    contact->misfit = noise > 0 ? contact->misfit_share / noise : (double)NAN;
-    if (contact->samples < SAMPLES_LEAST)
+    contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
+    if (contact->seen.samples < SAMPLES_LEAST)
         return tell(&contact->why,
                     "only %d samples are in contact, and pulses of very different length fit so "
                     "few: 5 are the least, 20 are better",
-                    (int)contact->samples);
-    if (contact->misfit_share > worst && contact->misfit_share > 2 * noise)
+                    (int)contact->seen.samples);
+    if (contact->seen.misfit_share > worst && contact->seen.misfit_share > 2 * noise)
         return tell(&contact->why,
                     "the trace is no pulse of the model's under the separation rule %s: the best "
                     "one leaves %.2g %% of the peak",
-                    separation_names[window->separation], 100 * contact->misfit_share);
+                    separation_names[window->separation], 100 * contact->seen.misfit_share);
     TraceInterval likely;
     TRY(trace_interval(window, fits, count, &likely));
+    TRY(draw(fit, &shape, found, run, &contact->seen.pulse));
     const TraceContact counted = *contact;
-    contact->start = (origin + likely.start.mean) * interval;
-    contact->end = (origin + likely.end.mean) * interval;
+    contact->seen.start = (origin + likely.start.mean) * interval;
+    contact->seen.end = (origin + likely.end.mean) * interval;
     contact->contact_time = likely.contact_time.mean * interval;
     contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
     contact->least_contact_time = likely.least * interval;
@@ -300,13 +310,21 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                            TraceContact *contact) {
     const TraceRun *run = &found->runs[number];
     const Stretch stretch = stretch_of(found, samples, number);
-    fields_clear(trace_contact_fields, contact);
-    contact->peak = run->peak;
-    contact->samples = run->last - run->first + 1;
-    contact->first = (double)run->first * interval;
-    contact->last = (double)run->last * interval;
-    contact->crossing_time = (double)(run->pressed - run->first + 1) * interval;
-    contact->crossing_uncertainty = interval / sqrt(6);
+    const double none = (double)NAN;
+    *contact = (TraceContact){.contact_time = none,
+                              .contact_time_uncertainty = none,
+                              .restitution = none,
+                              .restitution_uncertainty = none};
+    fields_clear(trace_seen_fields, &contact->seen);
+    contact->seen.baseline = found->baseline;
+    contact->seen.noise = found->noise;
+    contact->seen.threshold = found->threshold;
+    contact->seen.peak = run->peak;
+    contact->seen.samples = run->last - run->first + 1;
+    contact->seen.first = (double)run->first * interval;
+    contact->seen.last = (double)run->last * interval;
+    contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
+    contact->seen.crossing_uncertainty = interval / sqrt(6);
     count_samples(found, run, way->separation, interval, contact);
     if (run->first == 0 || run->last == samples - 1) {
         contact->most_contact_time = (double)NAN;
@@ -320,17 +338,13 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                                                        window, fits, &is_settled)
                                           : trace_fit(window, fits);
     TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
-    if (!is_settled && !isnan(contact->contact_time)) {
-        contact->is_doubtful = true;
+    if (!is_settled && !isnan(contact->contact_time))
         return tell(&contact->why,
                     "gravity is taken into account in part only: the masses and this "
                     "force do not lead to one approach speed; check them, or give it");
-    }
-    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time)) {
-        contact->is_doubtful = true;
+    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
                                    "nor the masses are known");
-    }
     return STATUS_OK;
 }
 
@@ -350,7 +364,7 @@ Status trace_check(double interval, const Reals *force, const char *pointer, Pro
 
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
                   TraceReading *reading, Problem *problem) {
-    *reading = (TraceReading){.baseline = (double)NAN};
+    *reading = (TraceReading){.why = NULL};
     TRY(trace_check(interval, force, pointer, problem));
     TraceFound found;
     TraceWindow *window = malloc(sizeof *window);
@@ -363,9 +377,6 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
     if (window == NULL)
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK) {
-        reading->baseline = found.baseline;
-        reading->noise = found.noise;
-        reading->threshold = found.threshold;
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
             if (!watch_advance(way->watch, (double)i / (double)found.count)) {
                 status = STATUS_CANCELLED;
@@ -388,25 +399,11 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
 }
 
 void trace_reading_clear(TraceReading *reading) {
-    for (size_t i = 0; i < reading->contacts.count; i++)
-        fields_clear(trace_contact_fields, &reading->contacts.at[i]);
+    for (size_t i = 0; i < reading->contacts.count; i++) {
+        fields_clear(trace_seen_fields, &reading->contacts.at[i].seen);
+        free(reading->contacts.at[i].why);
+    }
     free(reading->contacts.at);
     free(reading->why);
     *reading = (TraceReading){.why = NULL};
-}
-
-void trace_pulse(const TraceContact *contact, const TraceWay *way, double approach_speed,
-                 double start, double interval, size_t count, double *force) {
-    const bool is_known = contact->contact_time > 0;
-    const double pull = way->gravity > 0 && approach_speed > 0 && is_known
-                            ? way->gravity * contact->contact_time / approach_speed
-                            : 0;
-    const double decay = is_known ? fabs(log(contact->restitution)) : 0;
-    const TraceShape shape = trace_shape(decay, pull, way->separation);
-    const double size = contact->impulse / (trace_shape_impulse(&shape) * contact->contact_time);
-    for (size_t i = 0; i < count; i++) {
-        const double s = (start + (double)i * interval - contact->start) / contact->contact_time;
-        force[i] =
-            is_known && s >= 0 && s <= shape.length ? size * trace_shape_force(&shape, s) : 0;
-    }
 }

@@ -86,6 +86,12 @@ CREATE TABLE material_trail (
 ) STRICT;
 CREATE UNIQUE INDEX material_trail_of ON material_trail (material, version);
 
+-- One row: what revisions, reviews, measurements and the trail take by and large. They only grow, so there is an end to it.
+CREATE TABLE material_room (
+    bytes  INTEGER NOT NULL CHECK (bytes >= 0)
+) STRICT;
+INSERT INTO material_room (bytes) VALUES (0);
+
 -- The paper's five, with what it says of their tests; what it does not say stays unknown. They are of no user's hand: their
 -- time is that of this step, the same everywhere, and it is the program that calls them approved.
 CREATE TEMP TABLE paper (slug TEXT NOT NULL, kind TEXT NOT NULL);

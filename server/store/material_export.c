@@ -43,11 +43,14 @@ static Status first_revision(Store *store, const char *sql, const Key *key,
                        problem);
 }
 
+// CROSS and + keep the database to slugs in order: all revisions up to a number would be sorted
+// for each material.
 Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
                              MaterialRevision *revision, bool *is_found, Problem *problem) {
     static const char sql[] =
-        "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
-        "WHERE m.slug > :slug AND r.number <= :revisions ORDER BY m.slug, r.revision LIMIT 1";
+        "SELECT m.slug, r.* FROM materials m CROSS JOIN material_revisions r ON r.material = "
+        "m.number "
+        "WHERE m.slug > :slug AND +r.number <= :revisions ORDER BY m.slug, r.revision LIMIT 1";
     const Key key = {.slug = (char *)slug, .moment = *moment};
     return first_revision(store, sql, &key, revision, is_found, problem);
 }

@@ -133,6 +133,14 @@ typedef struct ResultUses {
 Status store_result_uses(Store *store, const char *name, size_t most, int64_t before,
                          ResultUses *uses, uint64_t *total, Problem *problem);
 
+// What is kept is kept for good, so there is an end to it: STATUS_LIMIT from each that writes.
+enum {
+    CATALOGUE_MATERIALS = 100000,
+    CATALOGUE_REVISIONS = 10000,    // of a material
+    CATALOGUE_MEASUREMENTS = 10000, // of a material
+};
+#define CATALOGUE_BYTES (INT64_C(64) << 30) // of all texts, and a bit for each row
+
 // Writing. Each is one transaction, durable when the call returns, and tells the catalogue's
 // readers. `version`: what the material's must be now (ANY_VERSION: whatever it is), else
 // STATUS_STALE, which tells the version that it has. Missing materials are STATUS_NOT_FOUND.

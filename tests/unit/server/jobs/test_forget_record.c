@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -87,6 +88,10 @@ static void a_job_that_waits_keeps_its_record_but_not_in_memory(void **state) {
     (void)state;
     NamedRecord *named;
     Job *first = submit("\"kind\": \"sine\", \"frequency\": 1, \"amplitude\": 2");
+    const struct timespec moment = {0, 1000000};
+    double progress;
+    for (int i = 0; i < 60000 && job_glance(first, &progress) != JOB_RUNNING; i++)
+        nanosleep(&moment, NULL);
     Job *second = submit("\"kind\": \"record\", \"name\": \"a\"");
     assert_int_equal(store_record_named(store, "a", &named, &problem), STATUS_OK);
     // The memory's and ours.
