@@ -59,13 +59,16 @@ for preset in "${presets[@]}"; do
     fi
 done
 
-# Tests that mostly wait do so beside the others: their process by "FILE PRESET", and what they say.
+# Python tests that run beside the others: their process by "FILE PRESET", and what they say.
 declare -A beside said
 begin() {
+    [ -z "${beside[$1 $2]-}" ] || return 0
     said[$1 $2]=$(mktemp)
     local target=$record
+    local -a runner=()
     [ "$2" = release ] || target=
-    IMPACTD_RECORD=$target "$python" "$1" --build "$(folder "$2")" >"${said[$1 $2]}" 2>&1 &
+    [ "$2" != tsan ] || runner=("${still[@]}")
+    IMPACTD_RECORD=$target "${runner[@]}" "$python" "$1" --build "$(folder "$2")" >"${said[$1 $2]}" 2>&1 &
     beside[$1 $2]=$!
 }
 
@@ -96,23 +99,36 @@ ask() {
     fi
 }
 
+# PRESET FILE...: each in turn while the next one runs beside it. Some hold what the others said against the contract:
+# nothing runs beside them, and they begin when what comes before has ended.
+ask_all() {
+    local preset=$1
+    shift
+    while [ $# -gt 0 ]; do
+        [ $# -lt 2 ] || grep -q '^ALONE = True' "$1" "$2" || begin "$2" "$preset"
+        IMPACTD_RECORD=$record ask "$1" "$preset"
+        shift
+    done
+}
+
 # What they say to daemons is recorded for contract/test_traffic.py, which comes after most of them.
 record=$(mktemp)
 while read -r file; do
     begin "$file" release
     [[ " ${presets[*]} " != *" debug "* ]] || ! grep -q '^SANITIZED = True' "$file" || begin "$file" debug
 done < <(grep -l '^WAITS = True' tests/contract/test_*.py)
-for file in tests/contract/test_*.py tests/truth/test_*.py; do
-    IMPACTD_RECORD=$record ask "$file" release
-done
+ask_all release tests/contract/test_*.py tests/truth/test_*.py
 rm -f "$record"
+record=
 # What faces hostile input is asked once more of the instrumented program.
 if [[ " ${presets[*]} " == *" debug "* ]]; then
-    while read -r file; do ask "$file" debug; done < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)
+    mapfile -t files < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)
+    ask_all debug "${files[@]}"
 fi
 # And what concerns threads of the one that watches them.
 if [[ " ${presets[*]} " == *" tsan "* ]]; then
-    while read -r file; do ask "$file" tsan; done < <(grep -l '^THREADED = True' tests/contract/test_*.py)
+    mapfile -t files < <(grep -l '^THREADED = True' tests/contract/test_*.py)
+    ask_all tsan "${files[@]}"
 fi
 
 echo

@@ -51,6 +51,10 @@ void text_fit(char *target, size_t size, const char *text) {
     memcpy(target + kept, mark, strlen(mark) + 1);
 }
 
+bool text_same(const char *a, const char *b) {
+    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
+}
+
 void text_list(char *target, size_t size, const char *item) {
     size_t used = strlen(target);
     if (used > 0) {

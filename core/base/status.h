@@ -94,6 +94,8 @@ bool problem_concerns(const Problem *problem, const char *pointer);
 // Copies `text` into `target[size]`, cut at a UTF-8 character's edge and marked by "..." if it is
 // too long.
 void text_fit(char *target, size_t size, const char *text);
+// Both may be NULL, which is a text of its own.
+bool text_same(const char *a, const char *b);
 
 // Puts `item` behind the others of a list in `target[size]`, with ", " between, cut likewise.
 void text_list(char *target, size_t size, const char *item);

@@ -16,9 +16,9 @@
 // clang-format off
 static const Field figure_fields[] = {
     FIELD_REAL(DerivedFigure, value, NULL, ANY, OPTIONAL, "null: not known"),
-    FIELD_REAL(DerivedFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c"),
-    FIELD_REAL(DerivedFigure, low, NULL, ANY, OPTIONAL, "95 % of contacts lie from here"),
-    FIELD_REAL(DerivedFigure, high, NULL, ANY, OPTIONAL, "to here"),
+    FIELD_REAL(DerivedFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c that the material states"),
+    FIELD_REAL(DerivedFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty: with high what 95 % of contacts lie between if e and T_c scatter log-normally with just these deviations, which few readings tell only roughly"),
+    FIELD_REAL(DerivedFigure, high, NULL, ANY, OPTIONAL, "value times exp(1.96 u)"),
     FIELD_END
 };
 

@@ -9,8 +9,9 @@
 #include "core/scene/material.h"
 
 // A figure with its standard uncertainty, from the standard deviations of e and T_c: of one
-// contact, not of a mean. The interval is of 95 % of contacts, even in the logarithm. NAN: not
-// known.
+// contact, not of a mean. low and high are the value over and times exp(1.96 u) with the relative
+// uncertainty u: 95 % of contacts lie between them if e and T_c scatter log-normally with just
+// these deviations; that they were told by few readings is not in it. NAN: not known.
 typedef struct DerivedFigure {
     double value, uncertainty, low, high;
 } DerivedFigure;

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/date.h"
 #include "core/contact/identify.h"
 #include "core/measure/trace.h"
 #include "core/scene/material.h"
@@ -46,7 +47,7 @@ const Field drop_test_fields[] = {
     FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
     FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
     FIELD_TEXT(DropTest, geometry, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
-    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out, and heights count by 9.80665"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out; heights count by 9.80665 whatever is said here"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
     FIELD_TEXT(DropTest, instrument, TEXT_MOST, PRESENCE_OPTIONAL, 0, "that it was read with"),
     FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "when it was done: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
@@ -57,7 +58,7 @@ const Field drop_test_fields[] = {
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one contact time"),
     FIELD_LIST(DropTest, drops, drop_fields, DROPS_MOST, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
-    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
     FIELD_END
 };
 // clang-format on
@@ -66,8 +67,8 @@ static bool has(double value) {
     return !isnan(value);
 }
 
-static double fall_speed(const DropTest *test, double height) {
-    return sqrt(2 * (test->gravity > 0 ? test->gravity : STANDARD_GRAVITY) * height);
+static double fall_speed(double height) {
+    return sqrt(2 * STANDARD_GRAVITY * height);
 }
 
 double drop_test_mass(const DropTest *test) {
@@ -78,71 +79,18 @@ double drop_test_mass(const DropTest *test) {
     return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
 }
 
-double drop_approach(const DropTest *test, const Drop *drop) {
-    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(test, drop->drop_height);
+double drop_approach(const Drop *drop) {
+    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
 }
 
 double drop_rebound(const DropTest *test, const Drop *drop) {
     if (has(drop->rebound_speed))
         return drop->rebound_speed;
-    const double rise = fall_speed(test, drop->rebound_height);
+    const double rise = fall_speed(drop->rebound_height);
     if (test->base != MATERIAL_BASE_FREE)
         return rise;
     const double m = test->impactor_mass, M = test->base_mass;
-    return (m * drop_approach(test, drop) + (m + M) * rise) / M;
-}
-
-// The days of a month, from 1.
-static int days_of(int year, int month) {
-    static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
-    const bool is_leap = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
-    return days[month - 1] + (month == 2 && is_leap ? 1 : 0);
-}
-
-// `size` digits as a number; -1 if they are none.
-static int digits(const char *text, size_t size) {
-    int value = 0;
-    for (size_t i = 0; i < size; i++) {
-        if (text[i] < '0' || text[i] > '9')
-            return -1;
-        value = 10 * value + (text[i] - '0');
-    }
-    return value;
-}
-
-static bool is_clock(const char *text) { // "09:30", on its own or with what follows
-    if (digits(text, 2) < 0 || digits(text, 2) > 23 || text[2] != ':')
-        return false;
-    return digits(text + 3, 2) >= 0 && digits(text + 3, 2) < 60;
-}
-
-// RFC 3339: a date, or one with a time of day and its distance from UTC.
-static bool is_date(const char *text) {
-    const int year = digits(text, 4);
-    if (year < 0 || text[4] != '-')
-        return false;
-    const int month = digits(text + 5, 2);
-    if (month < 1 || month > 12 || text[7] != '-')
-        return false;
-    const int day = digits(text + 8, 2);
-    if (day < 1 || day > days_of(year, month))
-        return false;
-    text += 10;
-    if (*text == '\0')
-        return true;
-    if ((*text != 'T' && *text != ' ') || !is_clock(text + 1) || text[6] != ':' ||
-        digits(text + 7, 2) < 0 || digits(text + 7, 2) > 60)
-        return false;
-    text += 9;
-    if (*text == '.') {
-        const size_t size = strspn(text + 1, "0123456789");
-        if (size == 0)
-            return false;
-        text += 1 + size;
-    }
-    if (*text == 'Z')
-        return text[1] == '\0';
-    return (*text == '+' || *text == '-') && is_clock(text + 1) && text[6] == '\0';
+    return (m * drop_approach(drop) + (m + M) * rise) / M;
 }
 
 static Status add(Problem *problem, const char *pointer, const char *name, double value,
@@ -160,9 +108,9 @@ static Status missing(Problem *problem, const char *pointer, const char *name,
 }
 
 // A speed that its height contradicts.
-static Status check_speed(const DropTest *test, double height, double speed, const char *name,
-                          const char *pointer, Problem *problem) {
-    const double falls = fall_speed(test, height);
+static Status check_speed(double height, double speed, const char *name, const char *pointer,
+                          Problem *problem) {
+    const double falls = fall_speed(height);
     if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
         return STATUS_OK;
     char sentence[160];
@@ -187,7 +135,7 @@ static Status check_rebound(const DropTest *test, const Drop *drop, const char *
         return missing(problem, pointer, "rebound_height",
                        "needs impactor_mass and base_mass on a free base, which takes part of "
                        "the rebound; or rebound_speed relative to the base in its place");
-    const double before = drop_approach(test, drop), after = drop_rebound(test, drop);
+    const double before = drop_approach(drop), after = drop_rebound(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
     char sentence[160];
@@ -213,13 +161,13 @@ static Status check_drop(const DropTest *test, const Drop *drop, const char *poi
                        has(drop->rebound_height) ? "drop_height" : "approach_speed",
                        "is required beside a rebound");
     Status status = STATUS_OK;
-    if (check_speed(test, drop->drop_height, drop->approach_speed, "approach_speed", pointer,
-                    problem) != STATUS_OK)
+    if (check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer, problem) !=
+        STATUS_OK)
         status = STATUS_INVALID;
     // On a free base the two are not of the same body.
     if (test->base != MATERIAL_BASE_FREE &&
-        check_speed(test, drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer,
-                    problem) != STATUS_OK)
+        check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer, problem) !=
+            STATUS_OK)
         status = STATUS_INVALID;
     if (status == STATUS_OK && has_after)
         status = check_rebound(test, drop, pointer, problem);
@@ -237,6 +185,34 @@ static Status check_drops(const DropTest *test, const char *pointer, Problem *pr
             check_drop(test, drop, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
+    return status;
+}
+
+size_t drop_test_samples(const DropTest *test) {
+    size_t samples = 0;
+    for (size_t i = 0; i < test->traces.count; i++)
+        samples += test->traces.at[i].force.count;
+    return samples;
+}
+
+static Status check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    for (size_t i = 0; i < test->traces.count; i++) {
+        const Trace *of = &test->traces.at[i];
+        pointer_index(trace, sizeof trace, traces, i);
+        pointer_join(place, sizeof place, trace, "force");
+        if (of->excluded == NULL && !problem_concerns(problem, trace) &&
+            trace_check(of->interval, &of->force, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    const size_t samples = drop_test_samples(test);
+    if (samples > TRACE_SAMPLES_MOST)
+        status = problem_add(problem, STATUS_INVALID, traces,
+                             "must have at most %d samples in all, have %zu: cut them to the "
+                             "contacts, or send them as several measurements",
+                             TRACE_SAMPLES_MOST, samples);
     return status;
 }
 
@@ -261,7 +237,9 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
                              "is required unless there are traces: at least one drop");
     }
     pointer_join(place, sizeof place, pointer, "date");
-    if (test->date != NULL && !problem_concerns(problem, place) && !is_date(test->date)) {
+    int64_t unix_ms;
+    if (test->date != NULL && !problem_concerns(problem, place) &&
+        !date_read(test->date, &unix_ms)) {
         Fault fault = {.detail = "must be a date as 2026-11-21, or one with a time of day as "
                                  "2026-11-21T09:30:00Z"};
         text_fit(fault.pointer, sizeof fault.pointer, place);
@@ -269,6 +247,8 @@ Status drop_test_check(const DropTest *test, const char *pointer, Problem *probl
         status = problem_put(problem, STATUS_INVALID, &fault);
     }
     if (check_base(test, pointer, problem) != STATUS_OK)
+        status = STATUS_INVALID;
+    if (check_traces(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;
     return check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
 }

@@ -6,9 +6,10 @@
 
 #include "core/base/field.h"
 
-enum { DROPS_MOST = 1000, TRACES_MOST = 100, TRACE_SAMPLES_MOST = 1 << 20 };
+enum { DROPS_MOST = 1000, TRACES_MOST = 100 };
+enum { TRACE_SAMPLES_MOST = 1 << 20 }; // in all traces of a test
 
-// What a height's speed is worth where a test does not say what pulls [m/s^2].
+// By which a height is worth a speed, whatever pulls during contact [m/s^2].
 #define STANDARD_GRAVITY 9.80665
 
 // One impact as it was read: heights or speeds, a duration, or some of them. Not known: NAN.
@@ -58,13 +59,17 @@ typedef struct DropTest {
 extern const Field drop_test_fields[];
 
 // All faults that rows cannot see, and the rows', below `pointer`: no reading at all, a rebound
-// above the drop, heights beside speeds that they contradict, a date that is none ... A drop that
-// is excluded may contradict itself: that may be why.
+// above the drop, heights beside speeds that they contradict, a date that is none, more samples
+// than a test may have, a trace that cannot be read ... What is excluded may contradict itself or
+// be unreadable: that may be why.
 Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem);
+
+// In all traces.
+size_t drop_test_samples(const DropTest *test);
 
 // What a drop says of its speeds [m/s]: as read, else by its heights; relative to the base. NAN
 // where nothing tells. A free base takes part of a rebound: heights then need both masses.
-double drop_approach(const DropTest *test, const Drop *drop);
+double drop_approach(const Drop *drop);
 double drop_rebound(const DropTest *test, const Drop *drop);
 
 // Of the test's pair; NAN where its masses are not known [kg].

@@ -14,6 +14,7 @@ const char *const trend_verdict_names[] = {"constant", "not_constant", "undecide
 static const Field row_fields[] = {
     FIELD_COUNT(EvaluationRow, measurement, NULL, AT_LEAST(1), OPTIONAL, "number of the measurement"),
     FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "which drop, or which contact of which trace, from 1"),
+    FIELD_COUNT(EvaluationRow, trace, NULL, AT_LEAST(1), OPTIONAL, "which trace of its measurement, from 1; null: a drop"),
     FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as read, else sqrt(2 g h)"),
     FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
     FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
@@ -34,6 +35,15 @@ static const Field row_fields[] = {
     FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
     FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, in the words of who measured"),
     FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "what else there is to know of it"),
+    FIELD_ITEM(EvaluationRow, contact, trace_seen_fields, NULL, PRESENCE_OPTIONAL, "the contact as it was detected in its trace; null: none was, or a drop"),
+    FIELD_END
+};
+
+static const Field ranges_fields[] = {
+    FIELD_REAL(Ranges, least_speed, "m/s", ANY, OPTIONAL, "the slowest approach that counts"),
+    FIELD_REAL(Ranges, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Ranges, least_temperature, "degC", ANY, OPTIONAL, "the coldest test of which a reading counts"),
+    FIELD_REAL(Ranges, most_temperature, "degC", ANY, OPTIONAL, "the warmest"),
     FIELD_END
 };
 
@@ -63,6 +73,7 @@ static const Field quantity_fields[] = {
     FIELD_REAL(Quantity, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
     FIELD_REAL(Quantity, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
     FIELD_REAL(Quantity, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
+    FIELD_REAL(Quantity, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
     FIELD_REAL(Quantity, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
     FIELD_REAL(Quantity, high, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_REAL(Quantity, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
@@ -78,10 +89,7 @@ static const Field quantity_fields[] = {
 const Field evaluation_fields[] = {
     FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "the rule by which traces were read and gravity was taken out"),
     FIELD_REAL(Evaluation, confidence, NULL, ANY, OPTIONAL, "of the intervals"),
-    FIELD_REAL(Evaluation, least_speed, "m/s", ANY, OPTIONAL, "the slowest approach that counts"),
-    FIELD_REAL(Evaluation, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
-    FIELD_REAL(Evaluation, least_temperature, "degC", ANY, OPTIONAL, "the coldest test"),
-    FIELD_REAL(Evaluation, most_temperature, "degC", ANY, OPTIONAL, "the warmest"),
+    FIELD_BASE(Evaluation, ranges, ranges_fields),
     FIELD_ITEM(Evaluation, restitution, quantity_fields, NULL, PRESENCE_DEFAULT, "e [-]"),
     FIELD_ITEM(Evaluation, contact_time, quantity_fields, NULL, PRESENCE_DEFAULT, "T_c [s]"),
     FIELD_LIST(Evaluation, rows, row_fields, 0, PRESENCE_DEFAULT, "every reading"),
@@ -108,25 +116,18 @@ static void choose_restitutions(Evaluation *evaluation) {
             evaluation->rows.at[i].restitution_counts = false;
 }
 
-static double wider(double bound, double value, bool is_least) {
-    return isnan(value)                                                 ? bound
-           : isnan(bound) || (is_least ? value < bound : value > bound) ? value
-                                                                        : bound;
+bool row_counts(const EvaluationRow *row) {
+    return row->restitution_counts || row->contact_time_counts;
 }
 
-static void find_ranges(const Measurement *tests, size_t count, Evaluation *evaluation) {
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (!row->restitution_counts && !row->contact_time_counts)
-            continue;
-        evaluation->least_speed = wider(evaluation->least_speed, row->approach_speed, true);
-        evaluation->most_speed = wider(evaluation->most_speed, row->approach_speed, false);
-    }
-    for (size_t i = 0; i < count; i++) {
-        const double temperature = tests[i].test->temperature;
-        evaluation->least_temperature = wider(evaluation->least_temperature, temperature, true);
-        evaluation->most_temperature = wider(evaluation->most_temperature, temperature, false);
-    }
+const Ranges ranges_unknown = {(double)NAN, (double)NAN, (double)NAN, (double)NAN};
+
+void ranges_take(Ranges *ranges, const EvaluationRow *row, const Measurement *tests) {
+    const double temperature = tests[row->test].test->temperature;
+    ranges->least_speed = fmin(ranges->least_speed, row->approach_speed);
+    ranges->most_speed = fmax(ranges->most_speed, row->approach_speed);
+    ranges->least_temperature = fmin(ranges->least_temperature, temperature);
+    ranges->most_temperature = fmax(ranges->most_temperature, temperature);
 }
 
 static Status make_restitution(Reading *readings, Evaluation *evaluation, Problem *problem) {
@@ -174,21 +175,15 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
 size_t evaluation_samples(const Measurement *tests, size_t count) {
     size_t samples = 0;
     for (size_t i = 0; i < count; i++)
-        for (size_t k = 0; k < tests[i].test->traces.count; k++)
-            samples += tests[i].test->traces.at[k].force.count;
+        samples += drop_test_samples(tests[i].test);
     return samples;
 }
 
-// Fits take time: a million samples some ten seconds.
+// They are all in memory.
 static Status check_size(const Measurement *tests, size_t count, Problem *problem) {
     const size_t samples = evaluation_samples(tests, count);
     if (samples <= EVALUATION_SAMPLES_MOST)
         return STATUS_OK;
-    if (count == 1 && tests[0].number == COUNT_ABSENT)
-        return problem_add(problem, STATUS_LIMIT, "/traces",
-                           "must have at most %d samples in all, have %zu: cut them to the "
-                           "contacts, or send them as several measurements",
-                           EVALUATION_SAMPLES_MOST, samples);
     return problem_set(problem, STATUS_LIMIT,
                        "more than %d samples in traces, %zu: evaluate fewer measurements at a time",
                        EVALUATION_SAMPLES_MOST, samples);
@@ -196,19 +191,17 @@ static Status check_size(const Measurement *tests, size_t count, Problem *proble
 
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
                        const Watch *watch, Evaluation *evaluation, Problem *problem) {
-    const double none = (double)NAN;
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
-                               .least_speed = none,
-                               .most_speed = none,
-                               .least_temperature = none,
-                               .most_temperature = none};
+                               .ranges = ranges_unknown};
     TRY(check_size(tests, count, problem));
     for (size_t i = 0; i < count; i++)
         TRY(rows_add(&tests[i], i, watch, evaluation, problem));
-    TRY(rows_unpull(tests, count, evaluation, problem));
+    TRY(rows_unpull(tests, count, watch, evaluation, problem));
     choose_restitutions(evaluation);
-    find_ranges(tests, count, evaluation);
+    for (size_t i = 0; i < evaluation->rows.count; i++)
+        if (row_counts(&evaluation->rows.at[i]))
+            ranges_take(&evaluation->ranges, &evaluation->rows.at[i], tests);
     Reading *readings = calloc(evaluation->rows.count + 1, sizeof *readings);
     if (readings == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");

@@ -8,7 +8,7 @@
 #include "core/measure/trace.h"
 #include "core/plan/plan.h"
 
-enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 1 << 20 };
+enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 4 * TRACE_SAMPLES_MOST };
 #define EVALUATION_CONFIDENCE 0.95
 
 // One test, by its number of the material; COUNT_ABSENT: it has none yet. Borrowed.
@@ -31,6 +31,7 @@ extern const char *const contact_time_by_names[]; // "duration", "pulse"; NULL-t
 typedef struct EvaluationRow {
     uint64_t measurement;                              // its number; COUNT_ABSENT
     char *from;                                        // "drop 3"; "trace 1, contact 2"
+    uint64_t trace;                                    // from 1; COUNT_ABSENT: of a drop
     double approach_speed, approach_speed_uncertainty; // [m/s]
     double restitution, restitution_uncertainty;       // [-]
     int restitution_by;                                // RestitutionBy
@@ -43,6 +44,7 @@ typedef struct EvaluationRow {
     bool restitution_is_outlier, contact_time_is_outlier; // which counts all the same
     char *excluded;                                       // why neither counts
     char *note;                                           // what else there is to know of it
+    TraceSeen contact;                                    // as it is seen in the trace
     bool is_of_trace; // "/traces/0" rather than "/drops/0"; no members of the answer:
     size_t place;
     size_t test; // of those given
@@ -78,6 +80,8 @@ typedef struct Quantity {
     double deviation;       // standard deviation of the readings
     double scatter;         // of them beyond their stated uncertainties; NAN: not weighted
     double standard_error;  // of the mean
+    double spread;          // standard deviation that a revision states beside the mean: scatter
+                            // where the mean is weighted, else deviation; at least standard_error
     double low, high;       // 95 % interval of the mean
     double minimum, median, maximum;
     uint64_t outliers;
@@ -86,26 +90,38 @@ typedef struct Quantity {
     Trend trend;
 } Quantity;
 
+// Over which rows that count something was measured; NAN: not known.
+typedef struct Ranges {
+    double least_speed, most_speed;             // [m/s]
+    double least_temperature, most_temperature; // of the rows' tests [degC]
+} Ranges;
+
 typedef struct Evaluation {
     int separation; // Separation: the rule by which traces were read
     double confidence;
     Quantity restitution, contact_time;
     EvaluationRows rows;
-    double least_speed, most_speed;             // of rows that count; NAN: not known [m/s]
-    double least_temperature, most_temperature; // likewise [degC]
-    Warnings warnings;                          // pointers lead into the tests: "/drops/2"
+    Ranges ranges;     // of all rows that count
+    Warnings warnings; // pointers lead into the tests: "/drops/2"
 } Evaluation;
 
 extern const Field evaluation_fields[]; // without the warnings
 
-// Samples in all traces: what an evaluation's time goes by.
+// Samples in all traces of all tests.
 size_t evaluation_samples(const Measurement *tests, size_t count);
 
 // `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
-// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody) says
-// so. Cleared by evaluation_clear in any case.
+// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody), asked
+// before each contact and each drop that gravity is taken out of, says so. Cleared by
+// evaluation_clear in any case.
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
                        const Watch *watch, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
+
+bool row_counts(const EvaluationRow *row); // at least one of e and T_c
+
+// Widens them by a row; all NAN at first.
+extern const Ranges ranges_unknown;
+void ranges_take(Ranges *ranges, const EvaluationRow *row, const Measurement *tests);
 
 #endif

@@ -44,6 +44,7 @@ static Status row_new(const Measurement *of, size_t index, Evaluation *evaluatio
     const double none = (double)NAN;
     rows->at[count] = (EvaluationRow){
         .measurement = of->number,
+        .trace = COUNT_ABSENT,
         .approach_speed = none,
         .approach_speed_uncertainty = none,
         .restitution = none,
@@ -61,6 +62,7 @@ static Status row_new(const Measurement *of, size_t index, Evaluation *evaluatio
         .test = index,
     };
     *row = &rows->at[rows->count++];
+    fields_clear(trace_seen_fields, &(*row)->contact);
     return STATUS_OK;
 }
 
@@ -106,7 +108,7 @@ static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation
     EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->place = i;
-    row->approach_speed = drop_approach(test, drop);
+    row->approach_speed = drop_approach(drop);
     row->approach_speed_uncertainty =
         row->approach_speed * speed_error(test, drop->approach_speed, drop->drop_height);
     read_restitution(test, drop, row);
@@ -124,12 +126,15 @@ static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation
 }
 
 static Status add_contact(const Measurement *of, size_t index, size_t i, size_t number,
-                          const TraceContact *contact, Evaluation *evaluation, Problem *problem) {
+                          TraceContact *contact, Evaluation *evaluation, Problem *problem) {
     const Trace *trace = &of->test->traces.at[i];
     EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->is_of_trace = true;
     row->place = i;
+    row->trace = i + 1;
+    row->contact = contact->seen;
+    contact->seen.pulse = (Reals){NULL, 0};
     if (number < trace->approach_speed.count) {
         row->approach_speed = trace->approach_speed.at[number];
         row->approach_speed_uncertainty = of->test->speed_uncertainty;
@@ -157,6 +162,7 @@ static Status add_silent(const Measurement *of, size_t index, size_t i, const ch
     TRY(row_new(of, index, evaluation, &row, problem));
     row->is_of_trace = true;
     row->place = i;
+    row->trace = i + 1;
     return sentence(&row->from, "trace %zu", i + 1) &&
                    copy(of->test->traces.at[i].excluded, &row->excluded) &&
                    sentence(&row->note, "%s", why != NULL ? why : "no contact is seen in it")
@@ -285,13 +291,16 @@ static Status unpull_one(const Pull *pull, double restitution, double contact_ti
     return STATUS_OK;
 }
 
-Status rows_unpull(const Measurement *tests, size_t count, Evaluation *evaluation,
-                   Problem *problem) {
+Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
+                   Evaluation *evaluation, Problem *problem) {
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         EvaluationRow *row = &evaluation->rows.at[i];
+        if (!is_pulled(tests, row) || !has(row->restitution) || !has(row->contact_time))
+            continue;
+        if (!watch_advance(watch, 1))
+            return STATUS_CANCELLED;
         const Pull pull = pull_of(tests, row, evaluation->separation);
-        if (is_pulled(tests, row) && has(row->restitution) && has(row->contact_time))
-            TRY(unpull(&pull, row, problem));
+        TRY(unpull(&pull, row, problem));
     }
     for (size_t test = 0; test < count; test++) {
         double restitution, contact_time;
@@ -301,6 +310,8 @@ Status rows_unpull(const Measurement *tests, size_t count, Evaluation *evaluatio
             if (row->test != test || !is_pulled(tests, row) ||
                 (has(row->restitution) && has(row->contact_time)))
                 continue;
+            if (!watch_advance(watch, 1))
+                return STATUS_CANCELLED;
             const Pull pull = pull_of(tests, row, evaluation->separation);
             TRY(unpull_one(&pull, restitution, contact_time, row, problem));
         }

@@ -13,8 +13,8 @@ Status rows_add(const Measurement *of, size_t index, const Watch *watch, Evaluat
 // Takes gravity out of all drops whose test says what pulls; traces have had it taken out by their
 // fit. A drop that tells only one of e and T_c borrows the mean of the other from the readings of
 // its test that are free of gravity.
-Status rows_unpull(const Measurement *tests, size_t count, Evaluation *evaluation,
-                   Problem *problem);
+Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
+                   Evaluation *evaluation, Problem *problem);
 
 // The place of a row in what was given: "/drops/2", or "/measurements/3/traces/0".
 void row_pointer(const EvaluationRow *row, char *pointer, size_t size);

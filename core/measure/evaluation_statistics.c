@@ -248,6 +248,7 @@ Status quantity_make(Reading *readings, size_t count, const char *name, const ch
         .deviation = none,
         .scatter = none,
         .standard_error = none,
+        .spread = none,
         .low = none,
         .high = none,
         .minimum = none,
@@ -285,6 +286,10 @@ Status quantity_make(Reading *readings, size_t count, const char *name, const ch
         quantity->mean = mean_of(readings, count, true);
         is_made = is_made && make_interval(readings, count, quantity);
     }
+    quantity->spread = fmax(isnan(quantity->scatter) ? quantity->deviation : quantity->scatter,
+                            quantity->standard_error);
+    if (!(quantity->spread > rounding * fabs(quantity->mean)))
+        quantity->spread = none;
     is_made = is_made && trend_make(readings, count, name, unit, quantity);
     if (is_made && count > 2)
         is_made = find_outliers(readings, count, quantity);

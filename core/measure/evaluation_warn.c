@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/measure/evaluation_rows.h"
+#include "core/measure/evaluation_same.h"
 #include "core/measure/gravity.h"
 
 enum { OUTLIERS_TOLD = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
@@ -26,8 +27,7 @@ static const EvaluationRow *slowest(const Evaluation *evaluation, size_t test) {
     const EvaluationRow *found = NULL;
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         const EvaluationRow *row = &evaluation->rows.at[i];
-        const bool counts = row->restitution_counts || row->contact_time_counts;
-        if (row->test == test && counts && has(row->approach_speed) &&
+        if (row->test == test && row_counts(row) && has(row->approach_speed) &&
             (found == NULL || row->approach_speed < found->approach_speed))
             found = row;
     }
@@ -68,6 +68,33 @@ static Status warn_of_gravity(const Measurement *of, size_t test, Evaluation *ev
                         "slowest %.3g m/s it lengthens a contact of this e and T_c by %.2g %% and "
                         "lowers e by %.2g %%; %s",
                         row->approach_speed, 100 * longer, 100 * lower, advice);
+}
+
+// A height is worth a speed by the gravity of the lab, which what pulls during contact need not be.
+static Status warn_of_heights(const Measurement *of, size_t test, Evaluation *evaluation) {
+    const double gravity = of->test->gravity;
+    if (!(gravity > 0) || !(fabs(gravity / STANDARD_GRAVITY - 1) > worth_telling))
+        return STATUS_OK;
+    for (size_t i = 0; i < evaluation->rows.count; i++) {
+        const EvaluationRow *row = &evaluation->rows.at[i];
+        if (row->test != test || row->is_of_trace || !row_counts(row))
+            continue;
+        const Drop *drop = &of->test->drops.at[row->place];
+        const bool is_by_height = has(drop->approach_speed)
+                                      ? row->restitution_by == (int)RESTITUTION_BY_HEIGHTS
+                                      : has(drop->drop_height);
+        if (!is_by_height)
+            continue;
+        char pointer[POINTER_SIZE], place[POINTER_SIZE];
+        test_pointer(of, pointer);
+        pointer_join(place, sizeof place, pointer, "gravity");
+        return warnings_add(&evaluation->warnings, place,
+                            "%.4g m/s^2 pull during contact, but speeds are told from heights by "
+                            "%.6g m/s^2: where that is not what the impactor fell by, give "
+                            "approach_speed and rebound_speed",
+                            gravity, STANDARD_GRAVITY);
+    }
+    return STATUS_OK;
 }
 
 static Status warn_of_pairs(const Measurement *tests, size_t count, Evaluation *evaluation) {
@@ -171,9 +198,12 @@ Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evalu
         is_left_out = is_left_out || (row->restitution_by == RESTITUTION_BY_PULSE &&
                                       row->excluded == NULL && !row->restitution_counts);
     }
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         TRY(warn_of_gravity(&tests[i], i, evaluation));
+        TRY(warn_of_heights(&tests[i], i, evaluation));
+    }
     TRY(warn_of_pairs(tests, count, evaluation));
+    TRY(evaluation_warn_same(tests, count, evaluation));
     TRY(warn_of_pulses(evaluation, is_left_out));
     TRY(warn_of_interval(evaluation));
     TRY(warn_of_doubt(evaluation));

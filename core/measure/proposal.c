@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/measure/evaluation_statistics.h"
 #include "core/measure/sentence.h"
 
 const char *const proposal_form_names[] = {"constant", "table", NULL};
@@ -44,22 +45,39 @@ static Status describe(const Material *before, Material *material) {
     return STATUS_OK;
 }
 
-static bool is_same_text(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 static bool is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
+// What stands behind a revision: the tests of whose readings some do, and their ranges.
+typedef struct Behind {
+    const EvaluationRow **rows;
+    size_t count;
+    Measurement *tests; // in their order
+    size_t test_count;
+    Ranges ranges;
+} Behind;
+
+// Of rows that are all set; `tests` has room for all.
+static void look_behind(const Measurement *tests, size_t count, Behind *behind) {
+    behind->ranges = ranges_unknown;
+    for (size_t i = 0; i < behind->count; i++)
+        ranges_take(&behind->ranges, behind->rows[i], tests);
+    for (size_t test = 0; test < count; test++)
+        for (size_t i = 0; i < behind->count; i++)
+            if (behind->rows[i]->test == test) {
+                behind->tests[behind->test_count++] = tests[test];
+                break;
+            }
+}
+
 // What all tests have in common of impactor and base.
-static Status take_pair(const Measurement *tests, size_t count, Material *material,
-                        Warnings *warnings) {
-    const DropTest *first = tests[0].test;
+static Status take_pair(const Behind *behind, Material *material, Warnings *warnings) {
+    const DropTest *first = behind->tests[0].test;
     bool is_one = true;
-    for (size_t i = 1; i < count; i++) {
-        const DropTest *test = tests[i].test;
-        is_one = is_one && is_same_text(test->impactor, first->impactor) &&
+    for (size_t i = 1; i < behind->test_count; i++) {
+        const DropTest *test = behind->tests[i].test;
+        is_one = is_one && text_same(test->impactor, first->impactor) &&
                  is_same(test->impactor_mass, first->impactor_mass) && test->base == first->base &&
                  is_same(test->base_mass, first->base_mass);
     }
@@ -77,14 +95,16 @@ static Status take_pair(const Measurement *tests, size_t count, Material *materi
 
 static bool stands_before(const Measurement *tests, size_t index) {
     for (size_t i = 0; i < index; i++)
-        if (is_same_text(tests[i].test->source, tests[index].test->source))
+        if (text_same(tests[i].test->source, tests[index].test->source))
             return true;
     return false;
 }
 
 // Their sources, else their numbers.
-static Status take_source(const Measurement *tests, size_t count, Material *material) {
+static Status take_source(const Behind *behind, Material *material) {
     char text[SOURCE_MOST + 1] = "", number[32];
+    const Measurement *tests = behind->tests;
+    const size_t count = behind->test_count;
     for (size_t i = 0; i < count; i++)
         if (tests[i].test->source != NULL && !stands_before(tests, i))
             text_list(text, sizeof text, tests[i].test->source);
@@ -105,35 +125,15 @@ static Status take_source(const Measurement *tests, size_t count, Material *mate
     return STATUS_OK;
 }
 
-// Of some readings: their mean and their spread, of a single one what its instrument leaves.
-typedef struct Fold {
-    double n, sum, squares, uncertainty;
-} Fold;
-
-static void fold_add(Fold *fold, double value, double uncertainty) {
-    const double mean = fold->n > 0 ? fold->sum / fold->n : 0, n = fold->n;
-    fold->squares += (value - mean) * (value - mean) * n / (n + 1);
-    fold->sum += value;
-    fold->n++;
-    fold->uncertainty = uncertainty;
+static bool is_by_pulse(const Behind *behind) {
+    for (size_t i = 0; i < behind->count; i++)
+        if (behind->rows[i]->contact_time_counts &&
+            behind->rows[i]->contact_time_by == (int)CONTACT_TIME_BY_PULSE)
+            return true;
+    return false;
 }
 
-static double fold_mean(const Fold *fold) {
-    return fold->n > 0 ? fold->sum / fold->n : (double)NAN;
-}
-
-static double spread(double deviation, double mean, double uncertainty) {
-    if (deviation > 1e-12 * fabs(mean))
-        return deviation;
-    return uncertainty > 0 ? uncertainty : (double)NAN;
-}
-
-static double fold_spread(const Fold *fold) {
-    const double deviation = fold->n > 1 ? sqrt(fold->squares / (fold->n - 1)) : 0;
-    return spread(deviation, fold_mean(fold), fold->uncertainty);
-}
-
-static Status take_constant(Evaluation *evaluation, Proposal *proposal) {
+static Status take_constant(Evaluation *evaluation, Behind *behind, Proposal *proposal) {
     Material *material = &proposal->material;
     const Quantity *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
@@ -142,19 +142,13 @@ static Status take_constant(Evaluation *evaluation, Proposal *proposal) {
                         "in a measurement with heights or speeds")
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
-    Fold of_e = {0}, of_T = {0};
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->restitution_counts)
-            fold_add(&of_e, row->restitution, row->restitution_uncertainty);
-        if (row->contact_time_counts)
-            fold_add(&of_T, row->contact_time, row->contact_time_uncertainty);
-    }
+    for (size_t i = 0; i < evaluation->rows.count; i++)
+        if (row_counts(&evaluation->rows.at[i]))
+            behind->rows[behind->count++] = &evaluation->rows.at[i];
     material->restitution = e->mean;
-    material->restitution_deviation = fold_spread(&of_e);
+    material->restitution_deviation = e->spread;
     material->contact_time = T->mean;
-    if (T->count > 0)
-        material->contact_time_deviation = fold_spread(&of_T);
+    material->contact_time_deviation = T->spread;
     if (e->trend.verdict == TREND_NOT_CONSTANT)
         TRY(warnings_add(&evaluation->warnings, "/revision/restitution", "%s", e->trend.detail));
     if (T->trend.verdict == TREND_NOT_CONSTANT)
@@ -166,10 +160,10 @@ static Status take_constant(Evaluation *evaluation, Proposal *proposal) {
     return STATUS_OK;
 }
 
-// One row of a table to be.
+// One row of a table to be: so many rows from `first` on, by rising speed.
 typedef struct Bin {
-    double from; // [m/s]
-    Fold speed, restitution, contact_time;
+    size_t first, count;
+    bool has_restitution, has_time;
 } Bin;
 
 static int by_speed(const void *a, const void *b) {
@@ -178,121 +172,157 @@ static int by_speed(const void *a, const void *b) {
     return left < right ? -1 : left > right ? 1 : 0;
 }
 
-// Rows that count and have a speed, in bins by rising speed; both arrays have room for all rows.
-static size_t make_bins(const Evaluation *evaluation, const EvaluationRow **sorted, Bin *bins) {
-    size_t count = 0, bin_count = 0;
+// Rows that count and have a speed, in bins; `bins` has room for all rows.
+static size_t make_bins(const Evaluation *evaluation, Behind *behind, Bin *bins) {
+    size_t count = 0;
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         const EvaluationRow *row = &evaluation->rows.at[i];
-        if ((row->restitution_counts || row->contact_time_counts) && has(row->approach_speed))
-            sorted[count++] = row;
+        if (row_counts(row) && has(row->approach_speed))
+            behind->rows[behind->count++] = row;
     }
-    if (count > 0)
-        qsort(sorted, count, sizeof *sorted, by_speed);
-    for (size_t i = 0; i < count; i++) {
-        const EvaluationRow *row = sorted[i];
-        if (bin_count == 0 || row->approach_speed > PROPOSAL_BIN * bins[bin_count - 1].from)
-            bins[bin_count++] = (Bin){.from = row->approach_speed};
-        Bin *bin = &bins[bin_count - 1];
-        fold_add(&bin->speed, row->approach_speed, (double)NAN);
-        if (row->restitution_counts)
-            fold_add(&bin->restitution, row->restitution, row->restitution_uncertainty);
-        if (row->contact_time_counts)
-            fold_add(&bin->contact_time, row->contact_time, row->contact_time_uncertainty);
+    if (behind->count > 0)
+        qsort(behind->rows, behind->count, sizeof(const EvaluationRow *), by_speed);
+    for (size_t i = 0; i < behind->count; i++) {
+        const EvaluationRow *row = behind->rows[i];
+        if (count == 0 || row->approach_speed >
+                              PROPOSAL_BIN * behind->rows[bins[count - 1].first]->approach_speed)
+            bins[count++] = (Bin){.first = i};
+        Bin *bin = &bins[count - 1];
+        bin->count++;
+        bin->has_restitution = bin->has_restitution || row->restitution_counts;
+        bin->has_time = bin->has_time || row->contact_time_counts;
     }
-    return bin_count;
+    return count;
 }
 
-// Every row needs e, and T_c where any has it.
-static size_t keep_bins(Bin *bins, size_t count, bool *has_time) {
-    size_t kept = 0;
+// Every row needs e, and T_c where any has it. The rows of other bins are given up.
+static size_t keep_bins(Behind *behind, Bin *bins, size_t count, bool *has_time) {
+    size_t kept = 0, rows = 0;
     *has_time = false;
     for (size_t i = 0; i < count; i++)
-        *has_time = *has_time || bins[i].contact_time.n > 0;
-    for (size_t i = 0; i < count; i++)
-        if (bins[i].restitution.n > 0 && (!*has_time || bins[i].contact_time.n > 0))
-            bins[kept++] = bins[i];
+        *has_time = *has_time || bins[i].has_time;
+    for (size_t i = 0; i < count; i++) {
+        if (!bins[i].has_restitution || (*has_time && !bins[i].has_time))
+            continue;
+        bins[kept] = bins[i];
+        bins[kept].first = rows;
+        for (size_t k = 0; k < bins[i].count; k++)
+            behind->rows[rows++] = behind->rows[bins[i].first + k];
+        kept++;
+    }
+    behind->count = rows;
     return kept;
 }
 
-static Status fill_table(const Bin *bins, size_t count, bool has_time, Material *material) {
-    const double none = (double)NAN;
+// By the same rule as of all readings.
+static Status fold(const Behind *behind, const Bin *bin, bool is_time, Reading *readings,
+                   double *mean, double *deviation) {
+    size_t count = 0;
+    for (size_t i = 0; i < bin->count; i++) {
+        const EvaluationRow *row = behind->rows[bin->first + i];
+        if (is_time ? row->contact_time_counts : row->restitution_counts)
+            readings[count++] = (Reading){
+                .value = is_time ? row->contact_time : row->restitution,
+                .uncertainty =
+                    is_time ? row->contact_time_uncertainty : row->restitution_uncertainty,
+                .speed = row->approach_speed,
+            };
+    }
+    Quantity quantity;
+    const Status status = quantity_make(readings, count, "reading", "", &quantity, NULL);
+    *mean = quantity.mean;
+    *deviation = quantity.spread;
+    quantity_clear(&quantity);
+    return status;
+}
+
+static Status fill_table(const Behind *behind, const Bin *bins, size_t count, Reading *readings,
+                         Material *material) {
     material->table.at = calloc(count, sizeof *material->table.at);
     if (material->table.at == NULL)
         return STATUS_NO_MEMORY;
     material->table.count = count;
-    for (size_t i = 0; i < count; i++)
-        material->table.at[i] = (MaterialRow){
-            .approach_speed = fold_mean(&bins[i].speed),
-            .restitution = fold_mean(&bins[i].restitution),
-            .contact_time = has_time ? fold_mean(&bins[i].contact_time) : none,
-            .restitution_deviation = fold_spread(&bins[i].restitution),
-            .contact_time_deviation = has_time ? fold_spread(&bins[i].contact_time) : none,
-        };
+    for (size_t i = 0; i < count; i++) {
+        MaterialRow *row = &material->table.at[i];
+        double sum = 0;
+        for (size_t k = 0; k < bins[i].count; k++)
+            sum += behind->rows[bins[i].first + k]->approach_speed;
+        row->approach_speed = sum / (double)bins[i].count;
+        TRY(fold(behind, &bins[i], false, readings, &row->restitution,
+                 &row->restitution_deviation));
+        TRY(fold(behind, &bins[i], true, readings, &row->contact_time,
+                 &row->contact_time_deviation));
+    }
     return STATUS_OK;
 }
 
-static Status take_table(Evaluation *evaluation, Proposal *proposal) {
-    const size_t most = evaluation->rows.count + 1;
-    const EvaluationRow **sorted = calloc(most, sizeof *sorted);
-    Bin *bins = calloc(most, sizeof *bins);
-    Status status = sorted != NULL && bins != NULL ? STATUS_OK : STATUS_NO_MEMORY;
-    if (status == STATUS_OK) {
-        bool has_time;
-        const size_t all = make_bins(evaluation, sorted, bins);
-        const size_t kept = keep_bins(bins, all, &has_time);
-        if (kept < 2 || kept > MATERIAL_ROWS)
-            status = sentence(&proposal->why,
-                              "a table needs e%s at two approach speeds at least (%g times one "
-                              "another), %d at most; the readings tell %zu",
-                              has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
-                         ? STATUS_OK
-                         : STATUS_NO_MEMORY;
-        else
-            status = fill_table(bins, kept, has_time, &proposal->material);
-        if (status == STATUS_OK && proposal->why == NULL && kept < all)
-            status = warnings_add(&evaluation->warnings, "/revision/table",
-                                  "%zu of %zu speeds are left out: e%s is not known there",
-                                  all - kept, all, has_time ? " or T_c" : "");
-        if (status == STATUS_OK && proposal->why == NULL && !has_time)
-            status = warnings_add(&evaluation->warnings, "/revision/table",
-                                  "no contact time is known at any speed: the material can be "
-                                  "used in contact models of impulse alone");
-    }
-    free(sorted);
-    free(bins);
-    return status;
-}
-
-static bool is_by_pulse(const Evaluation *evaluation) {
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->contact_time_counts && row->contact_time_by == CONTACT_TIME_BY_PULSE)
-            return true;
-    }
-    return false;
+// `bins` and `readings` have room for all rows.
+static Status take_table(Evaluation *evaluation, Behind *behind, Bin *bins, Reading *readings,
+                         Proposal *proposal) {
+    bool has_time;
+    const size_t all = make_bins(evaluation, behind, bins);
+    const size_t kept = keep_bins(behind, bins, all, &has_time);
+    if (kept < 2 || kept > MATERIAL_ROWS)
+        return sentence(&proposal->why,
+                        "a table needs e%s at two approach speeds at least (%g times one "
+                        "another), %d at most; the readings tell %zu",
+                        has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
+                   ? STATUS_OK
+                   : STATUS_NO_MEMORY;
+    TRY(fill_table(behind, bins, kept, readings, &proposal->material));
+    if (kept < all)
+        TRY(warnings_add(&evaluation->warnings, "/revision/table",
+                         "%zu of %zu speeds are left out: e%s is not known there", all - kept, all,
+                         has_time ? " or T_c" : ""));
+    if (!has_time)
+        TRY(warnings_add(&evaluation->warnings, "/revision/table",
+                         "no contact time is known at any speed: the material can be used in "
+                         "contact models of impulse alone"));
+    return STATUS_OK;
 }
 
 static Status make(Evaluation *evaluation, const Measurement *tests, size_t count,
-                   const Material *before, ProposalForm form, Proposal *proposal) {
+                   const Material *before, ProposalForm form, Behind *behind, Proposal *proposal) {
     Material *material = &proposal->material;
     TRY(describe(before, material));
-    TRY(take_pair(tests, count, material, &evaluation->warnings));
-    TRY(take_source(tests, count, material));
-    material->least_speed = evaluation->least_speed;
-    material->most_speed = evaluation->most_speed;
-    material->least_temperature = evaluation->least_temperature;
-    material->most_temperature = evaluation->most_temperature;
-    if (is_by_pulse(evaluation))
+    if (form == PROPOSAL_TABLE) {
+        const size_t most = evaluation->rows.count + 1;
+        Bin *bins = calloc(most, sizeof *bins);
+        Reading *readings = calloc(most, sizeof *readings);
+        const Status status = bins != NULL && readings != NULL
+                                  ? take_table(evaluation, behind, bins, readings, proposal)
+                                  : STATUS_NO_MEMORY;
+        free(bins);
+        free(readings);
+        TRY(status);
+    } else {
+        TRY(take_constant(evaluation, behind, proposal));
+    }
+    if (proposal->why != NULL)
+        return STATUS_OK;
+    look_behind(tests, count, behind);
+    TRY(take_pair(behind, material, &evaluation->warnings));
+    TRY(take_source(behind, material));
+    material->least_speed = behind->ranges.least_speed;
+    material->most_speed = behind->ranges.most_speed;
+    material->least_temperature = behind->ranges.least_temperature;
+    material->most_temperature = behind->ranges.most_temperature;
+    if (is_by_pulse(behind))
         material->separation = evaluation->separation;
-    return form == PROPOSAL_TABLE ? take_table(evaluation, proposal)
-                                  : take_constant(evaluation, proposal);
+    return STATUS_OK;
 }
 
 Status proposal_make(Evaluation *evaluation, const Measurement *tests, size_t count,
                      const Material *before, ProposalForm form, Proposal *proposal,
                      Problem *problem) {
     *proposal = (Proposal){.why = NULL};
-    const Status status = make(evaluation, tests, count, before, form, proposal);
+    Behind behind = {.rows = calloc(evaluation->rows.count + 1, sizeof(const EvaluationRow *)),
+                     .tests = calloc(count + 1, sizeof(Measurement))};
+    const Status status = behind.rows != NULL && behind.tests != NULL
+                              ? make(evaluation, tests, count, before, form, &behind, proposal)
+                              : STATUS_NO_MEMORY;
+    free(behind.rows);
+    free(behind.tests);
     if (status != STATUS_OK || proposal->why != NULL)
         fields_clear(material_fields, &proposal->material);
     return status == STATUS_OK ? STATUS_OK : no_memory(problem);

@@ -21,27 +21,23 @@ static const double widest = 0.5, faintest = 4.2;
 static const double worst = 0.15;
 
 // clang-format off
-const Field trace_contact_fields[] = {
-    FIELD_REAL(TraceContact, start, "s", ANY, OPTIONAL, "when the fitted contact begins, after the first sample"),
-    FIELD_REAL(TraceContact, end, "s", ANY, OPTIONAL, "when the fitted contact ends"),
-    FIELD_REAL(TraceContact, first, "s", ANY, OPTIONAL, "the first sample in contact, or above the threshold where nothing is fitted"),
-    FIELD_REAL(TraceContact, last, "s", ANY, OPTIONAL, "the last such sample"),
-    FIELD_COUNT(TraceContact, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
-    FIELD_REAL(TraceContact, peak, "N", ANY, OPTIONAL, "largest force above the baseline, with its sign"),
-    FIELD_REAL(TraceContact, impulse, "N s", ANY, OPTIONAL, "of the fitted pulse"),
-    FIELD_REAL(TraceContact, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
-    FIELD_REAL(TraceContact, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceContact, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
-    FIELD_REAL(TraceContact, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair, by the fit"),
-    FIELD_REAL(TraceContact, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, least_contact_time, "s", ANY, OPTIONAL, "T_c is at least this, with most_contact_time in 95 of 100 cases"),
-    FIELD_REAL(TraceContact, most_contact_time, "s", ANY, OPTIONAL, "T_c is at most this"),
-    FIELD_REAL(TraceContact, restitution, NULL, ANY, OPTIONAL, "e by the pulse's shape"),
-    FIELD_REAL(TraceContact, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty"),
-    FIELD_REAL(TraceContact, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
-    FIELD_REAL(TraceContact, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
-    FIELD_FLAG(TraceContact, is_doubtful, false, "a figure is given, but the trace is hardly the model's: see why"),
-    FIELD_TEXT(TraceContact, why, TRACE_WHY_MOST, PRESENCE_OPTIONAL, 0, "why there is no figure of T_c, or why it is doubtful"),
+const Field trace_seen_fields[] = {
+    FIELD_REAL(TraceSeen, baseline, "N", ANY, OPTIONAL, "of the trace"),
+    FIELD_REAL(TraceSeen, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
+    FIELD_REAL(TraceSeen, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
+    FIELD_REAL(TraceSeen, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
+    FIELD_REAL(TraceSeen, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceSeen, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceSeen, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
+    FIELD_REAL(TraceSeen, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceSeen, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceSeen, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
+    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, or no pulse fits"),
+    FIELD_REAL(TraceSeen, end, "s", ANY, OPTIONAL, "when it ends"),
+    FIELD_REALS(TraceSeen, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
+    FIELD_REAL(TraceSeen, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceSeen, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
     FIELD_END
 };
 // clang-format on
@@ -181,11 +177,10 @@ static Status judge(const TraceInterval *likely, bool is_form_sure, double noise
     if (!is_form_sure) {
         if (is_wide)
             withdraw(counted, contact);
-        contact->is_doubtful = !is_wide;
         return tell(&contact->why,
                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
                     "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                    separation_names[separation], 100 * contact->misfit_share, 100 * noise);
+                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
     }
     if (is_wide) {
         withdraw(counted, contact);
@@ -202,48 +197,61 @@ static Status judge(const TraceInterval *likely, bool is_form_sure, double noise
     return STATUS_OK;
 }
 
+// The best pulse, from where the contact is taken to begin to where it is taken to end.
+static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFound *found,
+                   const TraceRun *run, Reals *pulse) {
+    if (!reals_make(pulse, TRACE_PULSE))
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < TRACE_PULSE; i++) {
+        const double s = shape->length * (double)i / (TRACE_PULSE - 1);
+        const double force = fit->residue.amplitude * trace_shape_force(shape, s);
+        pulse->at[i] = found->baseline + run->peak * (fit->residue.baseline + force);
+    }
+    return STATUS_OK;
+}
+
 static Status fit_contact(TraceWindow *window, const TraceFound *found, const TraceRun *run,
-                          const Stretch *stretch, double interval, TraceContact *contact) {
-    TraceFit fits[TRACE_FITS_MOST];
-    const size_t count = trace_fit(window, fits);
+                          const Stretch *stretch, double interval, const TraceFit *fits,
+                          size_t count, TraceContact *contact) {
     if (count == 0)
         return tell(&contact->why, "no pulse of the model's fits");
     const TraceFit *fit = &fits[0];
-    contact->samples = (uint64_t)(fit->last - fit->first + 1);
+    contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     const double origin = (double)stretch->from;
-    contact->first = (origin + (double)fit->first) * interval;
-    contact->last = (origin + (double)fit->last) * interval;
+    contact->seen.first = (origin + (double)fit->first) * interval;
+    contact->seen.last = (origin + (double)fit->last) * interval;
     TraceShape shape;
     double T;
     trace_point_shape(window, &fit->at, &shape, &T);
     const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
-    contact->crossing_shortfall = 1 - (visible.pressed - visible.from);
-    contact->impulse =
+    contact->seen.crossing_shortfall = 1 - (visible.pressed - visible.from);
+    contact->seen.impulse =
         fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
     size_t means;
-    contact->misfit_share = left_over(window, fit, &means);
+    contact->seen.misfit_share = left_over(window, fit, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
-    contact->misfit = noise > 0 ? contact->misfit_share / noise : (double)NAN;
-    if (contact->samples < SAMPLES_LEAST)
+    contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
+    if (contact->seen.samples < SAMPLES_LEAST)
         return tell(&contact->why,
                     "only %d samples are in contact, and pulses of very different length fit so "
                     "few: 5 are the least, 20 are better",
-                    (int)contact->samples);
-    if (contact->misfit_share > worst && contact->misfit_share > 2 * noise)
+                    (int)contact->seen.samples);
+    if (contact->seen.misfit_share > worst && contact->seen.misfit_share > 2 * noise)
         return tell(&contact->why,
                     "the trace is no pulse of the model's under the separation rule %s: the best "
                     "one leaves %.2g %% of the peak",
-                    separation_names[window->separation], 100 * contact->misfit_share);
+                    separation_names[window->separation], 100 * contact->seen.misfit_share);
     // So much is seldom left by chance, of so many means and of a noise known from so many samples.
     const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
     const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
     const bool is_form_sure =
-        !(contact->misfit_share > 0.01 && contact->misfit_share > noise * chance);
+        !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
     TraceInterval likely;
     TRY(trace_interval(window, fits, count, is_form_sure, &likely));
+    TRY(draw(fit, &shape, found, run, &contact->seen.pulse));
     const TraceContact counted = *contact;
-    contact->start = (origin + likely.start.mean) * interval;
-    contact->end = (origin + likely.end.mean) * interval;
+    contact->seen.start = (origin + likely.start.mean) * interval;
+    contact->seen.end = (origin + likely.end.mean) * interval;
     contact->contact_time = likely.contact_time.mean * interval;
     contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
     contact->least_contact_time = likely.least * interval;
@@ -253,26 +261,50 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     return judge(&likely, is_form_sure, noise, window->separation, &counted, contact);
 }
 
-// g / v0, which without v0 is m_e g over the fitted m_e v0, and that hangs on g / v0 but little.
-static void pull_window(const TraceWay *way, size_t number, double interval, double peak,
-                        TraceWindow *window) {
-    if (number < way->approach_speed_count && way->approach_speeds[number] > 0) {
-        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
-        return;
-    }
-    for (int round = 0; round < 20 && way->effective_mass > 0; round++) {
-        TraceFit fits[TRACE_FITS_MOST];
+// Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
+// is m_e g over the fitted m_e v0, and that hangs on the pull but little.
+static bool settle(double weight, double unit, TraceWindow *window, TraceFit *fit) {
+    double rate_before = 0, gap_before = 0;
+    for (int round = 0; round < 12; round++) {
         TraceShape shape;
         double T;
-        if (trace_fit(window, fits) == 0 || !trace_point_shape(window, &fits->at, &shape, &T))
-            return;
-        const double momentum = fits->residue.amplitude * T * peak * interval;
-        const double rate = way->effective_mass * way->gravity / momentum * interval;
-        const bool is_there = fabs(rate - window->pull_rate) < 1e-6 * rate;
-        window->pull_rate = rate;
-        if (is_there)
-            return;
+        if (!isfinite(fit->residue.sum) || !trace_point_shape(window, &fit->at, &shape, &T))
+            return false;
+        const double rate = window->pull_rate;
+        const double gap = weight / (fit->residue.amplitude * T * unit) - rate;
+        if (fabs(gap) < 1e-4 * rate)
+            return true;
+        // Under a strong pull the gap only halves from one to the next: so by the secant.
+        const double slope = round > 0 ? (gap - gap_before) / (rate - rate_before) : -1;
+        rate_before = rate;
+        gap_before = gap;
+        window->pull_rate = fmax(rate - gap / fmin(slope, -0.1), 0);
+        trace_refit(window, fit);
     }
+    return false;
+}
+
+// The fits under the pull. By g / v0; without v0 from the best fit on, until it is the best under
+// the pull that follows from it; *is_settled is false where there is no such.
+static size_t fit_pulled(const TraceWay *way, size_t number, double interval, double peak,
+                         TraceWindow *window, TraceFit *fits, bool *is_settled) {
+    const bool is_known = number < way->approach_speed_count && way->approach_speeds[number] > 0;
+    *is_settled = true;
+    if (is_known)
+        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+    size_t count = trace_fit(window, fits);
+    if (is_known || !(way->effective_mass > 0))
+        return count;
+    for (int round = 0; round < 4 && count > 0; round++) {
+        TraceFit best = fits[0];
+        const double before = window->pull_rate;
+        *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
+        if (*is_settled && window->pull_rate == before)
+            return count;
+        count = trace_fit(window, fits);
+    }
+    *is_settled = false;
+    return count;
 }
 
 static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
@@ -280,13 +312,21 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                            TraceContact *contact) {
     const TraceRun *run = &found->runs[number];
     const Stretch stretch = stretch_of(found, samples, number);
-    fields_clear(trace_contact_fields, contact);
-    contact->peak = run->peak;
-    contact->samples = run->last - run->first + 1;
-    contact->first = (double)run->first * interval;
-    contact->last = (double)run->last * interval;
-    contact->crossing_time = (double)(run->pressed - run->first + 1) * interval;
-    contact->crossing_uncertainty = interval / sqrt(6);
+    const double none = (double)NAN;
+    *contact = (TraceContact){.contact_time = none,
+                              .contact_time_uncertainty = none,
+                              .restitution = none,
+                              .restitution_uncertainty = none};
+    fields_clear(trace_seen_fields, &contact->seen);
+    contact->seen.baseline = found->baseline;
+    contact->seen.noise = found->noise;
+    contact->seen.threshold = found->threshold;
+    contact->seen.peak = run->peak;
+    contact->seen.samples = run->last - run->first + 1;
+    contact->seen.first = (double)run->first * interval;
+    contact->seen.last = (double)run->last * interval;
+    contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
+    contact->seen.crossing_uncertainty = interval / sqrt(6);
     count_samples(found, run, way->separation, interval, contact);
     if (run->first == 0 || run->last == samples - 1) {
         contact->most_contact_time = (double)NAN;
@@ -294,20 +334,23 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    if (way->gravity > 0)
-        pull_window(way, number, interval, fabs(run->peak), window);
-    TRY(fit_contact(window, found, run, &stretch, interval, contact));
-    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time)) {
-        contact->is_doubtful = true;
+    TraceFit fits[TRACE_FITS_MOST];
+    bool is_settled = true;
+    const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
+                                                       window, fits, &is_settled)
+                                          : trace_fit(window, fits);
+    TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
+    if (!is_settled && !isnan(contact->contact_time))
+        return tell(&contact->why,
+                    "gravity is taken into account in part only: the masses and this "
+                    "force do not lead to one approach speed; check them, or give it");
+    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
                                    "nor the masses are known");
-    }
     return STATUS_OK;
 }
 
-Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
-                  TraceReading *reading, Problem *problem) {
-    *reading = (TraceReading){.baseline = (double)NAN};
+Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem) {
     if (!(interval > 0) || !isfinite(interval))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "its interval must be above 0 s, is %g", interval);
@@ -318,6 +361,13 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         if (!(fabs(force->at[i]) < 1e150))
             return problem_add(problem, STATUS_INVALID, pointer,
                                "its sample %zu must be a force below 1e150 N", i);
+    return STATUS_OK;
+}
+
+Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
+                  TraceReading *reading, Problem *problem) {
+    *reading = (TraceReading){.why = NULL};
+    TRY(trace_check(interval, force, pointer, problem));
     TraceFound found;
     TraceWindow *window = malloc(sizeof *window);
     Status status = trace_find(force, way->threshold, &found);
@@ -329,9 +379,6 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
     if (window == NULL)
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK) {
-        reading->baseline = found.baseline;
-        reading->noise = found.noise;
-        reading->threshold = found.threshold;
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
             if (!watch_advance(way->watch, (double)i / (double)found.count)) {
                 status = STATUS_CANCELLED;
@@ -354,25 +401,11 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
 }
 
 void trace_reading_clear(TraceReading *reading) {
-    for (size_t i = 0; i < reading->contacts.count; i++)
-        fields_clear(trace_contact_fields, &reading->contacts.at[i]);
+    for (size_t i = 0; i < reading->contacts.count; i++) {
+        fields_clear(trace_seen_fields, &reading->contacts.at[i].seen);
+        free(reading->contacts.at[i].why);
+    }
     free(reading->contacts.at);
     free(reading->why);
     *reading = (TraceReading){.why = NULL};
-}
-
-void trace_pulse(const TraceContact *contact, const TraceWay *way, double approach_speed,
-                 double start, double interval, size_t count, double *force) {
-    const bool is_known = contact->contact_time > 0;
-    const double pull = way->gravity > 0 && approach_speed > 0 && is_known
-                            ? way->gravity * contact->contact_time / approach_speed
-                            : 0;
-    const double decay = is_known ? fabs(log(contact->restitution)) : 0;
-    const TraceShape shape = trace_shape(decay, pull, way->separation);
-    const double size = contact->impulse / (trace_shape_impulse(&shape) * contact->contact_time);
-    for (size_t i = 0; i < count; i++) {
-        const double s = (start + (double)i * interval - contact->start) / contact->contact_time;
-        force[i] =
-            is_known && s >= 0 && s <= shape.length ? size * trace_shape_force(&shape, s) : 0;
-    }
 }

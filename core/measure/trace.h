@@ -8,7 +8,7 @@
 #include "core/base/watch.h"
 #include "core/contact/contact.h"
 
-enum { TRACE_CONTACTS_MOST = 200, TRACE_WHY_MOST = 400 };
+enum { TRACE_CONTACTS_MOST = 200, TRACE_WHY_MOST = 400, TRACE_PULSE = 33 };
 
 // How a trace is read.
 typedef struct TraceWay {
@@ -24,26 +24,33 @@ typedef struct TraceWay {
     const Watch *watch; // asked before each contact whether to go on; NULL: nobody watches
 } TraceWay;
 
-// One contact. What is not known is NAN; uncertainties are standard ones.
-typedef struct TraceContact {
-    double start, end; // of the fitted pulse, from the first sample on [s]
-    double first,
-        last; // of the samples in contact, or above the threshold where nothing is fitted [s]
-    uint64_t samples; // from the one to the other
-    double peak;      // largest force above the baseline, with its sign [N]
-    double impulse;   // of the fitted pulse, with its sign [N s]
+// Where a contact is in its trace, as it is shown and drawn. What is not known is NAN.
+typedef struct TraceSeen {
+    double baseline, noise, threshold; // of the trace; the threshold is above the baseline [N]
+    double first, last; // of the samples in contact, or above the threshold where nothing is
+                        // fitted, from the first sample of the trace on [s]
+    uint64_t samples;   // from the one to the other
+    double peak;        // largest force above the baseline, with its sign [N]
     // Between the crossings of the threshold on the pressing side, which is short of T_c by so much
     // of it as the fitted pulse has it.
-    double crossing_time, crossing_uncertainty;    // [s]
-    double crossing_shortfall;                     // [-]
+    double crossing_time, crossing_uncertainty; // [s]
+    double crossing_shortfall;                  // [-]
+    double impulse;                             // of the pulse that fits best, with its sign [N s]
+    double start, end;                          // of the fitted pulse [s]
+    Reals pulse;         // TRACE_PULSE forces of it as the trace has them, from start to end [N]
+    double misfit;       // rms of what the fit leaves over the noise
+    double misfit_share; // and over the peak
+} TraceSeen;
+extern const Field trace_seen_fields[];
+
+// One contact. What is not known is NAN; uncertainties are standard ones.
+typedef struct TraceContact {
+    TraceSeen seen;
     double contact_time, contact_time_uncertainty; // T_c of an isolated pair, by the fit [s]
     double least_contact_time,
         most_contact_time; // within which it lies, 95 %; also where there is no figure [s]
     double restitution, restitution_uncertainty; // by the pulse's shape
-    double misfit;                               // rms of what the fit leaves over the noise
-    double misfit_share;                         // and over the peak
-    bool is_doubtful;                            // a figure is given, but see why
-    char *why;                                   // no figure is given, or it is doubtful; NULL
+    char *why; // no figure is given, or a doubtful one; NULL: it is good
 } TraceContact;
 typedef struct TraceContacts {
     TraceContact *at;
@@ -51,22 +58,17 @@ typedef struct TraceContacts {
 } TraceContacts;
 
 typedef struct TraceReading {
-    double baseline, noise, threshold; // [N]
     TraceContacts contacts;
     char *why; // there are none, or not all; NULL
 } TraceReading;
 
-extern const Field trace_contact_fields[];
+// Whether the trace can be read at all: STATUS_INVALID with the fault at `pointer`.
+Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem);
 
-// Faults only where the trace cannot be read at all (STATUS_INVALID at `pointer`),
-// STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear in any case.
+// STATUS_INVALID as trace_check, STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear
+// in any case.
 Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
                   TraceReading *reading, Problem *problem);
 void trace_reading_clear(TraceReading *reading);
-
-// The fitted pulse's force without baseline at `count` times from `start` on, for drawing [N]; 0
-// everywhere where there is no figure. `approach_speed` [m/s] is used only with gravity.
-void trace_pulse(const TraceContact *contact, const TraceWay *way, double approach_speed,
-                 double start, double interval, size_t count, double *force);
 
 #endif

@@ -28,19 +28,9 @@ TraceBox trace_box(long first, long last, long gaps) {
 bool trace_point_shape(const TraceWindow *window, const TracePoint *point, TraceShape *shape,
                        double *contact_time) {
     const double length = point->part[END] - point->part[START];
-    double T = length;
-    *shape = trace_shape(point->part[DECAY], window->pull_rate * T, window->separation);
-    if (window->pull_rate > 0)
-        // A longer T_c means a stronger pull means a longer contact.
-        for (int step = 0; step < 40; step++) {
-            const double next = isfinite(shape->length) ? length / shape->length : T * 0.7;
-            const bool is_there = fabs(next - T) <= 1e-10 * T;
-            T = next;
-            *shape = trace_shape(point->part[DECAY], window->pull_rate * T, window->separation);
-            if (is_there)
-                break;
-        }
-    *contact_time = T;
+    *shape =
+        trace_shape_lasting(point->part[DECAY], window->pull_rate * length, window->separation);
+    *contact_time = length / shape->length;
     return length > 0 && isfinite(shape->length);
 }
 
@@ -378,4 +368,11 @@ size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]) {
             count = insert(fits, count, &seeds[i]);
     }
     return count;
+}
+
+void trace_refit(const TraceWindow *window, TraceFit *fit) {
+    const TraceBox box = trace_box(fit->first, fit->last, 1);
+    trace_fit_box(window, &box, fit);
+    if (isfinite(fit->residue.sum))
+        climb(window, fit);
 }

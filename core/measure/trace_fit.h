@@ -65,6 +65,9 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
 // From pulses of every form, the best first; how many there are.
 size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]);
 
+// From a fit on that was made under another pull.
+void trace_refit(const TraceWindow *window, TraceFit *fit);
+
 // log of the likelihood under noise of unknown size, but for a constant.
 double trace_likelihood(const TraceWindow *window, double sum);
 // sigma^2 of the noise.

@@ -53,48 +53,82 @@ double trace_shape_force(const TraceShape *shape, double s) {
     return shape->pull + exp(-shape->decay * s) * (shape->sine * sine + shape->cosine * cosine);
 }
 
-// What ends the contact: y, or F, at s.
-static double remainder_at(const TraceShape *shape, double s, int separation) {
-    if (separation == SEPARATION_ZERO_FORCE)
-        return trace_shape_force(shape, s);
+// What ends the contact, y or F, as own + pull * pulled at s, and the slope of own. That of pulled
+// is own itself, under either rule.
+typedef struct Remainder {
+    double own, pulled, slope;
+} Remainder;
+
+static Remainder remainder_at(double decay, double turn, int separation, double s) {
     double cosine;
-    const double sine = waves(shape->turn, s, &cosine), fall = exp(-shape->decay * s);
-    const double rest = shape->pull / (shape->turn + shape->decay * shape->decay);
-    return fall * sine + rest * (1 - fall * (cosine + shape->decay * sine));
+    const double sine = waves(turn, s, &cosine), fall = exp(-decay * s);
+    if (separation == SEPARATION_ZERO_FORCE) {
+        const double on_sine = turn - decay * decay, on_cosine = 2 * decay;
+        return (Remainder){
+            .own = fall * (on_sine * sine + on_cosine * cosine),
+            .pulled = 1 - fall * (cosine - decay * sine),
+            .slope = fall * ((on_sine - decay * on_cosine) * cosine -
+                             (turn * on_cosine + decay * on_sine) * sine),
+        };
+    }
+    return (Remainder){
+        .own = fall * sine,
+        .pulled = (1 - fall * (cosine + decay * sine)) / (turn + decay * decay),
+        .slope = fall * (cosine - decay * sine),
+    };
 }
 
-// The pull lengthens a contact, and may end it no more: then what is left does not come below 0
-// within the oscillation.
-static double length_under_pull(const TraceShape *shape, int separation) {
-    enum { STEPS = 64 };
-    const double most = shape->turn > 0 ? fmin(2 * pi / sqrt(shape->turn), 8) : 8;
-    double before = 1, after = 1;
-    for (int i = 0; remainder_at(shape, after, separation) > 0; i++) {
-        if (i == STEPS || after > most)
-            return (double)INFINITY;
-        before = after;
-        after += (most - 1) / STEPS + 1e-3;
+// The pull lengthens a contact, and may end it no more: then INFINITY. `push` is the pull, or, if
+// it is `of_length`, the pull times the length that is sought.
+//
+// Without pull the end is at 1, and own is below 0 for half an oscillation from there on. In it
+// own' / own falls without end, so what is left falls, from above 0 at 1, until where its own slope
+// at that pull is 0, and rises behind. Either the end is before that, and the only one, or there is
+// none: Newton's method between bounds that come together about the one or the other.
+static double length_under_pull(double decay, double turn, int separation, double push,
+                                bool of_length) {
+    double s = 1, low = 1, high = turn > 0 ? fmin(1 + pi / sqrt(turn), 8) : 8;
+    for (int step = 0; step < 100; step++) {
+        const Remainder at = remainder_at(decay, turn, separation, s);
+        const double pull = of_length ? push / s : push;
+        const double left = at.own + pull * at.pulled, falls = at.slope + pull * at.own;
+        const double change = left / (of_length ? falls - pull * at.pulled / s : falls);
+        const double next = s - change;
+        if (falls < 0 && fabs(change) < 1e-9)
+            return fmax(next, 1);
+        *(left > 0 && falls < 0 ? &low : &high) = s;
+        if (high - low < 1e-8)
+            break;
+        s = falls < 0 && next > low && next < high ? next : low + (high - low) / 2;
     }
-    for (int i = 0; i < 60; i++) {
-        const double middle = before + (after - before) / 2;
-        *(remainder_at(shape, middle, separation) > 0 ? &before : &after) = middle;
-    }
-    return after;
+    return (double)INFINITY;
 }
 
-TraceShape trace_shape(double decay, double pull, int separation) {
-    const double turn = separation == SEPARATION_ZERO_FORCE ? zero_force_turn(decay) : pi * pi;
-    TraceShape shape = {
+static TraceShape shape_of(double decay, double turn, double pull, double length) {
+    return (TraceShape){
         .decay = decay,
         .turn = turn,
         .pull = pull,
         .sine = turn - decay * decay + pull * decay,
         .cosine = 2 * decay - pull,
-        .length = 1,
+        .length = length,
     };
-    if (pull > 0)
-        shape.length = length_under_pull(&shape, separation);
-    return shape;
+}
+
+static double turn_of(double decay, int separation) {
+    return separation == SEPARATION_ZERO_FORCE ? zero_force_turn(decay) : pi * pi;
+}
+
+TraceShape trace_shape(double decay, double pull, int separation) {
+    const double turn = turn_of(decay, separation);
+    return shape_of(decay, turn, pull,
+                    pull > 0 ? length_under_pull(decay, turn, separation, pull, false) : 1);
+}
+
+TraceShape trace_shape_lasting(double decay, double pull, int separation) {
+    const double turn = turn_of(decay, separation);
+    const double length = pull > 0 ? length_under_pull(decay, turn, separation, pull, true) : 1;
+    return shape_of(decay, turn, pull / length, length);
 }
 
 // The change of momentum, v0 less the speed at the end, and what was pulled meanwhile.

@@ -23,6 +23,9 @@ typedef struct TraceShape {
 // `pull` is g T_c / v0 of what pulls the pair together during contact, 0: nothing.
 TraceShape trace_shape(double decay, double pull, int separation);
 
+// `pull` is g / v0 times the time that the contact lasts, as a trace shows it.
+TraceShape trace_shape_lasting(double decay, double pull, int separation);
+
 double trace_shape_force(const TraceShape *shape, double s);
 
 // The integral of the force over the contact [m_e v0].

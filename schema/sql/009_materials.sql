@@ -1,6 +1,6 @@
 -- The lab's materials. What is said of one stands in its revisions, what was measured in its measurements, what people
 -- think of a revision in its reviews, and who did what and why in the trail: rows are added, never changed, never deleted.
--- Who: the token's name; NULL: the local user, or the program itself. Standard deviations, SI units, temperatures in degC.
+-- Who: the token's name; NULL: the local user, or of a revision the program; 'impactd': the program reviewed it. Standard deviations, SI units, temperatures in degC.
 DROP VIEW material_states;
 CREATE TEMP TABLE revisions_before AS SELECT * FROM material_revisions;
 CREATE TEMP TABLE reviews_before AS SELECT * FROM material_reviews;
@@ -63,6 +63,10 @@ CREATE TABLE material_measurements (
     author           TEXT,
     comment          TEXT    NOT NULL,
     created_unix_ms  INTEGER NOT NULL,
+    -- Of the document, for lists that do not read it, large as it may be: they lie before it.
+    drops            INTEGER NOT NULL,
+    traces           INTEGER NOT NULL,
+    head             TEXT    NOT NULL,
     document         TEXT    NOT NULL,
     UNIQUE (material, measurement)
 ) STRICT;
@@ -82,26 +86,36 @@ CREATE TABLE material_trail (
 ) STRICT;
 CREATE UNIQUE INDEX material_trail_of ON material_trail (material, version);
 
--- The paper's five, with what it says of their tests; what it does not say stays unknown. They are of no user's hand, so
--- their time is that of this step, the same everywhere.
+-- One row: what revisions, reviews, measurements and the trail take by and large. They only grow, so there is an end to it.
+CREATE TABLE material_room (
+    bytes  INTEGER NOT NULL CHECK (bytes >= 0)
+) STRICT;
+INSERT INTO material_room (bytes) VALUES (0);
+
+-- The paper's five, with what it says of their tests; what it does not say stays unknown. They are of no user's hand: their
+-- time is that of this step, the same everywhere, and it is the program that calls them approved.
+CREATE TEMP TABLE paper (slug TEXT NOT NULL, kind TEXT NOT NULL);
+INSERT INTO paper (slug, kind) VALUES ('sponge', 'foam'), ('soft_rubber', 'rubber'), ('hard_rubber', 'rubber'),
+                                      ('hard_acrylic', 'plastic'), ('aluminium', 'metal');
 INSERT INTO material_revisions (number, material, revision, name, kind, restitution, contact_time, least_speed, most_speed,
                                 impactor, impactor_mass, source, comment, created_unix_ms)
-SELECT b.number, b.material, b.revision, b.name,
-       CASE m.slug WHEN 'sponge' THEN 'foam' WHEN 'soft_rubber' THEN 'rubber' WHEN 'hard_rubber' THEN 'rubber'
-                   WHEN 'hard_acrylic' THEN 'plastic' WHEN 'aluminium' THEN 'metal' END,
-       b.restitution, b.contact_time, 0.15, 1.0, 'steel ball, 30 mm', 0.11, b.source, 'as published', 1795219200000
-FROM revisions_before b JOIN materials m ON m.number = b.material ORDER BY b.number;
-INSERT INTO material_reviews (number, material, revision, status, reason, created_unix_ms)
-SELECT number, material, revision, status, reason, 1795219200000 FROM reviews_before ORDER BY number;
-INSERT INTO material_trail (material, version, action, revision, why, created_unix_ms)
+SELECT b.number, b.material, b.revision, b.name, p.kind, b.restitution, b.contact_time, iif(p.slug IS NULL, NULL, 0.15),
+       iif(p.slug IS NULL, NULL, 1.0), iif(p.slug IS NULL, NULL, 'steel ball, 30 mm'), iif(p.slug IS NULL, NULL, 0.11),
+       b.source, iif(p.slug IS NULL, 'from before', 'as published'), 1795219200000
+FROM revisions_before b JOIN materials m ON m.number = b.material LEFT JOIN paper p ON p.slug = m.slug ORDER BY b.number;
+INSERT INTO material_reviews (number, material, revision, status, reason, reviewer, created_unix_ms)
+SELECT b.number, b.material, b.revision, b.status, b.reason, iif(p.slug IS NULL, NULL, 'impactd'), 1795219200000
+FROM reviews_before b JOIN materials m ON m.number = b.material LEFT JOIN paper p ON p.slug = m.slug ORDER BY b.number;
+INSERT INTO material_trail (material, version, action, revision, who, why, created_unix_ms)
 SELECT material, row_number() OVER (PARTITION BY material ORDER BY is_review, number),
-       CASE action WHEN 'approved' THEN 'approve' WHEN 'deprecated' THEN 'deprecate' ELSE action END, revision, why,
+       CASE action WHEN 'approved' THEN 'approve' WHEN 'deprecated' THEN 'deprecate' ELSE action END, revision, who, why,
        created_unix_ms
-FROM (SELECT 0 AS is_review, number, material, revision, iif(revision = 1, 'create', 'revise') AS action, comment AS why,
-             created_unix_ms FROM material_revisions
+FROM (SELECT 0 AS is_review, number, material, revision, iif(revision = 1, 'create', 'revise') AS action, author AS who,
+             comment AS why, created_unix_ms FROM material_revisions
       UNION ALL
-      SELECT 1, number, material, revision, status, reason, created_unix_ms FROM material_reviews)
+      SELECT 1, number, material, revision, status, reviewer, reason, created_unix_ms FROM material_reviews)
 ORDER BY is_review, number;
+DROP TABLE paper;
 DROP TABLE revisions_before;
 DROP TABLE reviews_before;
 

@@ -32,6 +32,16 @@ CREATE TABLE record_samples (
     samples  BLOB    NOT NULL
 ) STRICT;
 
+-- What of the records an unfinished job was accepted with: "record:elcentro".
+CREATE TABLE job_uses (
+    job   INTEGER NOT NULL REFERENCES jobs (number) ON DELETE CASCADE,
+    name  TEXT    NOT NULL,
+    PRIMARY KEY (job, name)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX job_uses_of ON job_uses (name);
+CREATE TRIGGER jobs_end AFTER UPDATE OF state ON jobs WHEN OLD.state < 2 AND NEW.state >= 2
+BEGIN DELETE FROM job_uses WHERE job = OLD.number; END;
+
 CREATE TRIGGER records_keep BEFORE UPDATE ON records
 BEGIN SELECT RAISE (ABORT, 'a record never changes; add another'); END;
 CREATE TRIGGER records_once BEFORE INSERT ON records
@@ -39,7 +49,8 @@ WHEN EXISTS (SELECT 1 FROM records WHERE name = NEW.name OR number = NEW.number)
 BEGIN SELECT RAISE (ABORT, 'a record never changes; add another'); END;
 CREATE TRIGGER records_stay BEFORE DELETE ON records
 WHEN EXISTS (SELECT 1 FROM result_uses WHERE name = 'record:' || OLD.name)
-BEGIN SELECT RAISE (ABORT, 'a record that results were made with is not deleted'); END;
+  OR EXISTS (SELECT 1 FROM job_uses WHERE name = 'record:' || OLD.name)
+BEGIN SELECT RAISE (ABORT, 'a record that results were or will be made with is not deleted'); END;
 CREATE TRIGGER records_go AFTER DELETE ON records
 BEGIN DELETE FROM record_samples WHERE number = OLD.number; END;
 CREATE TRIGGER record_samples_keep BEFORE UPDATE ON record_samples

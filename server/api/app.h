@@ -23,7 +23,7 @@ struct App {
     bool has_tls;
     int64_t started_unix_ms;
     atomic_bool is_stopping;
-    atomic_int evaluations; // of long traces, under way
+    atomic_int evaluations; // long ones, under way
 };
 
 extern const char program_version[]; // "0.1.0"

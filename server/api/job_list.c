@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/date.h"
 #include "core/base/field.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/api/job_document.h"
 #include "server/api/query.h"
-#include "server/base/clock.h"
 #include "server/http/reply.h"
 #include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
@@ -67,7 +67,7 @@ static Status read_time(const Request *request, const char *name, bool is_end, i
     TRY(query_text(request, name, &text, problem));
     if (text == NULL)
         return STATUS_OK;
-    if (!clock_read(text, unix_ms))
+    if (!date_read(text, unix_ms))
         return problem_set(problem, STATUS_USAGE,
                            "the query parameter \"%s\" must be a day or a time as of RFC 3339, "
                            "2026-11-21T09:00:00Z, is \"%.40s\"",

@@ -170,13 +170,11 @@ static size_t put_differences(Bytes *bytes, const Material *from, const Material
 }
 
 // What came newest is set beside what is in use; that itself beside the one before it.
-static Status read_sides(App *app, const Request *request, size_t *from, size_t *to,
-                         Problem *problem) {
+static Status read_sides(App *app, const Request *request, const MaterialState *state, size_t *from,
+                         size_t *to, Problem *problem) {
     const char *slug = request->parameters[0];
-    MaterialState state;
+    const size_t latest = (size_t)state->latest;
     MaterialRevision head;
-    TRY(store_material_state(app->store, slug, &state, problem));
-    const size_t latest = (size_t)state.latest;
     TRY(request_count(request, "to", 1, latest, latest, to, problem));
     size_t before = *to > 1 ? *to - 1 : 1;
     const Status status = store_material(app->store, slug, 0, &head, NULL);
@@ -186,10 +184,8 @@ static Status read_sides(App *app, const Request *request, size_t *from, size_t 
     return request_count(request, "from", 1, latest, before, from, problem);
 }
 
-static Status diff(App *app, const Request *request, const MaterialRevision *a,
-                   const MaterialRevision *b, Reply *reply, Problem *problem) {
-    if (is_known(request, reply, b->latest, b->version))
-        return STATUS_OK;
+static Status diff(App *app, const MaterialRevision *a, const MaterialRevision *b, Reply *reply,
+                   Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\"", a->slug);
     put_side(&bytes, "from", a);
@@ -203,13 +199,18 @@ static Status diff(App *app, const Request *request, const MaterialRevision *a,
 Status materials_diff(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
     MaterialRevision a = {0}, b = {0};
+    MaterialState state;
     size_t from, to;
-    TRY(read_sides(app, request, &from, &to, problem));
+    // Before all else, so that its tag is not newer than what it stands for.
+    TRY(store_material_state(app->store, slug, &state, problem));
+    TRY(read_sides(app, request, &state, &from, &to, problem));
+    if (is_known(request, reply, state.latest, state.version))
+        return STATUS_OK;
     Status status = catalogue_find(app->store, slug, from, &a, problem);
     if (status == STATUS_OK)
         status = catalogue_find(app->store, slug, to, &b, problem);
     if (status == STATUS_OK)
-        status = diff(app, request, &a, &b, reply, problem);
+        status = diff(app, &a, &b, reply, problem);
     material_revision_clear(&a);
     material_revision_clear(&b);
     return status;

@@ -7,6 +7,7 @@
 #include "server/api/query.h"
 #include "server/base/link.h"
 #include "server/http/reply.h"
+#include "server/materials/catalogue.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 1000 };
 

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
@@ -83,18 +82,6 @@ Status material_revision_number(const char *text, uint64_t *revision, Problem *p
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no revision \"%.20s\"; they count from 1", text);
-}
-
-void material_put_text(Bytes *bytes, const char *name, const char *text) {
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, text);
-}
-
-void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
-    char text[32];
-    if (unix_ms > 0)
-        clock_rfc3339(unix_ms, text);
-    material_put_text(bytes, name, unix_ms > 0 ? text : NULL);
 }
 
 static Status show(App *app, const Request *request, uint64_t revision, Reply *reply,

@@ -5,6 +5,7 @@
 
 #include "core/measure/evaluation.h"
 #include "server/api/app.h"
+#include "server/api/patience.h"
 #include "server/base/bytes.h"
 #include "server/store/material_rows.h"
 
@@ -35,13 +36,8 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
 // zero penetration.
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem);
 
-// evaluation_make for a request: it ends when the daemon does, or takes too long, and of those that
-// may take long only so many go at once. STATUS_BUSY, STATUS_LIMIT.
-Status material_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+// evaluation_make while patience lasts. STATUS_BUSY, STATUS_LIMIT.
+Status material_evaluate(Patience *patience, const Measurement *tests, size_t count, int separation,
                          Evaluation *evaluation, Reply *reply, Problem *problem);
-
-// A text and a time as members behind others: NULL and 0 are null.
-void material_put_text(Bytes *bytes, const char *name, const char *text);
-void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
 
 #endif

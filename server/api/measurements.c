@@ -17,11 +17,6 @@
 #include "server/materials/measurement.h"
 
 enum { LIST_INITIAL = 20, LIST_MOST = 100 };
-enum { PAGE_MOST = 32 << 20 }; // bytes of documents that are read for one page
-
-// Of evaluations: samples in traces that take a moment, and how many longer ones go at once.
-enum { SAMPLES_QUICK = 20000, LONG_MOST = 4 };
-static const double patience_most = 30; // [s]
 
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem) {
     const char *slug = request->parameters[0];
@@ -50,47 +45,41 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
     return problem_set(problem, status, "the material \"%.63s\" cannot be read", slug);
 }
 
-typedef struct Patience {
-    App *app;
-    int64_t until_ns; // monotonic
-} Patience;
-
-static bool is_patient(void *context, double fraction) {
-    const Patience *patience = context;
-    (void)fraction;
-    return !atomic_load(&patience->app->is_stopping) && clock_monotonic_ns() < patience->until_ns;
-}
-
-static Status evaluate(App *app, const Measurement *tests, size_t count, int separation,
-                       Evaluation *evaluation, Problem *problem) {
-    Patience patience = {app, clock_monotonic_ns() + (int64_t)(1e9 * patience_most)};
-    const Watch watch = {&patience, is_patient};
-    const Status status =
-        evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
-    if (status != STATUS_CANCELLED)
-        return status;
-    if (atomic_load(&app->is_stopping))
-        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
-    return problem_set(problem, STATUS_LIMIT,
-                       "to find all contacts of these traces takes more than %g s: cut the traces, "
-                       "or take in fewer measurements at a time",
-                       patience_most);
-}
-
-Status material_evaluate(App *app, const Measurement *tests, size_t count, int separation,
+Status material_evaluate(Patience *patience, const Measurement *tests, size_t count, int separation,
                          Evaluation *evaluation, Reply *reply, Problem *problem) {
-    *evaluation = (Evaluation){.separation = separation};
-    if (evaluation_samples(tests, count) <= SAMPLES_QUICK)
-        return evaluate(app, tests, count, separation, evaluation, problem);
-    Status status = STATUS_BUSY;
-    if (atomic_fetch_add(&app->evaluations, 1) < LONG_MOST) {
-        status = evaluate(app, tests, count, separation, evaluation, problem);
-    } else {
+    const Watch watch = {patience, patience_lasts};
+    Status status =
+        evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
+    if (status == STATUS_CANCELLED)
+        status = patience_tell(patience, problem);
+    if (status == STATUS_BUSY)
         reply->retry_after = 10;
-        (void)problem_set(problem, STATUS_BUSY,
-                          "other long force traces are being evaluated: ask again");
+    return status;
+}
+
+// Of a test that is kept whatever it comes to. Given up, the evaluation is clear and its warnings
+// say why.
+static Status evaluate_kept(Patience *patience, const Measurement *test, int separation,
+                            Evaluation *evaluation, bool *is_there, Reply *reply,
+                            Problem *problem) {
+    Problem *why = calloc(1, sizeof *why);
+    *evaluation = (Evaluation){.separation = separation};
+    *is_there = false;
+    if (why == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
+    Status status = material_evaluate(patience, test, 1, separation, evaluation, reply, why);
+    *is_there = status == STATUS_OK;
+    if (status == STATUS_NO_MEMORY) {
+        (void)problem_set(problem, status, "%s", why->detail);
+    } else if (status != STATUS_OK) {
+        evaluation_clear(evaluation);
+        *evaluation = (Evaluation){.separation = separation};
+        reply->retry_after = 0; // that is of a refusal
+        status = warnings_add(&evaluation->warnings, "", "it is not evaluated: %s", why->detail);
+        if (status != STATUS_OK)
+            (void)problem_set(problem, status, "no memory for the evaluation");
     }
-    atomic_fetch_sub(&app->evaluations, 1);
+    free(why);
     return status;
 }
 
@@ -109,11 +98,15 @@ static Status read_body(const Request *request, MeasurementBody *body, Problem *
     return STATUS_OK;
 }
 
-static void write_test(Bytes *bytes, const DropTest *test, const Evaluation *evaluation) {
+static void write_test(Bytes *bytes, const DropTest *test, const Evaluation *evaluation,
+                       bool is_there) {
     bytes_text(bytes, ", \"test\": ");
     write_item(bytes, drop_test_fields, test, WRITE_SCENE);
     bytes_text(bytes, ", ");
-    evaluation_write(bytes, evaluation);
+    if (is_there)
+        evaluation_write(bytes, evaluation);
+    else
+        evaluation_write_none(bytes, evaluation);
     bytes_text(bytes, ", ");
 }
 
@@ -121,7 +114,7 @@ static Status tell_dry(App *app, const char *slug, const DropTest *test,
                        const Evaluation *evaluation, Reply *reply, Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"dry_run\": true, \"slug\": \"%s\"", slug);
-    write_test(&bytes, test, evaluation);
+    write_test(&bytes, test, evaluation, true);
     bytes_format(&bytes,
                  "\"links\": {\"material\": \"%s/v1/materials/%s\", \"measurements\": "
                  "\"%s/v1/materials/%s/measurements\"}}\n",
@@ -130,11 +123,12 @@ static Status tell_dry(App *app, const char *slug, const DropTest *test,
 }
 
 static Status tell(App *app, const MaterialMeasurement *row, const DropTest *test,
-                   const Evaluation *evaluation, int code, Reply *reply, Problem *problem) {
+                   const Evaluation *evaluation, bool is_there, int code, Reply *reply,
+                   Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     bytes_text(&bytes, "{");
     measurement_write_row(&bytes, row);
-    write_test(&bytes, test, evaluation);
+    write_test(&bytes, test, evaluation, is_there);
     measurement_write_links(&bytes, row->slug, row->measurement);
     bytes_text(&bytes, "}\n");
     if (code == 201)
@@ -147,7 +141,7 @@ static Status tell(App *app, const MaterialMeasurement *row, const DropTest *tes
 // know nothing.
 static Status keep(App *app, const Request *request, const MeasurementBody *body,
                    const MaterialState *state, uint64_t seen, const Evaluation *evaluation,
-                   Reply *reply, Problem *problem) {
+                   bool is_there, Reply *reply, Problem *problem) {
     Bytes document = {0};
     write_item(&document, drop_test_fields, &body->test, WRITE_SCENE);
     char *text = bytes_take(&document, NULL);
@@ -166,22 +160,28 @@ static Status keep(App *app, const Request *request, const MeasurementBody *body
     char tag[MATERIAL_TAG];
     material_tag(row.slug, state->latest, state->version + 1, tag);
     snprintf(reply->etag, sizeof reply->etag, "\"%s\"", tag);
-    return tell(app, &row, &body->test, evaluation, 201, reply, problem);
+    return tell(app, &row, &body->test, evaluation, is_there, 201, reply, problem);
 }
 
 static Status create(App *app, const Request *request, const MeasurementBody *body,
                      const MaterialState *state, uint64_t seen, Reply *reply, Problem *problem) {
-    size_t is_dry;
+    bool is_dry, is_there = true;
     int separation;
-    TRY(request_count(request, "dry_run", 0, 1, 0, &is_dry, problem));
+    TRY(request_flag(request, "dry_run", &is_dry, problem));
     TRY(material_separation(app, request, &separation, problem));
     const Measurement test = {COUNT_ABSENT, &body->test};
     Evaluation evaluation;
-    Status status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
-    if (status == STATUS_OK && is_dry == 1)
+    Patience patience;
+    patience_begin(app, &patience);
+    Status status =
+        is_dry
+            ? material_evaluate(&patience, &test, 1, separation, &evaluation, reply, problem)
+            : evaluate_kept(&patience, &test, separation, &evaluation, &is_there, reply, problem);
+    patience_end(&patience);
+    if (status == STATUS_OK && is_dry)
         status = tell_dry(app, request->parameters[0], &body->test, &evaluation, reply, problem);
     else if (status == STATUS_OK)
-        status = keep(app, request, body, state, seen, &evaluation, reply, problem);
+        status = keep(app, request, body, state, seen, &evaluation, is_there, reply, problem);
     evaluation_clear(&evaluation);
     return status;
 }
@@ -207,32 +207,27 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     const size_t count = (size_t)state.measurements;
     TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
     TRY(request_count(request, "before", 1, (size_t)1 << 53, count + 1, &before, problem));
-    const size_t beyond = before <= count ? before : count + 1;
-    const size_t least = beyond > limit ? beyond - limit : 1;
     char tag[MATERIAL_TAG];
     material_tag(slug, state.latest, state.version, tag);
     if (reply_tagged(reply, request, tag))
         return STATUS_OK;
+    MaterialBriefs page;
+    Status status = store_material_briefs(app->store, slug, before, limit, &page, problem);
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"count\": %zu, \"measurements\": [", slug, count);
-    Status status = STATUS_OK;
-    size_t next = beyond, size = 0;
-    while (next > least && status == STATUS_OK && size < PAGE_MOST) {
-        StoredTest stored = {.row = {.slug = NULL}};
-        status = stored_test_load(app->store, slug, --next, &stored, problem);
-        bytes_text(&bytes, next + 1 < beyond ? ",\n " : "");
-        if (status == STATUS_OK)
-            measurement_write_brief(&bytes, &stored);
-        size += stored.row.document != NULL ? strlen(stored.row.document) : 0;
-        stored_test_clear(&stored);
+    for (size_t i = 0; i < page.count && status == STATUS_OK; i++) {
+        bytes_text(&bytes, i > 0 ? ",\n " : "");
+        status = measurement_write_brief(&bytes, &page.at[i], problem);
     }
+    const uint64_t next = page.count > 0 ? page.at[page.count - 1].row.measurement : 0;
+    material_briefs_clear(&page);
     bytes_text(&bytes, "]}\n");
     if (status != STATUS_OK) {
         bytes_clear(&bytes);
         return status;
     }
     char number[24];
-    snprintf(number, sizeof number, "%zu", next);
+    snprintf(number, sizeof number, "%llu", (unsigned long long)next);
     if (next > 1)
         query_link_next(request, reply, "before", number);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
@@ -251,20 +246,36 @@ Status measurement_number(const char *text, uint64_t *number, Problem *problem) 
 
 Status measurements_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request->parameters[0];
+    MaterialState state;
     uint64_t number;
     int separation;
     TRY(measurement_number(request->parameters[1], &number, problem));
     TRY(material_separation(app, request, &separation, problem));
+    TRY(store_material_state(app->store, slug, &state, problem));
+    // What was measured never changes, and what it comes to only with the program.
+    char tag[MATERIAL_TAG];
+    snprintf(tag, sizeof tag, "%.63s#%llu-%s-%s", slug, (unsigned long long)number,
+             separation_names[separation], program_version);
+    if (number <= state.measurements && reply_tagged(reply, request, tag))
+        return STATUS_OK;
     StoredTest stored = {.row = {.slug = NULL}};
+    Patience patience;
+    patience_begin(app, &patience);
     Status status = stored_test_load(app->store, slug, number, &stored, problem);
     if (status == STATUS_OK) {
         const Measurement test = {COUNT_ABSENT, &stored.test};
         Evaluation evaluation;
-        status = material_evaluate(app, &test, 1, separation, &evaluation, reply, problem);
+        bool is_there;
+        status =
+            evaluate_kept(&patience, &test, separation, &evaluation, &is_there, reply, problem);
+        if (!is_there) // another time it may be
+            reply->etag[0] = '\0';
         if (status == STATUS_OK)
-            status = tell(app, &stored.row, &stored.test, &evaluation, 200, reply, problem);
+            status =
+                tell(app, &stored.row, &stored.test, &evaluation, is_there, 200, reply, problem);
         evaluation_clear(&evaluation);
     }
+    patience_end(&patience);
     stored_test_clear(&stored);
     return status;
 }

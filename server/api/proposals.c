@@ -32,7 +32,8 @@ static void taken_free(Taken *taken) {
     free(taken);
 }
 
-static Status take(App *app, const char *slug, uint64_t number, Taken *taken, Problem *problem) {
+static Status take(const char *slug, const MaterialState *state, uint64_t number, Taken *taken,
+                   Problem *problem) {
     for (size_t i = 0; i < taken->count; i++)
         if (taken->tests[i].number == number)
             return problem_set(problem, STATUS_USAGE,
@@ -43,19 +44,37 @@ static Status take(App *app, const char *slug, uint64_t number, Taken *taken, Pr
                            "at most %d measurements are taken in at a time: name them as "
                            "?measurements=1,2",
                            TESTS_MOST);
-    StoredTest *stored = &taken->stored[taken->count];
-    taken->tests[taken->count++] = (Measurement){number, &stored->test};
-    TRY(stored_test_load(app->store, slug, number, stored, problem));
-    // Before there are more of them in memory.
-    if (evaluation_samples(taken->tests, taken->count) <= EVALUATION_SAMPLES_MOST)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_LIMIT,
-                       "more than %d samples in traces: take in fewer measurements at a time",
-                       EVALUATION_SAMPLES_MOST);
+    if (number == 0 || number > state->measurements)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "there is no measurement %llu of the material \"%.63s\"",
+                           (unsigned long long)number, slug);
+    taken->tests[taken->count] = (Measurement){number, &taken->stored[taken->count].test};
+    taken->count++;
+    return STATUS_OK;
+}
+
+static Status load(Patience *patience, const char *slug, Taken *taken, Reply *reply,
+                   Problem *problem) {
+    for (size_t i = 0; i < taken->count; i++) {
+        if (!patience_lasts(patience, 0)) {
+            const Status status = patience_tell(patience, problem);
+            reply->retry_after = status == STATUS_BUSY ? 10 : reply->retry_after;
+            return status;
+        }
+        TRY(stored_test_load(patience->app->store, slug, taken->tests[i].number, &taken->stored[i],
+                             problem));
+        // Before there are more of them in memory.
+        if (evaluation_samples(taken->tests, i + 1) > EVALUATION_SAMPLES_MOST)
+            return problem_set(problem, STATUS_LIMIT,
+                               "more than %d samples in traces: take in fewer measurements at a "
+                               "time, as ?measurements=1,2",
+                               EVALUATION_SAMPLES_MOST);
+    }
+    return STATUS_OK;
 }
 
 // "1,2,5"; all of them without it.
-static Status take_asked(App *app, const Request *request, const MaterialState *state, Taken *taken,
+static Status take_asked(const Request *request, const MaterialState *state, Taken *taken,
                          Problem *problem) {
     const char *slug = request->parameters[0], *list = request_query(request, "measurements");
     if (state->measurements == 0)
@@ -64,7 +83,7 @@ static Status take_asked(App *app, const Request *request, const MaterialState *
                            "/v1/materials/%.63s/measurements",
                            slug, slug);
     for (uint64_t i = 1; list == NULL && i <= state->measurements; i++)
-        TRY(take(app, slug, i, taken, problem));
+        TRY(take(slug, state, i, taken, problem));
     for (const char *text = list; text != NULL;) {
         const size_t size = strspn(text, "0123456789");
         if (size == 0 || size > 9 || (text[size] != ',' && text[size] != '\0'))
@@ -72,7 +91,7 @@ static Status take_asked(App *app, const Request *request, const MaterialState *
                                "the query parameter \"measurements\" must be numbers with commas "
                                "between, as 1,2, is \"%.40s\"",
                                list);
-        TRY(take(app, slug, strtoull(text, NULL, 10), taken, problem));
+        TRY(take(slug, state, strtoull(text, NULL, 10), taken, problem));
         text = text[size] == ',' ? text + size + 1 : NULL;
     }
     return STATUS_OK;
@@ -156,14 +175,19 @@ static Status tell_chart(App *app, const Request *request, const Evaluation *eva
     return reply_bytes(reply, 200, svg_type, &bytes, problem);
 }
 
-static Status propose(App *app, const Request *request, const Material *before, const Taken *taken,
+static Status propose(App *app, const Request *request, const Material *before, Taken *taken,
                       int separation, int format, Reply *reply, Problem *problem) {
     int form;
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
-    Evaluation evaluation;
+    Evaluation evaluation = {.separation = separation};
     Proposal proposal = {.why = NULL};
-    Status status =
-        material_evaluate(app, taken->tests, taken->count, separation, &evaluation, reply, problem);
+    Patience patience;
+    patience_begin(app, &patience);
+    Status status = load(&patience, request->parameters[0], taken, reply, problem);
+    if (status == STATUS_OK)
+        status = material_evaluate(&patience, taken->tests, taken->count, separation, &evaluation,
+                                   reply, problem);
+    patience_end(&patience);
     if (status == STATUS_OK)
         status = proposal_make(&evaluation, taken->tests, taken->count, before, (ProposalForm)form,
                                &proposal, problem);
@@ -187,7 +211,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     MaterialRevision before = {.slug = NULL};
     TRY(material_latest(app, slug, &before, problem));
     Taken *taken = calloc(1, sizeof *taken);
-    Status status = taken != NULL ? take_asked(app, request, &state, taken, problem)
+    Status status = taken != NULL ? take_asked(request, &state, taken, problem)
                                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
     if (status == STATUS_OK && !reply_tagged(reply, request, tag))
         status = propose(app, request, &before.material, taken, separation, format, reply, problem);

@@ -139,7 +139,6 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
     RecordUses uses;
     char tag[112];
     TRY(store_record(app->store, request->parameters[0], &row, problem));
-    store_settle(app->store); // whoever was told of a job finds it counted
     Status status = store_record_uses(app->store, row.name, &uses, problem);
     if (status != STATUS_OK) {
         record_row_clear(&row);

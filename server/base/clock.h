@@ -12,8 +12,5 @@ int64_t clock_monotonic_ns(void);
 int64_t clock_thread_cpu_ns(void);
 // RFC 3339 UTC with milliseconds, "2026-11-21T09:00:00.000Z".
 void clock_rfc3339(int64_t unix_ms, char target[32]);
-// Reads that back, any fraction and offset, and a day alone ("2026-11-21", its beginning); a blank
-// stands for the "+" that a query would have needed escaped. False for anything else.
-bool clock_read(const char *text, int64_t *unix_ms);
 
 #endif

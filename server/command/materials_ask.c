@@ -77,20 +77,6 @@ Status materials_ask(MaterialsCall *call, const char *method, Bytes *path, const
     return status;
 }
 
-Status materials_tag(MaterialsCall *call, const char *slug, char tag[256], Problem *problem) {
-    // The history has one whatever became of the revisions.
-    Bytes path;
-    HttpAnswer answer;
-    materials_path(&path, slug, "/history?limit=1");
-    Status status = materials_ask(call, "GET", &path, NULL, NULL, &answer, problem);
-    if (status == STATUS_OK && answer.etag[0] == '\0')
-        status = problem_set(problem, STATUS_UNREACHABLE,
-                             "the answer tells no state: what answers there is no impactd");
-    text_fit(tag, 256, answer.etag);
-    http_answer_clear(&answer);
-    return status;
-}
-
 Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
                        const OutlineTable *tables, Problem *problem) {
     static const char *const besides[] = {"links", "test", NULL};

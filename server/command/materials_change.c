@@ -1,5 +1,6 @@
 // impactd materials add, revise, revert, approve, deprecate. Whoever revises says which state that
-// is about; the state is asked for just before, and of two who do so at once one is told.
+// is about; where nothing was shown before, the state is asked for just before, and of two who do
+// so at once one is told.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,12 +47,15 @@ static Status stale_tell(const char *slug, Status status, Problem *problem) {
                        said, slug);
 }
 
-Status materials_write(MaterialsCall *call, const char *slug, const char *name, const char *rest,
-                       const Bytes *body, HttpAnswer *answer, Problem *problem) {
-    char tag[256];
+Status materials_write_seen(MaterialsCall *call, const char *slug, const char *name,
+                            const char *rest, const Bytes *body, const char *tag,
+                            HttpAnswer *answer, Problem *problem) {
     Bytes path;
     *answer = (HttpAnswer){0};
-    Status status = materials_tag(call, slug, tag, problem);
+    Status status = STATUS_OK;
+    if (tag[0] == '\0')
+        status = problem_set(problem, STATUS_UNREACHABLE,
+                             "the answer tells no state: what answers there is no impactd");
     if (status == STATUS_OK)
         status = check_from(call, slug, tag, problem);
     if (status == STATUS_OK) {
@@ -59,6 +63,20 @@ Status materials_write(MaterialsCall *call, const char *slug, const char *name, 
         status = materials_ask(call, "POST", &path, body, tag, answer, problem);
     }
     return stale_tell(slug, status, problem);
+}
+
+Status materials_write(MaterialsCall *call, const char *slug, const char *name, const char *rest,
+                       const Bytes *body, HttpAnswer *answer, Problem *problem) {
+    // The history has a tag whatever became of the revisions.
+    Bytes path;
+    HttpAnswer history;
+    *answer = (HttpAnswer){0};
+    materials_path(&path, slug, "/history?limit=1");
+    Status status = materials_ask(call, "GET", &path, NULL, NULL, &history, problem);
+    if (status == STATUS_OK)
+        status = materials_write_seen(call, slug, name, rest, body, history.etag, answer, problem);
+    http_answer_clear(&history);
+    return status;
 }
 
 static Status write_and_tell(MaterialsCall *call, const char *slug, const char *name,

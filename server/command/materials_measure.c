@@ -87,18 +87,20 @@ Status materials_measurements_act(MaterialsCall *call, Problem *problem) {
     return status;
 }
 
-// What was shown is what is said, under the comment given, else its own.
-static Status confirm(MaterialsCall *call, const Bytes *shown, Problem *problem) {
+// What was shown is what is said, under the comment given, else its own, and of the state that it
+// was shown of: whatever was done since is not overwritten.
+static Status confirm(MaterialsCall *call, const HttpAnswer *shown, Problem *problem) {
     const char *slug = call->operands[0];
     Bytes body = {0}, comment = {0};
     HttpAnswer answer = {0};
-    Status status = amend_take(shown, "revision", &body, problem);
+    Status status = amend_take(&shown->body, "revision", &body, problem);
     if (call->settings->comment != NULL)
         bytes_json_string(&comment, call->settings->comment);
     if (status == STATUS_OK && call->settings->comment != NULL)
         status = amend_set(&body, "comment", &comment, problem);
     if (status == STATUS_OK)
-        status = materials_write(call, slug, slug, "/revisions", &body, &answer, problem);
+        status = materials_write_seen(call, slug, slug, "/revisions", &body, shown->etag, &answer,
+                                      problem);
     if (status == STATUS_OK && !call->settings->json)
         putchar('\n');
     if (status == STATUS_OK)
@@ -125,7 +127,7 @@ Status materials_propose_act(MaterialsCall *call, Problem *problem) {
     if (status == STATUS_OK && !(settings->confirm && settings->json))
         status = materials_print(call, &answer, tables, problem);
     if (status == STATUS_OK && settings->confirm)
-        status = confirm(call, &answer.body, problem);
+        status = confirm(call, &answer, problem);
     http_answer_clear(&answer);
     return status;
 }

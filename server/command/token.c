@@ -29,6 +29,9 @@ static Status create(Store *store, const TokenSettings *settings, TokenRow *row,
     static const double days_most = 36500;
     char token[TOKEN_SIZE];
     int64_t expires_unix_ms = 0;
+    // Who reviewed what the program came with.
+    if (strcmp(row->name, "impactd") == 0)
+        return problem_set(problem, STATUS_USAGE, "impactd is the program's own name");
     if (isfinite(settings->expires)) {
         const double days = settings->expires < days_most ? settings->expires : days_most;
         expires_unix_ms = clock_unix_ms() + (int64_t)(days * day_ms);

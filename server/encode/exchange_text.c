@@ -140,21 +140,18 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
 }
 
-// Reviews of that revision from *at on, which moves behind them.
-static Status put_revision(const ExchangeText *text, Bytes *bytes, MaterialRevision *revision,
-                           const MaterialReviews *reviews, size_t *at, Problem *problem) {
+static Status put_reviewed(ExchangeText *text, Bytes *bytes, MaterialRevision *revision,
+                           const MaterialReviews *reviews, Problem *problem) {
     ExchangeRow row;
-    size_t count = 0;
+    const size_t count = reviews->count;
     char created[32];
-    while (*at + count < reviews->count && reviews->at[*at + count].revision == revision->revision)
-        count++;
     ExchangeReview *shown = calloc(count + 1, sizeof *shown);
     Created *times = calloc(count + 1, sizeof *times);
     Status status = shown != NULL && times != NULL && row_default(&row)
                         ? catalogue_read_lists(revision, problem)
                         : no_memory(problem);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        const MaterialReview *review = &reviews->at[*at + i];
+        const MaterialReview *review = &reviews->at[i];
         clock_rfc3339(review->created_unix_ms, times[i].text);
         shown[i] = (ExchangeReview){verdict(review->status), review->reason,
                                     known(review->reviewer), times[i].text};
@@ -163,7 +160,7 @@ static Status put_revision(const ExchangeText *text, Bytes *bytes, MaterialRevis
         clock_rfc3339(revision->created_unix_ms, created);
         row.row = EXCHANGE_REVISION;
         row.slug = revision->slug;
-        row.number = revision->revision;
+        row.number = text->number = revision->revision;
         row.material = revision->material;
         row.reverts = revision->reverts > 0 ? revision->reverts : COUNT_ABSENT;
         row.author = known(revision->author);
@@ -172,29 +169,20 @@ static Status put_revision(const ExchangeText *text, Bytes *bytes, MaterialRevis
         row.reviews = (ExchangeReviews){shown, count};
         put_row(text, bytes, &row, NULL);
     }
-    *at += count;
     free(times);
     free(shown);
     return status;
 }
 
-static Status put_revisions(ExchangeText *text, Bytes *bytes, MaterialRevisions *revisions,
-                            const MaterialReviews *reviews, Problem *problem) {
-    size_t at = 0;
-    if (!text->is_table)
-        bytes_format(bytes, "%s{\"slug\": \"%s\", \"revisions\": [\n",
-                     text->slug[0] != '\0' ? ",\n" : "", revisions->at[0].slug);
-    for (size_t i = 0; i < revisions->count; i++) {
-        bytes_text(bytes, i > 0 && !text->is_table ? ",\n" : "");
-        TRY(put_revision(text, bytes, &revisions->at[i], reviews, &at, problem));
-    }
-    text_fit(text->slug, sizeof text->slug, revisions->at[0].slug);
-    text->number = 0;
-    text->measurements = 0;
-    text->is_in_material = true;
-    if (!text->is_table)
-        bytes_text(bytes, "]");
-    return STATUS_OK;
+static Status put_revision(ExchangeText *text, Bytes *bytes, MaterialRevision *revision,
+                           Problem *problem) {
+    MaterialReviews reviews;
+    Status status = store_reviews_of(text->store, &text->moment, revision->slug, revision->revision,
+                                     &reviews, problem);
+    if (status == STATUS_OK)
+        status = put_reviewed(text, bytes, revision, &reviews, problem);
+    material_reviews_clear(&reviews);
+    return status;
 }
 
 static Status put_measurement(ExchangeText *text, Bytes *bytes,
@@ -217,17 +205,40 @@ static Status put_measurement(ExchangeText *text, Bytes *bytes,
 }
 
 static Status next_material(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem) {
-    MaterialRevisions revisions;
-    MaterialReviews reviews;
-    Status status = store_material_behind(text->store, &text->moment, text->slug, &revisions,
-                                          &reviews, problem);
-    *is_last = status == STATUS_OK && revisions.count == 0;
+    MaterialRevision first;
+    bool is_found;
+    Status status =
+        store_material_behind(text->store, &text->moment, text->slug, &first, &is_found, problem);
+    *is_last = status == STATUS_OK && !is_found;
     if (*is_last)
         bytes_text(bytes, text->is_table ? "" : "]}\n");
-    else if (status == STATUS_OK)
-        status = put_revisions(text, bytes, &revisions, &reviews, problem);
-    material_revisions_clear(&revisions);
-    material_reviews_clear(&reviews);
+    if (status == STATUS_OK && is_found) {
+        if (!text->is_table)
+            bytes_format(bytes, "%s{\"slug\": \"%s\", \"revisions\": [\n",
+                         text->slug[0] != '\0' ? ",\n" : "", first.slug);
+        text_fit(text->slug, sizeof text->slug, first.slug);
+        text->stage = EXCHANGE_REVISIONS;
+        status = put_revision(text, bytes, &first, problem);
+    }
+    material_revision_clear(&first);
+    return status;
+}
+
+static Status next_revision(ExchangeText *text, Bytes *bytes, Problem *problem) {
+    MaterialRevision revision;
+    bool is_found;
+    Status status = store_revision_behind(text->store, &text->moment, text->slug, text->number,
+                                          &revision, &is_found, problem);
+    if (status == STATUS_OK && !text->is_table)
+        bytes_text(bytes, is_found ? ",\n" : "]");
+    if (status == STATUS_OK && is_found)
+        status = put_revision(text, bytes, &revision, problem);
+    if (status == STATUS_OK && !is_found) {
+        text->stage = EXCHANGE_MEASUREMENTS;
+        text->number = 0;
+        text->measurements = 0;
+    }
+    material_revision_clear(&revision);
     return status;
 }
 
@@ -241,7 +252,7 @@ static Status next_measurement(ExchangeText *text, Bytes *bytes, Problem *proble
     if (status == STATUS_OK && !is_found) {
         if (!text->is_table)
             bytes_text(bytes, text->measurements > 0 ? "]}" : "}");
-        text->is_in_material = false;
+        text->stage = EXCHANGE_BETWEEN;
     }
     material_measurement_clear(&measurement);
     return status;
@@ -268,7 +279,9 @@ Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Probl
     *is_last = false;
     if (!text->has_begun)
         begin(text, bytes);
-    const Status status = text->is_in_material ? next_measurement(text, bytes, problem)
-                                               : next_material(text, bytes, is_last, problem);
+    const Status status =
+        text->stage == EXCHANGE_BETWEEN     ? next_material(text, bytes, is_last, problem)
+        : text->stage == EXCHANGE_REVISIONS ? next_revision(text, bytes, problem)
+                                            : next_measurement(text, bytes, problem);
     return status == STATUS_OK && bytes->is_failed ? no_memory(problem) : status;
 }

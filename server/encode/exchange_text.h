@@ -6,21 +6,28 @@
 #include "server/base/bytes.h"
 #include "server/store/material_export.h"
 
+typedef enum ExchangeStage {
+    EXCHANGE_BETWEEN, // materials
+    EXCHANGE_REVISIONS,
+    EXCHANGE_MEASUREMENTS
+} ExchangeStage;
+
 // How far it is.
 typedef struct ExchangeText {
     Store *store;
     MaterialMoment moment;
     bool is_table;
-    bool has_begun, is_in_material;
+    bool has_begun;
+    ExchangeStage stage;
     size_t measurements;               // of this material so far
     char slug[MATERIAL_SLUG_MOST + 1]; // the material's; "" before the first
-    uint64_t number;                   // of its last measurement
+    uint64_t number;                   // of its last revision, or measurement
 } ExchangeText;
 
 Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem);
 
-// Appends the next piece, a material without measurements or one measurement; *is_last behind it
-// all.
+// Appends the next piece, at most one revision with its reviews or one measurement; *is_last behind
+// it all.
 Status exchange_text_next(ExchangeText *text, Bytes *bytes, bool *is_last, Problem *problem);
 
 #endif

@@ -21,6 +21,12 @@ Status body_require_json(const Request *request, Problem *problem) {
     return body_require(request, problem);
 }
 
+Status body_refuse_large(size_t most, Problem *problem) {
+    return problem_set(problem, STATUS_TOO_LARGE,
+                       "the body is larger than %zu bytes; impactd serve --max-body lets in more",
+                       most);
+}
+
 Status body_require(const Request *request, Problem *problem) {
     const char *encoding = request->content_encoding;
     if (encoding != NULL && encoding[0] != '\0' && strcasecmp(encoding, "identity") != 0)
@@ -29,8 +35,7 @@ Status body_require(const Request *request, Problem *problem) {
                            "as %.60s",
                            encoding);
     if (request->is_too_large)
-        return problem_set(problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes",
-                           request->body_most);
+        return body_refuse_large(request->body_most, problem);
     if (request->body == NULL || request->body_size == 0)
         return problem_set(problem, STATUS_UNREADABLE, "there is no body; send the scene as JSON");
     return STATUS_OK;

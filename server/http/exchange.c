@@ -107,7 +107,7 @@ static enum MHD_Result begin(Exchange *exchange, struct MHD_Connection *connecti
     }
     if (code == 0 && body_size > (waits_for_leave ? most : DRAINED * most)) {
         code = 413;
-        problem_set(&problem, STATUS_TOO_LARGE, "the body is larger than %zu bytes", most);
+        body_refuse_large(most, &problem);
     }
     const bool has_body = body_size > 0 || exchange->gate.is_chunked;
     const bool drains =

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "server/base/clock.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/study.h"
 
 // Of scenes that wait, where the settings say nothing.
@@ -48,6 +49,7 @@ void intake_call_worker(Intake *intake) {
 void intake_enqueue(Intake *intake, Computation *computation, Client *client) {
     index_add(intake->in_flight, &computation->indexed);
     study_foretell(computation, &intake->settings.limits);
+    prepare_records_drop(&computation->inquiry); // until it is its turn
     if (client == NULL)
         queue_urge(intake->queue, &computation->queued);
     else

@@ -1,6 +1,6 @@
-// Scenes that are being read and accepted, any number at once, and against them whoever takes a
-// name away from under them: he waits until none is under way, and they until he is done. Used by
-// submit.c and forget_record.c.
+// Scenes that name a record and are being accepted, any number at once, and against them whoever
+// takes a name away from under them: he waits until none is under way, and they until he is done.
+// Used by submit.c and forget_record.c.
 #ifndef SERVER_JOBS_NAMING_H
 #define SERVER_JOBS_NAMING_H
 

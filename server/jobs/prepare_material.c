@@ -9,7 +9,8 @@
 #include "core/base/pointer.h"
 #include "server/materials/catalogue.h"
 
-enum { NAME = 160 };
+// The first of the faults alone tell what names there are.
+enum { NAME = 160, SUGGESTED = 10 };
 
 // "slug" or "slug@revision"; false if what stands behind @ is no revision.
 static bool split_name(const char *name, char slug[128], uint64_t *revision) {
@@ -38,7 +39,7 @@ static Status refuse_unknown(Store *store, const char *name, const char *slug, c
     text_quote(fault.value, sizeof fault.value, name);
     char short_name[80], list[200] = "";
     text_fit(short_name, sizeof short_name, name);
-    if (store_material_slugs(store, &known, NULL) == STATUS_OK) {
+    if (problem->count < SUGGESTED && store_material_slugs(store, &known, NULL) == STATUS_OK) {
         // One more, for the NULL behind the last one.
         const char **slugs = calloc(known.count + 1, sizeof *slugs);
         for (size_t i = 0; i < known.count; i++) {
@@ -86,21 +87,32 @@ static Status refuse_deprecated(const MaterialRevision *newest, const char *poin
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
+// What passes, or is no fault of the scene's.
+static Status refuse_for_now(const char *slug, Status status, Problem *problem) {
+    return problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+}
+
 // Why a name stands for no revision: it is no material's, or the material has none of that number,
 // or, where it names none, all of them are deprecated.
 static Status refuse(Store *store, const char *name, const char *slug, uint64_t revision,
                      const char *pointer, Problem *problem) {
     MaterialRevision known = {0};
+    if (problem->count >= PROBLEM_FAULTS) // is counted alone
+        return problem_add(problem, STATUS_INVALID, pointer, "is not there");
     Status status = store_material(store, slug, 0, &known, NULL);
-    if (status == STATUS_OK) {
+    const bool has_head = status == STATUS_OK;
+    if (status == STATUS_NOT_FOUND)
+        status = store_material(store, slug, 1, &known, NULL);
+    if (has_head) {
         status = refuse_revision(&known, "head", name, pointer, problem);
-    } else if (status == STATUS_NOT_FOUND &&
-               store_material(store, slug, 1, &known, NULL) == STATUS_OK) {
+    } else if (status == STATUS_OK) {
         known.revision = known.latest;
         status = revision > 0 ? refuse_revision(&known, "newest revision", name, pointer, problem)
                               : refuse_deprecated(&known, pointer, problem);
-    } else {
+    } else if (status == STATUS_NOT_FOUND) {
         status = refuse_unknown(store, name, slug, pointer, problem);
+    } else {
+        status = refuse_for_now(slug, status, problem);
     }
     material_revision_clear(&known);
     return status;
@@ -278,8 +290,7 @@ Status prepare_buffer(Store *store, Buffer *buffer, const char *pointer, Warning
     else if (status == STATUS_NOT_FOUND)
         status = refuse(store, buffer->material, slug, revision, pointer, problem);
     else
-        status =
-            problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+        status = refuse_for_now(slug, status, problem);
     material_revision_clear(&found);
     return status;
 }

@@ -10,12 +10,15 @@
 #include "core/study/sweep.h"
 #include "server/store/record_rows.h"
 
+// Of all records that one sweep names: they are in memory as long as it runs.
+enum { PINNED_SAMPLES = 1 << 24 };
+
 static const char axis_pointer[] = "/excitation/name";
 
 // "no record is called ...; there are ...", with the nearest one suggested.
 static Status refuse_unknown(Store *store, const char *name, const char *pointer,
                              Problem *problem) {
-    enum { LISTED = 1000 };
+    enum { LISTED = 1000, SUGGESTED = 10 }; // SUGGESTED: faults that tell what names there are
     Fault fault = {.detail = ""};
     RecordRows known = {NULL, 0};
     char short_name[80], list[160] = "";
@@ -29,7 +32,8 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
                  short_name);
         return problem_put(problem, STATUS_INVALID, &fault);
     }
-    if (store_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
+    const bool is_suggested = problem->count < SUGGESTED;
+    if (is_suggested && store_records(store, NULL, "", LISTED, &known, NULL) == STATUS_OK) {
         const char **names = calloc(known.count + 1, sizeof *names);
         for (size_t i = 0; i < known.count; i++) {
             text_list(list, sizeof list, known.at[i].name);
@@ -41,8 +45,11 @@ static Status refuse_unknown(Store *store, const char *name, const char *pointer
             text_fit(fault.did_you_mean, sizeof fault.did_you_mean, nearest);
         free(names);
     }
-    snprintf(fault.detail, sizeof fault.detail, "no record is called \"%s\"; %s%s", short_name,
-             known.count > 0 ? "there are " : "there are none: POST one to /v1/records", list);
+    snprintf(fault.detail, sizeof fault.detail, "no record is called \"%s\"%s%s", short_name,
+             !is_suggested     ? ""
+             : known.count > 0 ? "; there are "
+                               : "; there are none: POST one to /v1/records",
+             list);
     record_rows_clear(&known);
     return problem_put(problem, STATUS_INVALID, &fault);
 }
@@ -118,16 +125,40 @@ static Status pin(PinnedRecords *records, NamedRecord *named) {
     return STATUS_NO_MEMORY;
 }
 
+// To what a sweep holds.
+static Status add_samples(const Shared *named, size_t *samples, const char *place,
+                          Problem *problem) {
+    *samples += ((const NamedRecord *)(const void *)named)->samples.count;
+    if (*samples <= PINNED_SAMPLES)
+        return STATUS_OK;
+    (void)problem_add(problem, STATUS_INVALID, place,
+                      "names one more record than a sweep can hold: all of its records may have "
+                      "%d samples, with this one they have %zu; sweep over fewer at a time",
+                      PINNED_SAMPLES, *samples);
+    return STATUS_LIMIT;
+}
+
+// What was found before stays; it only needs to be there still.
+static Status hold(Store *store, const char *name, const char *digest, const char *pointer,
+                   const char *place, Shared **named, Problem *problem) {
+    NamedRecord *found;
+    TRY(find(store, name, digest, pointer, place, &found, problem));
+    if (*named == NULL)
+        *named = &found->shared;
+    else
+        shared_drop(&found->shared);
+    return STATUS_OK;
+}
+
 // One that came with the sweep.
 static Status resolve_pinned(Store *store, PinnedRecord *pinned, size_t index, Problem *problem) {
     char name[64], digest[64];
-    NamedRecord *named;
     snprintf(name, sizeof name, "/study/records/%zu/name", index);
     snprintf(digest, sizeof digest, "/study/records/%zu/digest", index);
-    if (pinned->name == NULL || pinned->named != NULL)
+    if (pinned->name == NULL)
         return STATUS_OK; // told by the rows
-    TRY(find(store, pinned->name, pinned->digest, name, digest, &named, problem));
-    pinned->named = &named->shared;
+    TRY(hold(store, pinned->name, pinned->digest, name, digest, &pinned->named, problem));
+    const NamedRecord *named = (const NamedRecord *)(const void *)pinned->named;
     if (pinned->digest == NULL && (pinned->digest = strdup(named->digest)) == NULL)
         return STATUS_NO_MEMORY;
     return STATUS_OK;
@@ -135,7 +166,7 @@ static Status resolve_pinned(Store *store, PinnedRecord *pinned, size_t index, P
 
 // One value of an axis. What is no text is for the axis to refuse.
 static Status resolve_value(Store *store, const char *value, PinnedRecords *records,
-                            const char *place, Problem *problem) {
+                            size_t *samples, const char *place, Problem *problem) {
     Scalar scalar;
     NamedRecord *named;
     char *room = malloc(strlen(value) + 1);
@@ -147,6 +178,8 @@ static Status resolve_value(Store *store, const char *value, PinnedRecords *reco
         status = find(store, scalar.text, NULL, place, place, &named, problem);
         if (status == STATUS_OK)
             status = pin(records, named);
+        if (status == STATUS_OK)
+            status = add_samples(&named->shared, samples, place, problem);
     }
     free(room);
     return status;
@@ -161,8 +194,16 @@ static SweepStudy *sweep_of(const Inquiry *inquiry) {
 Status prepare_sweep_records(Store *store, Inquiry *inquiry, Problem *problem) {
     SweepStudy *study = sweep_of(inquiry);
     Status status = STATUS_OK;
+    size_t samples = 0;
     for (size_t i = 0; study != NULL && i < study->records.count; i++) {
-        const Status one = resolve_pinned(store, &study->records.at[i], i, problem);
+        PinnedRecord *pinned = &study->records.at[i];
+        char place[64];
+        snprintf(place, sizeof place, "/study/records/%zu", i);
+        if (problem->count >= PROBLEM_FAULTS) // no more can be told
+            return STATUS_INVALID;
+        Status one = resolve_pinned(store, pinned, i, problem);
+        if (one == STATUS_OK && pinned->named != NULL)
+            one = add_samples(pinned->named, &samples, place, problem);
         if (one != STATUS_OK && one != STATUS_INVALID)
             return one;
         status = status == STATUS_OK ? one : status;
@@ -174,14 +215,40 @@ Status prepare_sweep_records(Store *store, Inquiry *inquiry, Problem *problem) {
         for (size_t k = 0; takes_records && k < axis->values.count; k++) {
             char place[96];
             snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", i, k);
+            if (problem->count >= PROBLEM_FAULTS)
+                return STATUS_INVALID;
             const Status one =
-                resolve_value(store, axis->values.at[k], &study->records, place, problem);
+                resolve_value(store, axis->values.at[k], &study->records, &samples, place, problem);
             if (one != STATUS_OK && one != STATUS_INVALID)
                 return one;
             status = status == STATUS_OK ? one : status;
         }
     }
     return status;
+}
+
+void prepare_records_drop(Inquiry *inquiry) {
+    ExcitationRecord *record = record_of(&inquiry->simulation);
+    SweepStudy *study = sweep_of(inquiry);
+    if (record != NULL) {
+        shared_drop(record->named);
+        record->named = NULL;
+    }
+    for (size_t i = 0; study != NULL && i < study->records.count; i++) {
+        shared_drop(study->records.at[i].named);
+        study->records.at[i].named = NULL;
+    }
+}
+
+Status prepare_records_again(Store *store, Inquiry *inquiry, Problem *problem) {
+    ExcitationRecord *record = record_of(&inquiry->simulation);
+    SweepStudy *study = sweep_of(inquiry);
+    if (record != NULL)
+        TRY(hold(store, record->name, record->digest, axis_pointer, "/excitation/digest",
+                 &record->named, problem));
+    for (size_t i = 0; study != NULL && i < study->records.count; i++)
+        TRY(resolve_pinned(store, &study->records.at[i], i, problem));
+    return STATUS_OK;
 }
 
 static void put_use(Bytes *uses, const char *name) {

@@ -76,6 +76,8 @@ static Status resolve_axes(Store *store, SweepStudy *study, Warnings *warnings, 
         const SweepAxis *axis = &study->axes.at[i];
         for (size_t k = 0; k < axis->values.count && takes_materials(axis->pointer); k++) {
             char place[96];
+            if (problem->count >= PROBLEM_FAULTS) // no more can be told
+                return STATUS_INVALID;
             snprintf(place, sizeof place, "/study/axes/%zu/values/%zu", i, k);
             const Status one = resolve_value(store, &axis->values.at[k], &study->materials, place,
                                              warnings, problem);
@@ -92,7 +94,7 @@ static Status resolve_axes(Store *store, SweepStudy *study, Warnings *warnings, 
 static Status resolve_sweep(Store *store, Inquiry *inquiry, Warnings *warnings, Problem *problem) {
     SweepStudy *study = (SweepStudy *)(void *)inquiry->study;
     Status status = STATUS_OK;
-    for (size_t i = 0; i < study->materials.count; i++) {
+    for (size_t i = 0; i < study->materials.count && problem->count < PROBLEM_FAULTS; i++) {
         char place[64];
         snprintf(place, sizeof place, "/study/materials/%zu", i);
         const Status one = prepare_buffer(store, &study->materials.at[i], place, warnings, problem);
@@ -126,7 +128,9 @@ Status prepare_sweep(Store *store, Inquiry *inquiry, const SimulationLimits *lim
         status = resolve_sweep(store, inquiry, warnings, names);
         // Where the scene has faults they are judged with it, as ever.
         const bool has_own = problem->count > 0;
-        if (status == STATUS_OK || status == STATUS_INVALID) {
+        if (status == STATUS_LIMIT || names->count >= PROBLEM_FAULTS) {
+            status = STATUS_INVALID; // told; names that were not looked up are judged no further
+        } else if (status == STATUS_OK || status == STATUS_INVALID) {
             const Status resolved = status;
             status = inquiry_complete(inquiry, limits, warnings, has_own ? problem : rest);
             status = resolved != STATUS_OK ? resolved : status;

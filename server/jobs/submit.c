@@ -12,6 +12,7 @@
 #include "server/jobs/intake_state.h"
 #include "server/jobs/job_id.h"
 #include "server/jobs/keyed.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/quota.h"
 #include "server/jobs/retry.h"
 #include "server/store/job_search.h"
@@ -226,7 +227,7 @@ static Status fill_sender(Job *job, const Submission *submission, const KeyHold 
 static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warnings,
                        Problem *problem) {
     JobRow *row = &job->row;
-    Bytes scene = {0}, told = {0};
+    Bytes scene = {0}, told = {0}, uses = {0};
     if (!job_id_make(row->id))
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
     job->indexed.key = row->id;
@@ -236,8 +237,16 @@ static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warning
     document_warnings(&told, warnings);
     row->scene = bytes_take(&scene, NULL);
     row->warnings = bytes_take(&told, NULL);
+    prepare_record_uses(inquiry, &uses);
+    const bool has_uses = uses.count > 0;
+    row->uses = bytes_take(&uses, NULL);
+    if (row->uses != NULL && !has_uses) {
+        free(row->uses);
+        row->uses = NULL;
+    }
     TRY(fill_notes(row, inquiry, problem));
-    if (row->result[0] == '\0' || row->scene == NULL || row->warnings == NULL)
+    if (row->result[0] == '\0' || (has_uses && row->uses == NULL) || row->scene == NULL ||
+        row->warnings == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     return STATUS_OK;
 }
@@ -273,6 +282,20 @@ static Status enter_client(Intake *intake, const Submission *submission, Client 
     return status;
 }
 
+// A record that it names may have been deleted since it was looked up under `generation`. From here
+// on none is before the store knows of the job.
+static Status submit_named(Intake *intake, Job *job, Inquiry *inquiry, uint64_t generation,
+                           const Submission *submission, Problem *problem) {
+    Status status = STATUS_OK;
+    naming_enter(&intake->naming);
+    if (store_generation(intake->store) != generation)
+        status = prepare_records_again(intake->store, inquiry, problem);
+    if (status == STATUS_OK)
+        status = submit(intake, job, inquiry, submission->retry_of != NULL, problem);
+    naming_leave(&intake->naming);
+    return status;
+}
+
 static Status submit_new(Intake *intake, const Submission *submission, const KeyHold *hold,
                          Job **accepted, Problem *problem) {
     Client *client;
@@ -284,16 +307,17 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
     job->client = client;
     Inquiry inquiry = {0};
     Warnings warnings = {NULL, 0};
-    naming_enter(&intake->naming);
+    const uint64_t generation = store_generation(intake->store);
     Status status = intake_prepare(intake->store, submission->text, submission->size,
                                    &intake->settings.limits, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_job(job, &inquiry, &warnings, problem);
     if (status == STATUS_OK)
         status = fill_sender(job, submission, hold);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && job->row.uses == NULL)
         status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
-    naming_leave(&intake->naming);
+    else if (status == STATUS_OK)
+        status = submit_named(intake, job, &inquiry, generation, submission, problem);
     inquiry_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {

@@ -11,6 +11,7 @@
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/gather.h"
+#include "server/jobs/prepare_record.h"
 #include "server/jobs/study.h"
 #include "server/jobs/uses.h"
 
@@ -138,8 +139,10 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     problem_clear(problem);
     findings->began_ns = clock_monotonic_ns();
     const int64_t run_ns = clock_thread_cpu_ns();
-    Status status = simulation_run(&computation->inquiry.simulation, limits, &watch,
-                                   &worker->workspace, &findings->outcome, problem);
+    Status status = prepare_records_again(intake->store, &computation->inquiry, problem);
+    if (status == STATUS_OK)
+        status = simulation_run(&computation->inquiry.simulation, limits, &watch,
+                                &worker->workspace, &findings->outcome, problem);
     const int64_t study_ns = clock_thread_cpu_ns();
     findings->seconds = 1e-9 * (double)(study_ns - run_ns);
     if (status == STATUS_OK)
@@ -242,6 +245,7 @@ static void leave(Worker *worker, const Computation *computation) {
 
 // It waits for room, of whatever kind, and then begins anew.
 static void stall(Intake *intake, Computation *computation) {
+    prepare_records_drop(&computation->inquiry);
     computation->next_stalled = intake->stalled;
     intake->stalled = computation;
 }

@@ -39,23 +39,16 @@ Status catalogue_find(Store *store, const char *slug, uint64_t revision, Materia
     return catalogue_read_lists(found, problem);
 }
 
-static void put_text(Bytes *bytes, const char *name, const char *text) {
+void material_put_text(Bytes *bytes, const char *name, const char *text) {
     bytes_format(bytes, ", \"%s\": ", name);
-    if (text != NULL)
-        bytes_json_string(bytes, text);
-    else
-        bytes_text(bytes, "null");
+    bytes_json_string(bytes, text);
 }
 
-static void put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
+void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms) {
     char text[32];
     if (unix_ms > 0)
         clock_rfc3339(unix_ms, text);
-    put_text(bytes, name, unix_ms > 0 ? text : NULL);
-}
-
-static bool is_same(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
+    material_put_text(bytes, name, unix_ms > 0 ? text : NULL);
 }
 
 static void write_review(Bytes *bytes, const MaterialRevision *revision) {
@@ -63,14 +56,14 @@ static void write_review(Bytes *bytes, const MaterialRevision *revision) {
         bytes_text(bytes, ", \"review\": null");
         return;
     }
-    const bool is_own = is_same(revision->reviewer, revision->author);
+    const bool is_own = text_same(revision->reviewer, revision->author);
     bytes_text(bytes, ", \"review\": {\"status\": ");
     bytes_json_string(bytes, revision->status);
-    put_text(bytes, "reason", revision->reason);
-    put_text(bytes, "reviewer", revision->reviewer);
+    material_put_text(bytes, "reason", revision->reason);
+    material_put_text(bytes, "reviewer", revision->reviewer);
     bytes_format(bytes, ", \"self_approved\": %s",
                  is_own && strcmp(revision->status, "approved") == 0 ? "true" : "false");
-    put_time(bytes, "created", revision->reviewed_unix_ms);
+    material_put_time(bytes, "created", revision->reviewed_unix_ms);
     bytes_text(bytes, "}");
 }
 
@@ -83,13 +76,13 @@ void catalogue_write(Bytes *bytes, const MaterialRevision *revision) {
                  slug, number, (unsigned long long)revision->latest,
                  (unsigned long long)revision->version, revision->status);
     (void)write_members(bytes, material_fields, &revision->material, WRITE_REPORT);
-    put_text(bytes, "author", revision->author);
-    put_text(bytes, "comment", revision->comment);
+    material_put_text(bytes, "author", revision->author);
+    material_put_text(bytes, "comment", revision->comment);
     if (revision->reverts > 0)
         bytes_format(bytes, ", \"reverts\": %llu", (unsigned long long)revision->reverts);
     else
         bytes_text(bytes, ", \"reverts\": null");
-    put_time(bytes, "created", revision->created_unix_ms);
+    material_put_time(bytes, "created", revision->created_unix_ms);
     write_review(bytes, revision);
     bytes_format(bytes,
                  ", \"links\": {\"self\": \"%s/v1/materials/%s\", \"revision\": "

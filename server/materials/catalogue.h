@@ -22,4 +22,8 @@ void catalogue_write(Bytes *bytes, const MaterialRevision *revision);
 // Of it slug, revision, status and what the revision says.
 void catalogue_write_said(Bytes *bytes, const MaterialRevision *revision);
 
+// A text and a time as members behind others: NULL and 0 are null.
+void material_put_text(Bytes *bytes, const char *name, const char *text);
+void material_put_time(Bytes *bytes, const char *name, int64_t unix_ms);
+
 #endif

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
+#include "core/base/date.h"
 #include "server/codec/material_bodies.h"
 #include "server/codec/write.h"
 #include "server/materials/catalogue.h"
@@ -94,7 +94,7 @@ static bool grow(void **at, size_t *room, size_t count, size_t size) {
 static int64_t read_time(const char *text, const char *place, Problem *problem) {
     int64_t unix_ms = 0;
     char pointer[POINTER_SIZE];
-    if (text == NULL || (clock_read(text, &unix_ms) && unix_ms > 0))
+    if (text == NULL || (date_read(text, &unix_ms) && unix_ms > 0))
         return unix_ms;
     Fault fault = {.row = 0};
     pointer_join(pointer, sizeof pointer, place, "created");

@@ -56,23 +56,26 @@ static int order_tests(const void *a, const void *b) {
     const int by_test = strcmp(one->made.document, other->made.document);
     if (by_test != 0)
         return by_test;
+    const bool is_numbered = one->made.measurement > 0;
+    if (is_numbered != (other->made.measurement > 0))
+        return is_numbered ? -1 : 1;
     return one->mark.order < other->mark.order ? -1 : one->mark.order > other->mark.order;
 }
 
-// The same test twice without a number is one that was copied twice.
+// The same test once more without a number is one that was copied twice.
 static Status check_tests(const MaterialImport *import, Problem *problem) {
     const ImportMeasurement **tests = calloc(import->measurement_count + 1, sizeof *tests);
     size_t count = 0;
     if (tests == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
     for (size_t i = 0; i < import->measurement_count; i++)
-        if (import->measurements[i].made.measurement == 0 &&
-            import->measurements[i].made.document != NULL)
+        if (import->measurements[i].made.document != NULL)
             tests[count++] = &import->measurements[i];
     qsort(tests, count, sizeof(const ImportMeasurement *), order_tests);
     for (size_t i = 1; i < count; i++) {
         const MaterialMeasurement *before = &tests[i - 1]->made, *here = &tests[i]->made;
-        if (strcmp(before->slug, here->slug) != 0 || strcmp(before->document, here->document) != 0)
+        if (here->measurement > 0 || strcmp(before->slug, here->slug) != 0 ||
+            strcmp(before->document, here->document) != 0)
             continue;
         char place[sizeof((Fault){0}.pointer)];
         pointer_join(place, sizeof place, tests[i]->mark.place, "test");

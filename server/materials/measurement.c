@@ -3,45 +3,45 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/base/clock.h"
 #include "server/base/link.h"
 #include "server/codec/read.h"
 #include "server/codec/write.h"
+#include "server/materials/catalogue.h"
 
 void stored_test_clear(StoredTest *stored) {
     material_measurement_clear(&stored->row);
     fields_clear(drop_test_fields, &stored->test);
 }
 
-Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredTest *stored,
-                        Problem *problem) {
-    TRY(store_material_measurement(store, slug, number, &stored->row, problem));
-    const char *text = stored->row.document;
+// A fault is the store's, not the client's.
+static Status read_test(const MaterialMeasurement *row, DropTest *test, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    const Status status = read_json(text, strlen(text), drop_test_fields, &stored->test, fault);
-    // A fault here is ours, not the client's.
+    Status status = read_json(row->document, strlen(row->document), drop_test_fields, test, fault);
     if (status != STATUS_OK)
-        problem_set(problem, STATUS_INTERNAL, "measurement %llu of \"%.63s\" cannot be read: %s",
-                    (unsigned long long)number, slug, fault->detail);
+        status = problem_set(problem, STATUS_INTERNAL,
+                             "measurement %llu of \"%.63s\" cannot be read: %s",
+                             (unsigned long long)row->measurement, row->slug, fault->detail);
     free(fault);
-    return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
+    return status;
 }
 
-static void put_text(Bytes *bytes, const char *name, const char *text) {
-    bytes_format(bytes, ", \"%s\": ", name);
-    bytes_json_string(bytes, text);
+Status stored_test_load(Store *store, const char *slug, uint64_t number, StoredTest *stored,
+                        Problem *problem) {
+    TRY(store_material_measurement(store, slug, number, &stored->row, problem));
+    const Status status = read_test(&stored->row, &stored->test, problem);
+    free(stored->row.document); // it may be as large as the test
+    stored->row.document = NULL;
+    return status;
 }
 
 void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row) {
-    char created[32];
-    clock_rfc3339(row->created_unix_ms, created);
     bytes_format(bytes, "\"slug\": \"%s\", \"measurement\": %llu", row->slug,
                  (unsigned long long)row->measurement);
-    put_text(bytes, "author", row->author);
-    put_text(bytes, "comment", row->comment);
-    put_text(bytes, "created", created);
+    material_put_text(bytes, "author", row->author);
+    material_put_text(bytes, "comment", row->comment);
+    material_put_time(bytes, "created", row->created_unix_ms);
 }
 
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {
@@ -54,24 +54,37 @@ void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number) {
                  base, slug, n, base, slug, base, slug, n);
 }
 
-void measurement_write_brief(Bytes *bytes, const StoredTest *stored) {
-    DropTest brief = stored->test; // borrows
-    brief.drops = (Drops){NULL, 0};
-    brief.traces = (Traces){NULL, 0};
-    bytes_text(bytes, "{");
-    measurement_write_row(bytes, &stored->row);
-    bytes_format(bytes, ", \"drops\": %zu, \"traces\": %zu, \"test\": ", stored->test.drops.count,
-                 stored->test.traces.count);
-    write_item(bytes, drop_test_fields, &brief, WRITE_SCENE);
-    bytes_text(bytes, ", ");
-    measurement_write_links(bytes, stored->row.slug, stored->row.measurement);
-    bytes_text(bytes, "}");
+Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem *problem) {
+    DropTest test;
+    memset(&test, 0, sizeof test);
+    const Status status = read_test(&brief->row, &test, problem);
+    if (status == STATUS_OK) {
+        bytes_text(bytes, "{");
+        measurement_write_row(bytes, &brief->row);
+        bytes_format(bytes, ", \"drops\": %llu, \"traces\": %llu, \"test\": ",
+                     (unsigned long long)brief->drops, (unsigned long long)brief->traces);
+        write_item(bytes, drop_test_fields, &test, WRITE_SCENE);
+        bytes_text(bytes, ", ");
+        measurement_write_links(bytes, brief->row.slug, brief->row.measurement);
+        bytes_text(bytes, "}");
+    }
+    fields_clear(drop_test_fields, &test);
+    return status;
+}
+
+static void write_warnings(Bytes *bytes, const Evaluation *evaluation) {
+    bytes_text(bytes, ", \"warnings\": ");
+    write_list(bytes, warning_fields, evaluation->warnings.at, evaluation->warnings.count,
+               sizeof *evaluation->warnings.at, WRITE_REPORT);
 }
 
 void evaluation_write(Bytes *bytes, const Evaluation *evaluation) {
     bytes_text(bytes, "\"evaluation\": ");
     write_item(bytes, evaluation_fields, evaluation, WRITE_REPORT);
-    bytes_text(bytes, ", \"warnings\": ");
-    write_list(bytes, warning_fields, evaluation->warnings.at, evaluation->warnings.count,
-               sizeof *evaluation->warnings.at, WRITE_REPORT);
+    write_warnings(bytes, evaluation);
+}
+
+void evaluation_write_none(Bytes *bytes, const Evaluation *evaluation) {
+    bytes_text(bytes, "\"evaluation\": null");
+    write_warnings(bytes, evaluation);
 }

@@ -9,7 +9,7 @@
 #include "server/store/material_rows.h"
 
 typedef struct StoredTest {
-    MaterialMeasurement row;
+    MaterialMeasurement row; // without its document
     DropTest test;
 } StoredTest;
 
@@ -21,10 +21,12 @@ void stored_test_clear(StoredTest *stored);
 // Whose it is, and when: `"slug": ..., "measurement": ...` without braces.
 void measurement_write_row(Bytes *bytes, const MaterialMeasurement *row);
 // Of the test all but its readings, of which the numbers are told; a whole object.
-void measurement_write_brief(Bytes *bytes, const StoredTest *stored);
+Status measurement_write_brief(Bytes *bytes, const MaterialBrief *brief, Problem *problem);
 // `"links": {...}`.
 void measurement_write_links(Bytes *bytes, const char *slug, uint64_t number);
 // `"evaluation": {...}, "warnings": [...]`.
 void evaluation_write(Bytes *bytes, const Evaluation *evaluation);
+// The same of one that was given up: null, and its warnings say why.
+void evaluation_write_none(Bytes *bytes, const Evaluation *evaluation);
 
 #endif

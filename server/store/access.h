@@ -43,4 +43,7 @@ Status store_first(Store *store, const char *sql, const RowColumn *key_columns, 
 Status store_all(Store *store, const char *sql, const RowColumn *key_columns, const void *key,
                  const RowColumn *columns, size_t size, void **at, size_t *count, Problem *problem);
 
+// Within a transaction: `sql` with each of the lines as :name.
+Status use_lines_add(Database *database, const char *sql, const char *lines, Problem *problem);
+
 #endif

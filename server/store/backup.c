@@ -48,6 +48,11 @@ static bool is_same(const struct stat *a, const struct stat *b) {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
+static Status refuse_place(const char *path, Problem *problem) {
+    return problem_set(problem, STATUS_CONFLICT,
+                       "%s is there already: name another file, or --force replaces it", path);
+}
+
 static Status check_place(Work *work, Problem *problem) {
     const char *path = work->request->path, *slash = strrchr(path, '/');
     const char *name = slash != NULL ? slash + 1 : path;
@@ -74,10 +79,7 @@ static Status check_place(Work *work, Problem *problem) {
         return problem_set(problem, STATUS_CONFLICT, "%s is a folder: name a file in it", path);
     if (is_there && !S_ISREG(there.st_mode))
         return problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
-    if (is_there && !work->request->replaces)
-        return problem_set(problem, STATUS_CONFLICT,
-                           "%s is there already: name another file, or --force replaces it", path);
-    return STATUS_OK;
+    return is_there && !work->request->replaces ? refuse_place(path, problem) : STATUS_OK;
 }
 
 static Status read_late(Work *work, Problem *problem) {
@@ -108,7 +110,7 @@ static Status open_source(Work *work, Database **source, Problem *problem) {
     static const RowColumn columns[] = {ROW_COLUMN(Backup, jobs, COLUMN_COUNT), ROW_END};
     const char *directory = work->request->directory;
     char path[PATH_MAX];
-    bool is_current, has_row;
+    bool has_row;
     Statement *statement;
     snprintf(path, sizeof path, "%.4000s/impactd.db", directory);
     if (access(path, F_OK) != 0 && errno != EACCES)
@@ -116,7 +118,7 @@ static Status open_source(Work *work, Database **source, Problem *problem) {
                            "there is no database in %s; --data DIR names the daemon's folder",
                            directory);
     TRY(database_open(path, DATABASE_READER, source, problem));
-    TRY(database_is_current(*source, embedded_sql, &is_current, problem));
+    TRY(database_is_current(*source, embedded_sql, NULL, problem));
     TRY(statement_begin(*source, sql, NULL, NULL, &statement, problem));
     Status status = statement_step(statement, &has_row, problem);
     if (status == STATUS_OK && has_row)
@@ -211,7 +213,8 @@ static Status fill(Work *work, Problem *problem) {
     return STATUS_OK;
 }
 
-// What was there a moment ago may be there again.
+// Never over a file that has come since it was looked for, unless that may be replaced; where the
+// file system has no links to tell, what was just seen must do.
 static Status give_name(Work *work, Problem *problem) {
     const char *path = work->request->path;
     struct stat what;
@@ -222,8 +225,13 @@ static Status give_name(Work *work, Problem *problem) {
     if (!watch_advance(work->request->watch, 1))
         return problem_set(problem, STATUS_CANCELLED, "it was interrupted");
     TRY(check_place(work, problem));
-    if (rename(work->part, path) != 0)
+    const bool is_linked = !work->request->replaces && link(work->part, path) == 0;
+    if (!is_linked && !work->request->replaces && errno == EEXIST)
+        return refuse_place(path, problem);
+    if (!is_linked && rename(work->part, path) != 0)
         return problem_set(problem, STATUS_IO, "%s cannot be written: %s", path, strerror(errno));
+    if (is_linked)
+        (void)unlink(work->part);
     work->part[0] = '\0';
     return folder_sync(work->folder, problem);
 }

@@ -325,7 +325,8 @@ Status database_is_current(Database *database, const EmbeddedFile *files, bool *
                            Problem *problem) {
     int64_t version = 0, last = 0;
     TRY(read_version(database, files, &version, &last, problem));
-    *is_current = version == last;
+    if (is_current != NULL)
+        *is_current = version == last;
     return STATUS_OK;
 }
 

@@ -31,7 +31,8 @@ void database_close(Database *database);
 // impactd's.
 Status database_migrate(Database *database, const EmbeddedFile *files, Problem *problem);
 
-// Whether the schema is at the last of `files` already. STATUS_CONFLICT for a newer one.
+// Whether the schema is at the last of `files` already (NULL: no matter). STATUS_CONFLICT for a
+// newer one.
 Status database_is_current(Database *database, const EmbeddedFile *files, bool *is_current,
                            Problem *problem);
 

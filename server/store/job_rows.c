@@ -36,6 +36,7 @@ const RowColumn job_columns[] = {
 // clang-format on
 
 void job_row_clear(JobRow *row) {
+    free(row->uses);
     row_clear(job_columns, row, sizeof *row);
 }
 
@@ -65,7 +66,11 @@ static Status not_found(const char *id, Problem *problem) {
 
 static Status add(Database *database, const void *work, Problem *problem) {
     static const char sql[] = JOB_INSERT;
-    return database_change(database, sql, job_columns, work, NULL, problem);
+    static const char uses_sql[] = "INSERT INTO job_uses (job, name) VALUES "
+                                   "(last_insert_rowid(), :name) ON CONFLICT DO NOTHING";
+    const JobRow *row = work;
+    TRY(database_change(database, sql, job_columns, row, NULL, problem));
+    return row->state < 2 ? use_lines_add(database, uses_sql, row->uses, problem) : STATUS_OK;
 }
 
 Status store_job_add(Store *store, const JobRow *row, Problem *problem) {
@@ -125,6 +130,7 @@ bool store_job_late(Store *store, const JobRow *row) {
 
 bool job_row_copy(const JobRow *row, JobRow *copy) {
     *copy = *row;
+    copy->uses = NULL;
     return pack_own(job_columns, copy);
 }
 

@@ -1,7 +1,6 @@
 // Rows that follow their answer: kept in a small file that is mapped into memory, found at once,
 // and written to the database by the hundred. Not for what must outlast the machine. Used by
-// store.c,
-// job_rows.c and backup.c.
+// store.c, job_rows.c and backup.c.
 //
 // What may be lost: nothing when the process ends or is killed, for the file's pages are the
 // kernel's, and the next start writes them to the database. When the machine itself stops (power,

@@ -59,6 +59,19 @@ const RowColumn material_measurement_columns[] = {
     ROW_END
 };
 
+#define OF_ROW(member, kind_) ROW_COLUMN_AS(MaterialBrief, row.member, #member, kind_)
+const RowColumn material_brief_columns[] = {
+    OF_ROW(slug, COLUMN_TEXT),
+    OF_ROW(measurement, COLUMN_COUNT),
+    OF_ROW(author, COLUMN_TEXT),
+    OF_ROW(comment, COLUMN_TEXT),
+    OF_ROW(created_unix_ms, COLUMN_INTEGER),
+    ROW_COLUMN_AS(MaterialBrief, row.document, "head", COLUMN_TEXT),
+    ROW_COLUMN(MaterialBrief, drops, COLUMN_COUNT),
+    ROW_COLUMN(MaterialBrief, traces, COLUMN_COUNT),
+    ROW_END
+};
+
 const RowColumn material_deed_columns[] = {
     ROW_COLUMN(MaterialDeed, version, COLUMN_COUNT),
     ROW_COLUMN(MaterialDeed, action, COLUMN_TEXT),

@@ -7,7 +7,7 @@
 #include "server/store/material_rows.h"
 
 extern const RowColumn material_revision_columns[], material_review_columns[],
-    material_measurement_columns[], material_deed_columns[];
+    material_measurement_columns[], material_brief_columns[], material_deed_columns[];
 
 // A material within the writer's transaction; all zero where there is none.
 typedef struct MaterialKey {

@@ -36,29 +36,45 @@ Status store_material_moment(Store *store, MaterialMoment *moment, Problem *prob
     return store_first(store, sql, NULL, NULL, moment_columns, moment, &is_found, problem);
 }
 
-// A review is younger than its revision: of what is told of, all revisions are there.
+static Status first_revision(Store *store, const char *sql, const Key *key,
+                             MaterialRevision *revision, bool *is_found, Problem *problem) {
+    memset(revision, 0, sizeof *revision);
+    return store_first(store, sql, key_columns, key, material_revision_columns, revision, is_found,
+                       problem);
+}
+
+// CROSS and + keep the database to slugs in order: all revisions up to a number would be sorted
+// for each material.
 Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
-                             MaterialRevisions *revisions, MaterialReviews *reviews,
+                             MaterialRevision *revision, bool *is_found, Problem *problem) {
+    static const char sql[] =
+        "SELECT m.slug, r.* FROM materials m CROSS JOIN material_revisions r ON r.material = "
+        "m.number "
+        "WHERE m.slug > :slug AND +r.number <= :revisions ORDER BY m.slug, r.revision LIMIT 1";
+    const Key key = {.slug = (char *)slug, .moment = *moment};
+    return first_revision(store, sql, &key, revision, is_found, problem);
+}
+
+Status store_revision_behind(Store *store, const MaterialMoment *moment, const char *slug,
+                             uint64_t number, MaterialRevision *revision, bool *is_found,
                              Problem *problem) {
-    static const char revisions_sql[] =
+    static const char sql[] =
         "SELECT m.slug, r.* FROM materials m JOIN material_revisions r ON r.material = m.number "
-        "WHERE m.slug = (SELECT n.slug FROM materials n WHERE n.slug > :slug AND EXISTS (SELECT 1 "
-        "FROM material_revisions o WHERE o.material = n.number AND o.number <= :revisions) ORDER "
-        "BY n.slug LIMIT 1) AND r.number <= :revisions ORDER BY r.revision";
-    static const char reviews_sql[] =
+        "WHERE m.slug = :slug AND r.revision > :number AND r.number <= :revisions "
+        "ORDER BY r.revision LIMIT 1";
+    const Key key = {(char *)slug, number, *moment};
+    return first_revision(store, sql, &key, revision, is_found, problem);
+}
+
+Status store_reviews_of(Store *store, const MaterialMoment *moment, const char *slug,
+                        uint64_t revision, MaterialReviews *reviews, Problem *problem) {
+    static const char sql[] =
         "SELECT m.slug, v.* FROM materials m JOIN material_reviews v ON v.material = m.number "
-        "WHERE m.slug = :slug AND v.number <= :reviews ORDER BY v.revision, v.number";
-    Key key = {.slug = (char *)slug, .moment = *moment};
+        "WHERE m.slug = :slug AND v.revision = :number AND v.number <= :reviews ORDER BY v.number";
+    const Key key = {(char *)slug, revision, *moment};
     void *at;
-    *reviews = (MaterialReviews){NULL, 0};
-    Status status = store_all(store, revisions_sql, key_columns, &key, material_revision_columns,
-                              sizeof *revisions->at, &at, &revisions->count, problem);
-    revisions->at = at;
-    if (status != STATUS_OK || revisions->count == 0)
-        return status;
-    key.slug = revisions->at[0].slug;
-    status = store_all(store, reviews_sql, key_columns, &key, material_review_columns,
-                       sizeof *reviews->at, &at, &reviews->count, problem);
+    const Status status = store_all(store, sql, key_columns, &key, material_review_columns,
+                                    sizeof *reviews->at, &at, &reviews->count, problem);
     reviews->at = at;
     return status;
 }

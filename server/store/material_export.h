@@ -12,15 +12,20 @@ typedef struct MaterialMoment {
 
 Status store_material_moment(Store *store, MaterialMoment *moment, Problem *problem);
 
-// The revisions of the first material behind `slug` in their order, and their reviews, by revision;
-// none behind the last. What the last review made of a revision is not told in it. Both are cleared
-// by the caller, in any case.
-Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
-                             MaterialRevisions *revisions, MaterialReviews *reviews,
-                             Problem *problem);
+// What is found below may be uninitialised before, and is cleared by the caller in any case;
+// *is_found is false behind the last.
 
-// The first of a material's measurements behind `number`; *is_found is false behind the last.
-// `measurement` may be uninitialised.
+// The first revision of the first material behind `slug`.
+Status store_material_behind(Store *store, const MaterialMoment *moment, const char *slug,
+                             MaterialRevision *revision, bool *is_found, Problem *problem);
+// The first of a material's revisions behind `number`. What its last review made of it is not told.
+Status store_revision_behind(Store *store, const MaterialMoment *moment, const char *slug,
+                             uint64_t number, MaterialRevision *revision, bool *is_found,
+                             Problem *problem);
+// The reviews of one revision in their order.
+Status store_reviews_of(Store *store, const MaterialMoment *moment, const char *slug,
+                        uint64_t revision, MaterialReviews *reviews, Problem *problem);
+// The first of a material's measurements behind `number`.
 Status store_measurement_behind(Store *store, const MaterialMoment *moment, const char *slug,
                                 uint64_t number, MaterialMeasurement *measurement, bool *is_found,
                                 Problem *problem);

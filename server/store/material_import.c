@@ -81,7 +81,7 @@ static void judge_measurements(const Walk *walk, const ImportRevision *ours, con
 static Status add_revision(Walk *walk, Database *database, const ImportRevision *ours,
                            uint64_t number, Group *group, Problem *problem) {
     const ImportMark *mark = &ours->mark;
-    import_judge_author(walk, mark, ours->said.author);
+    import_judge_origin(walk, mark, ours->said.author, ours->said.created_unix_ms);
     judge_measurements(walk, ours, group);
     TRY(judge_reverts(walk, database, ours, number, group, problem));
     group->revisions_done.added++;
@@ -92,7 +92,7 @@ static Status add_revision(Walk *walk, Database *database, const ImportRevision 
     said.created_unix_ms = mark->has_created ? said.created_unix_ms : walk->import->now_unix_ms;
     if (walk->writes && walk->faults->count == 0)
         TRY(material_revision_add(database, &said, problem));
-    return import_reviews(walk, database, ours, number, said.author, group, problem);
+    return import_reviews(walk, database, ours, &said, group, problem);
 }
 
 // One without a number is the next, unless the newest says the same already.
@@ -105,8 +105,7 @@ static Status import_next(Walk *walk, Database *database, const ImportRevision *
     if (status == STATUS_OK && newest.revision > 0 &&
         walk->import->says_same(&ours->said, &newest, "", NULL)) {
         group->revisions_done.same++;
-        status =
-            import_reviews(walk, database, ours, newest.revision, newest.author, group, problem);
+        status = import_reviews(walk, database, ours, &newest, group, problem);
     } else if (status == STATUS_OK) {
         status = add_revision(walk, database, ours, group->key.latest + 1, group, problem);
     }
@@ -119,8 +118,7 @@ static Status import_known(Walk *walk, Database *database, const ImportRevision 
     MaterialRevision there = {0};
     TRY(load_revision(database, group->slug, ours->said.revision, &there, problem));
     compare_revision(walk, ours, &there, group);
-    const Status status =
-        import_reviews(walk, database, ours, ours->said.revision, there.author, group, problem);
+    const Status status = import_reviews(walk, database, ours, &there, group, problem);
     material_revision_clear(&there);
     return status;
 }
@@ -200,12 +198,11 @@ static Status import_all(Walk *walk, Database *database, Problem *problem) {
         Group group = {.slug = a == NULL || (b != NULL && strcmp(b, a) < 0) ? b : a,
                        .revisions = &import->revisions[r],
                        .measurements = &import->measurements[m]};
-        for (; r < import->revision_count &&
-               import_is_same(import->revisions[r].said.slug, group.slug);
+        for (; r < import->revision_count && text_same(import->revisions[r].said.slug, group.slug);
              r++)
             group.revision_count++;
         for (; m < import->measurement_count &&
-               import_is_same(import->measurements[m].made.slug, group.slug);
+               text_same(import->measurements[m].made.slug, group.slug);
              m++)
             group.measurement_count++;
         walk->tally->materials++;
@@ -220,9 +217,9 @@ static Status refuse(const Walk *walk) {
     if (walk->denied == 0)
         return STATUS_OK;
     return problem_add(walk->faults, STATUS_FORBIDDEN, walk->denied_place,
-                       "%s (%zu more rows are like it): what is by others, and reviews, may be "
-                       "brought by who has the scope admin; nobody approves their own by way of a "
-                       "file",
+                       "%s (%zu more rows are like it): what is by others, times, and reviews "
+                       "may be brought by who has the scope admin; nobody approves their own by "
+                       "way of a file",
                        walk->denied_why, walk->denied - 1);
 }
 
@@ -256,7 +253,10 @@ Status store_material_import(Store *store, const MaterialImport *import, bool is
         return judge_all(store, &walk, problem);
     walk.writes = true;
     TRY(store_write(store, write_all, &walk, problem));
-    store_catalogue_changed(store);
+    if (tally->revisions.added + tally->reviews.added > 0)
+        store_catalogue_changed(store);
+    else if (tally->measurements.added > 0)
+        store_material_measured(store);
     return STATUS_OK;
 }
 

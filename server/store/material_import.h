@@ -30,7 +30,7 @@ typedef struct ImportRevision {
 
 typedef struct ImportMeasurement {
     ImportMark mark;
-    MaterialMeasurement made; // measurement 0: the next
+    MaterialMeasurement made; // measurement 0: the next, unless its test is there
 } ImportMeasurement;
 
 // Both lists are by slug, then by number, those without one last, in the file's order.

@@ -51,24 +51,27 @@ static Status load_reviews(Database *database, const char *slug, uint64_t revisi
 
 static bool is_review(const ImportReview *ours, const MaterialReview *there) {
     const MaterialReview *review = &ours->review;
-    return import_is_same(review->status, there->status) &&
-           import_is_same(review->reason, there->reason) &&
-           (!ours->has_reviewer || import_is_same(review->reviewer, there->reviewer)) &&
+    return text_same(review->status, there->status) && text_same(review->reason, there->reason) &&
+           (!ours->has_reviewer || text_same(review->reviewer, there->reviewer)) &&
            (!ours->has_created || review->created_unix_ms == there->created_unix_ms);
 }
 
-// What a review that is not there yet must not be.
+// What a review that is not there yet must not be. One whose reviewer nobody knows may be the
+// importer's own.
 static Status judge_review(const Walk *walk, const char *place, const ImportReview *ours,
-                           const char *before, const char *author) {
+                           const char *before, const MaterialRevision *said) {
     const MaterialReview *review = &ours->review;
-    const char *reviewer = ours->has_reviewer ? review->reviewer : walk->import->who;
-    if (import_is_same(review->status, before))
+    const bool is_known = ours->has_reviewer && review->reviewer != NULL;
+    const char *reviewer = is_known ? review->reviewer : walk->import->who;
+    if (text_same(review->status, before))
         return import_fault(walk, place, "status", "is %s already", before);
     if (strcmp(review->status, "approved") == 0 && reviewer != NULL &&
-        import_is_same(reviewer, author))
+        text_same(reviewer, said->author))
         return import_fault(walk, place, "reviewer",
-                            "is the revision's author, %.64s, and nobody approves their own",
-                            author);
+                            "%s the revision's author, %.64s, and nobody approves their own",
+                            is_known ? "is" : "must be told, else it is", said->author);
+    if (ours->has_created)
+        import_judge_time(walk, place, review->created_unix_ms, said->created_unix_ms);
     return STATUS_OK;
 }
 
@@ -85,10 +88,14 @@ static Status add_review(const Walk *walk, Database *database, const char *slug,
 }
 
 static Status match_reviews(Walk *walk, Database *database, const ImportRevision *ours,
-                            uint64_t number, const char *author, const Reviews *there, Group *group,
+                            const MaterialRevision *said, const Reviews *there, Group *group,
                             Problem *problem) {
     char list[POINTER_SIZE], place[POINTER_SIZE];
     const char *before = there->count > 0 ? there->at[there->count - 1].status : "draft";
+    // Of a faulty row the time may be what could not be read.
+    MaterialRevision dated = *said; // borrows
+    if (ours->mark.is_faulty && !ours->mark.has_created)
+        dated.created_unix_ms = 0;
     pointer_join(list, sizeof list, ours->mark.place, "reviews");
     for (size_t i = 0; i < ours->review_count; i++) {
         const ImportReview *review = &ours->reviews[i];
@@ -102,10 +109,10 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
                 (void)import_fault(
                     walk, place, "",
                     "is not the review of %.64s@%llu that is there, and those never change",
-                    group->slug, (unsigned long long)number);
+                    group->slug, (unsigned long long)said->revision);
             continue;
         }
-        const Status judged = judge_review(walk, place, review, before, author);
+        const Status judged = judge_review(walk, place, review, before, &dated);
         before = review->review.status;
         if (judged != STATUS_OK)
             continue;
@@ -113,21 +120,21 @@ static Status match_reviews(Walk *walk, Database *database, const ImportRevision
             import_deny(walk, ours->mark.place, "reviews", "brings reviews");
         group->reviews_done.added++;
         if (walk->writes && walk->faults->count == 0)
-            TRY(add_review(walk, database, group->slug, number, review, problem));
+            TRY(add_review(walk, database, group->slug, said->revision, review, problem));
     }
     return STATUS_OK;
 }
 
-Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours, uint64_t number,
-                      const char *author, Group *group, Problem *problem) {
+Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours,
+                      const MaterialRevision *said, Group *group, Problem *problem) {
     Reviews there = {0};
     if (ours->review_count == 0)
         return STATUS_OK;
     Status status = STATUS_OK;
-    if (number <= group->key.latest)
-        status = load_reviews(database, group->slug, number, &there, problem);
+    if (said->revision <= group->key.latest)
+        status = load_reviews(database, group->slug, said->revision, &there, problem);
     if (status == STATUS_OK)
-        status = match_reviews(walk, database, ours, number, author, &there, group, problem);
+        status = match_reviews(walk, database, ours, said, &there, group, problem);
     reviews_clear(&there);
     return status;
 }

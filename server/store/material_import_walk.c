@@ -7,6 +7,9 @@
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
+// Clocks differ, and a date alone is its midnight wherever it was written.
+static const int64_t time_slack_ms = 24 * 3600 * (int64_t)1000;
+
 const RowColumn import_key_columns[] = {ROW_COLUMN(ImportKey, slug, COLUMN_TEXT),
                                         ROW_COLUMN(ImportKey, number, COLUMN_COUNT), ROW_END};
 
@@ -31,10 +34,6 @@ void import_deny(Walk *walk, const char *place, const char *name, const char *wh
     walk->denied_why = why;
 }
 
-bool import_is_same(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 Status import_load(Database *database, const char *sql, const char *slug, uint64_t number,
                    const RowColumn *columns, void *item, Problem *problem) {
     const ImportKey key = {(char *)slug, number};
@@ -51,9 +50,9 @@ Status import_load(Database *database, const char *sql, const char *slug, uint64
 void import_compare_origin(const Walk *walk, const ImportMark *mark, const char *what,
                            const ImportOrigin *ours, const ImportOrigin *there) {
     static const char never[] = "is not that of the %s that is there, and those never change";
-    if (mark->has_author && !import_is_same(ours->author, there->author))
+    if (mark->has_author && !text_same(ours->author, there->author))
         (void)import_fault(walk, mark->place, "author", never, what);
-    if (mark->has_comment && !import_is_same(ours->comment, there->comment))
+    if (mark->has_comment && !text_same(ours->comment, there->comment))
         (void)import_fault(walk, mark->place, "comment", never, what);
     if (mark->has_created && ours->created_unix_ms != there->created_unix_ms)
         (void)import_fault(walk, mark->place, "created", never, what);
@@ -79,8 +78,22 @@ const char *import_author(const Walk *walk, const ImportMark *mark, const char *
     return mark->has_author && walk->import->may_all ? author : walk->import->who;
 }
 
-void import_judge_author(Walk *walk, const ImportMark *mark, const char *author) {
-    if (!walk->import->may_all && mark->has_author && author != NULL &&
-        !import_is_same(author, walk->import->who))
+void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
+                       int64_t revised_unix_ms) {
+    if (unix_ms > walk->import->now_unix_ms + time_slack_ms)
+        (void)import_fault(walk, place, "created", "lies in the future");
+    else if (unix_ms < revised_unix_ms - time_slack_ms)
+        (void)import_fault(walk, place, "created",
+                           "lies before the revision was written; give that its \"created\", too");
+}
+
+void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
+                         int64_t created_unix_ms) {
+    const bool may_all = walk->import->may_all;
+    if (!may_all && mark->has_author && author != NULL && !text_same(author, walk->import->who))
         import_deny(walk, mark->place, "author", "is somebody else");
+    if (!may_all && mark->has_created)
+        import_deny(walk, mark->place, "created", "is a time of the file's own");
+    if (mark->has_created)
+        import_judge_time(walk, mark->place, created_unix_ms, 0);
 }

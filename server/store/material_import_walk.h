@@ -35,9 +35,14 @@ Status import_fault(const Walk *walk, const char *place, const char *name, const
 // Counts what the importer may not bring.
 void import_deny(Walk *walk, const char *place, const char *name, const char *why);
 
-bool import_is_same(const char *a, const char *b); // both may be NULL
 const char *import_author(const Walk *walk, const ImportMark *mark, const char *author);
-void import_judge_author(Walk *walk, const ImportMark *mark, const char *author);
+// Of a row that is not there yet: who wrote it, and when.
+void import_judge_origin(Walk *walk, const ImportMark *mark, const char *author,
+                         int64_t created_unix_ms);
+// A time is told at "created" below `place` where it lies ahead, or before that of the revision
+// reviewed; 0: of none.
+void import_judge_time(const Walk *walk, const char *place, int64_t unix_ms,
+                       int64_t revised_unix_ms);
 // Who, when and why, as far as the file tells it.
 typedef struct ImportOrigin {
     const char *author, *comment;
@@ -60,8 +65,8 @@ Status import_load(Database *database, const char *sql, const char *slug, uint64
                    const RowColumn *columns, void *item, Problem *problem);
 
 Status import_measurements(Walk *walk, Database *database, Group *group, Problem *problem);
-// Those of one revision, which is there already or has been added.
-Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours, uint64_t number,
-                      const char *author, Group *group, Problem *problem);
+// Those of one revision, `said`, which is there already or has been added.
+Status import_reviews(Walk *walk, Database *database, const ImportRevision *ours,
+                      const MaterialRevision *said, Group *group, Problem *problem);
 
 #endif

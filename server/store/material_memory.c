@@ -1,10 +1,12 @@
 // A short list, searched from end to end. Where it is full, or the catalogue has changed, it begins
-// anew.
+// anew. What it holds are rows as they are stored: their lists are texts, not read yet.
 #include "server/store/material_memory.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "server/store/material_columns.h"
 
 enum { MOST = 32 };
 
@@ -47,8 +49,9 @@ bool material_memory_find(MaterialMemory *memory, uint64_t generation, const cha
     pthread_mutex_lock(&memory->lock);
     for (size_t i = 0; i < memory->count && generation == memory->generation && !is_found; i++) {
         const Known *known = &memory->known[i];
-        is_found = known->asked == revision && strcmp(known->material.slug, slug) == 0 &&
-                   material_revision_copy(&known->material, material) == STATUS_OK;
+        is_found =
+            known->asked == revision && strcmp(known->material.slug, slug) == 0 &&
+            row_copy(material_revision_columns, &known->material, material, sizeof *material);
     }
     pthread_mutex_unlock(&memory->lock);
     return is_found;
@@ -64,7 +67,8 @@ void material_memory_put(MaterialMemory *memory, uint64_t generation, uint64_t r
         Known *known = &memory->known[memory->count];
         memory->generation = generation;
         known->asked = revision;
-        memory->count += material_revision_copy(material, &known->material) == STATUS_OK;
+        memory->count +=
+            row_copy(material_revision_columns, material, &known->material, sizeof known->material);
     }
     pthread_mutex_unlock(&memory->lock);
 }

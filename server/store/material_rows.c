@@ -46,19 +46,6 @@ void material_revision_clear(MaterialRevision *revision) {
     row_clear(material_revision_columns, revision, sizeof *revision);
 }
 
-Status material_revision_copy(const MaterialRevision *revision, MaterialRevision *copy) {
-    Material material;
-    if (!row_copy(material_revision_columns, revision, copy, sizeof *copy))
-        return STATUS_NO_MEMORY;
-    if (fields_copy(material_fields, &revision->material, &material) != STATUS_OK) {
-        material_revision_clear(copy);
-        return STATUS_NO_MEMORY;
-    }
-    fields_clear(material_fields, &copy->material);
-    copy->material = material;
-    return STATUS_OK;
-}
-
 static Status refuse_slug(const char *slug, Problem *problem) {
     return problem_set(problem, STATUS_NOT_FOUND, "there is no material \"%.64s\"", slug);
 }
@@ -81,7 +68,7 @@ Status store_material(Store *store, const char *slug, uint64_t revision, Materia
                       Problem *problem) {
     const Key key = key_of(slug, revision);
     MaterialMemory *memory = store_material_memory(store);
-    const uint64_t generation = store_generation(store);
+    const uint64_t generation = store_deeds(store);
     bool is_found;
     memset(material, 0, sizeof *material);
     if (material_memory_find(memory, generation, slug, revision, material))
@@ -185,6 +172,20 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no measurement %llu of a material \"%.64s\"",
                        (unsigned long long)number, slug);
+}
+
+Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
+                             MaterialBriefs *briefs, Problem *problem) {
+    static const char sql[] =
+        "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head, t.drops, "
+        "t.traces FROM material_measurements t JOIN materials m ON m.number = t.material WHERE "
+        "m.slug = :slug AND t.measurement < :number ORDER BY t.measurement DESC LIMIT :most";
+    const Key key = key_of_page(slug, before, most);
+    return all(store, sql, &key, material_brief_columns, sizeof *briefs->at, briefs, problem);
+}
+
+void material_briefs_clear(MaterialBriefs *briefs) {
+    clear_all(material_brief_columns, sizeof *briefs->at, briefs);
 }
 
 void material_measurement_clear(MaterialMeasurement *measurement) {

@@ -29,8 +29,6 @@ typedef struct MaterialRevisions {
     size_t count;
 } MaterialRevisions;
 void material_revision_clear(MaterialRevision *revision);
-// STATUS_NO_MEMORY, and then it is clear. `copy` may be uninitialised.
-Status material_revision_copy(const MaterialRevision *revision, MaterialRevision *copy);
 
 // How far a material has come.
 typedef struct MaterialState {
@@ -80,6 +78,20 @@ Status store_material_measurement(Store *store, const char *slug, uint64_t numbe
                                   MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
 
+// A measurement without its readings, which are counted. `document` is the drop test but for them.
+typedef struct MaterialBrief {
+    MaterialMeasurement row;
+    uint64_t drops, traces;
+} MaterialBrief;
+typedef struct MaterialBriefs {
+    MaterialBrief *at;
+    size_t count;
+} MaterialBriefs;
+// Newest first, at most `most` of one material's, those before `before`.
+Status store_material_briefs(Store *store, const char *slug, uint64_t before, size_t most,
+                             MaterialBriefs *briefs, Problem *problem);
+void material_briefs_clear(MaterialBriefs *briefs);
+
 typedef struct MaterialDeed {
     uint64_t version;               // of the material after it; what is added gets the next
     char *action;                   // "create", "revise" ...: schema/sql/009_materials.sql
@@ -121,6 +133,14 @@ typedef struct ResultUses {
 Status store_result_uses(Store *store, const char *name, size_t most, int64_t before,
                          ResultUses *uses, uint64_t *total, Problem *problem);
 
+// What is kept is kept for good, so there is an end to it: STATUS_LIMIT from each that writes.
+enum {
+    CATALOGUE_MATERIALS = 100000,
+    CATALOGUE_REVISIONS = 10000,    // of a material
+    CATALOGUE_MEASUREMENTS = 10000, // of a material
+};
+#define CATALOGUE_BYTES (INT64_C(64) << 30) // of all texts, and a bit for each row
+
 // Writing. Each is one transaction, durable when the call returns, and tells the catalogue's
 // readers. `version`: what the material's must be now (ANY_VERSION: whatever it is), else
 // STATUS_STALE, which tells the version that it has. Missing materials are STATUS_NOT_FOUND.
@@ -129,8 +149,8 @@ Status store_result_uses(Store *store, const char *name, size_t most, int64_t be
 // The first revision of a new material. STATUS_CONFLICT where the slug is taken. Slug, material,
 // lists, author, comment and created_unix_ms are read.
 Status store_material_add(Store *store, const MaterialRevision *first, Problem *problem);
-// Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above.
-// STATUS_INVALID where a measurement that it names is not there is its caller's to find.
+// Adds a revision and sets revision->revision; `reverts` is kept (0: none), the rest as above. That
+// the measurements that it names are there is for the caller to see to.
 Status store_material_revise(Store *store, MaterialRevision *revision, uint64_t version,
                              Problem *problem);
 // STATUS_CONFLICT where the revision has that status already; STATUS_FORBIDDEN where its author,

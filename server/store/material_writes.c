@@ -48,10 +48,53 @@ static Status require(Database *database, const char *slug, uint64_t revision, u
     return STATUS_OK;
 }
 
+typedef struct Room {
+    int64_t bytes, most;
+} Room;
+static const RowColumn room_columns[] = {ROW_COLUMN(Room, bytes, COLUMN_INTEGER),
+                                         ROW_COLUMN(Room, most, COLUMN_INTEGER), ROW_END};
+
+static int64_t length(const char *text) {
+    return text != NULL ? (int64_t)strlen(text) : 0;
+}
+
+// Room for a row with that many bytes of texts, within the transaction that adds it.
+static Status take_room(Database *database, int64_t bytes, Problem *problem) {
+    enum { ROW = 200 };
+    static const char sql[] =
+        "UPDATE material_room SET bytes = bytes + :bytes WHERE bytes + :bytes <= :most";
+    const Room room = {ROW + bytes, CATALOGUE_BYTES};
+    int changes = 0;
+    TRY(database_change(database, sql, room_columns, &room, &changes, problem));
+    if (changes > 0)
+        return STATUS_OK;
+    return problem_set(problem, STATUS_LIMIT,
+                       "all materials with their measurements have %lld GiB, and no more is kept",
+                       (long long)(CATALOGUE_BYTES >> 30));
+}
+
+static Status require_number(uint64_t number, uint64_t most, const char *slug, const char *what,
+                             Problem *problem) {
+    return number <= most
+               ? STATUS_OK
+               : problem_set(problem, STATUS_LIMIT,
+                             "the material \"%.64s\" has %llu %s, and no more are kept: go on "
+                             "under another slug",
+                             slug, (unsigned long long)most, what);
+}
+
 Status material_row_add(Database *database, const char *slug, Problem *problem) {
-    static const char sql[] = "INSERT INTO materials (slug) VALUES (:slug)";
-    const MaterialKey key = {.slug = (char *)slug};
-    return database_change(database, sql, material_key_columns, &key, NULL, problem);
+    // None is ever deleted: the highest number is how many there are.
+    static const char sql[] = "INSERT INTO materials (slug) SELECT :slug WHERE (SELECT "
+                              "coalesce(max(number), 0) FROM materials) < :revision";
+    const MaterialKey key = {.slug = (char *)slug, .revision = CATALOGUE_MATERIALS};
+    int changes = 0;
+    TRY(take_room(database, length(slug), problem));
+    TRY(database_change(database, sql, material_key_columns, &key, &changes, problem));
+    return changes > 0 ? STATUS_OK
+                       : problem_set(problem, STATUS_LIMIT,
+                                     "%d materials are kept, no more: revise one that is there",
+                                     CATALOGUE_MATERIALS);
 }
 
 Status material_revision_add(Database *database, const MaterialRevision *revision,
@@ -67,6 +110,14 @@ Status material_revision_add(Database *database, const MaterialRevision *revisio
         ":most_temperature, :impactor, :impactor_mass, :base, :base_mass, :source, :lists, "
         "nullif(:reverts, 0), :author, :comment, :created_unix_ms FROM materials WHERE slug = "
         ":slug";
+    const Material *said = &revision->material;
+    TRY(require_number(revision->revision, CATALOGUE_REVISIONS, revision->slug, "revisions",
+                       problem));
+    TRY(take_room(database,
+                  length(said->name) + length(said->kind) + length(said->hardness) +
+                      length(said->supplier) + length(said->notes) + length(said->impactor) +
+                      length(said->source) + length(revision->lists) + length(revision->comment),
+                  problem));
     return database_change(database, sql, material_revision_columns, revision, NULL, problem);
 }
 
@@ -75,6 +126,7 @@ Status material_review_add(Database *database, const MaterialReview *review, Pro
         "INSERT INTO material_reviews (material, revision, status, reason, reviewer, "
         "created_unix_ms) SELECT number, :revision, :status, :reason, :reviewer, :created_unix_ms "
         "FROM materials WHERE slug = :slug";
+    TRY(take_room(database, length(review->reason), problem));
     return database_change(database, sql, material_review_columns, review, NULL, problem);
 }
 
@@ -82,8 +134,13 @@ Status material_measurement_add(Database *database, const MaterialMeasurement *m
                                 Problem *problem) {
     static const char sql[] =
         "INSERT INTO material_measurements (material, measurement, author, comment, "
-        "created_unix_ms, document) SELECT number, :measurement, :author, :comment, "
-        ":created_unix_ms, :document FROM materials WHERE slug = :slug";
+        "created_unix_ms, drops, traces, head, document) SELECT number, :measurement, :author, "
+        ":comment, :created_unix_ms, coalesce(json_array_length(:document, '$.drops'), 0), "
+        "coalesce(json_array_length(:document, '$.traces'), 0), json_remove(:document, '$.drops', "
+        "'$.traces'), :document FROM materials WHERE slug = :slug";
+    TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
+                       "measurements", problem));
+    TRY(take_room(database, length(measurement->comment) + length(measurement->document), problem));
     return database_change(database, sql, material_measurement_columns, measurement, NULL, problem);
 }
 
@@ -112,6 +169,7 @@ Status material_deed_add(Database *database, const char *slug, const MaterialDee
         "material_trail t WHERE t.material = m.number), :action, nullif(:revision, 0), "
         "nullif(:measurement, 0), :who, :why, :created_unix_ms FROM materials m WHERE slug = :slug";
     const SlugDeed both = {(char *)slug, *deed};
+    TRY(take_room(database, length(deed->why), problem));
     return database_change(database, sql, slug_deed_columns, &both, NULL, problem);
 }
 
@@ -231,5 +289,7 @@ static Status measure(Database *database, const void *work, Problem *problem) {
 
 Status store_material_measure(Store *store, MaterialMeasurement *measurement, uint64_t version,
                               Problem *problem) {
-    return write(store, measure, &(Measure){measurement, version}, problem);
+    TRY(store_write(store, measure, &(Measure){measurement, version}, problem));
+    store_material_measured(store);
+    return STATUS_OK;
 }

@@ -38,18 +38,22 @@ static const RowColumn record_columns[] = {
 
 // What is asked for, and numbers that come back.
 typedef struct Key {
-    char *name, *words, *digest, *use, *mark;
+    char *name, *words, *digest, *use;
     StoredBytes samples;
     double interval;
     uint64_t most, count, results, jobs;
 } Key;
-static const RowColumn key_columns[] = {
-    ROW_COLUMN(Key, name, COLUMN_TEXT),     ROW_COLUMN(Key, words, COLUMN_TEXT),
-    ROW_COLUMN(Key, digest, COLUMN_TEXT),   ROW_COLUMN(Key, use, COLUMN_TEXT),
-    ROW_COLUMN(Key, mark, COLUMN_TEXT),     ROW_COLUMN(Key, samples, COLUMN_BYTES),
-    ROW_COLUMN(Key, interval, COLUMN_REAL), ROW_COLUMN(Key, most, COLUMN_COUNT),
-    ROW_COLUMN(Key, count, COLUMN_COUNT),   ROW_COLUMN(Key, results, COLUMN_COUNT),
-    ROW_COLUMN(Key, jobs, COLUMN_COUNT),    ROW_END};
+static const RowColumn key_columns[] = {ROW_COLUMN(Key, name, COLUMN_TEXT),
+                                        ROW_COLUMN(Key, words, COLUMN_TEXT),
+                                        ROW_COLUMN(Key, digest, COLUMN_TEXT),
+                                        ROW_COLUMN(Key, use, COLUMN_TEXT),
+                                        ROW_COLUMN(Key, samples, COLUMN_BYTES),
+                                        ROW_COLUMN(Key, interval, COLUMN_REAL),
+                                        ROW_COLUMN(Key, most, COLUMN_COUNT),
+                                        ROW_COLUMN(Key, count, COLUMN_COUNT),
+                                        ROW_COLUMN(Key, results, COLUMN_COUNT),
+                                        ROW_COLUMN(Key, jobs, COLUMN_COUNT),
+                                        ROW_END};
 
 static const char one_sql[] = "SELECT * FROM records WHERE name = :name";
 
@@ -102,13 +106,9 @@ static Status first(Database *database, const char *sql, const Key *key, const R
     return status;
 }
 
-static bool same(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
 // In what a record that is there differs from one that is to be; NULL: in nothing.
 static const char *difference(const RecordRow *there, const RecordRow *row) {
-    if (!same(there->digest, row->digest))
+    if (!text_same(there->digest, row->digest))
         return "samples or another interval";
     const struct {
         const char *what, *there, *given;
@@ -124,7 +124,7 @@ static const char *difference(const RecordRow *there, const RecordRow *row) {
         {"stated unit", there->stated_unit, row->stated_unit},
     };
     for (size_t i = 0; i < COUNT(words); i++)
-        if (!same(words[i].there, words[i].given))
+        if (!text_same(words[i].there, words[i].given))
             return words[i].what;
     return NULL;
 }
@@ -268,20 +268,14 @@ void record_use_name(const char *name, char target[RECORD_NAME_SIZE + 8]) {
     snprintf(target, RECORD_NAME_SIZE + 8, "record:%.64s", name);
 }
 
-// How a job's canonical scene names it; inside a JSON string the quotes would be escaped.
-static void use_mark(const char *name, char target[2 * RECORD_NAME_SIZE]) {
-    snprintf(target, 2 * (size_t)RECORD_NAME_SIZE, "\"name\": \"%.64s\", \"digest\": \"", name);
-}
-
 static const char uses_sql[] =
     "SELECT (SELECT count(*) FROM result_uses WHERE name = :use) AS results, "
-    "(SELECT count(*) FROM jobs WHERE state < 2 AND instr(scene, :mark) > 0) AS jobs";
+    "(SELECT count(*) FROM job_uses WHERE name = :use) AS jobs";
 
 Status store_record_uses(Store *store, const char *name, RecordUses *uses, Problem *problem) {
-    char use[RECORD_NAME_SIZE + 8], mark[2 * RECORD_NAME_SIZE];
+    char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
-    use_mark(name, mark);
-    const Key key = {.use = use, .mark = mark};
+    const Key key = {.use = use};
     Key found = {.results = 0};
     bool is_found;
     TRY(store_first(store, uses_sql, key_columns, &key, key_columns, &found, &is_found, problem));
@@ -314,10 +308,9 @@ static Status delete (Database *database, const void *work, Problem *problem) {
 }
 
 Status store_record_delete(Store *store, const char *name, RecordUses *uses, Problem *problem) {
-    char use[RECORD_NAME_SIZE + 8], mark[2 * RECORD_NAME_SIZE];
+    char use[RECORD_NAME_SIZE + 8];
     record_use_name(name, use);
-    use_mark(name, mark);
-    const Deleting deleting = {{.name = (char *)name, .use = use, .mark = mark}, uses};
+    const Deleting deleting = {{.name = (char *)name, .use = use}, uses};
     *uses = (RecordUses){0, 0};
     TRY(store_write(store, delete, &deleting, problem));
     store_catalogue_changed(store);

@@ -38,27 +38,6 @@ typedef struct Finish {
     size_t job_count;
 } Finish;
 
-typedef struct Use {
-    char name[160];
-} Use;
-static const RowColumn use_columns[] = {ROW_COLUMN(Use, name, COLUMN_NAME), ROW_END};
-
-// Those of the result that was added last.
-static Status add_uses(Database *database, const char *uses, Problem *problem) {
-    static const char sql[] = "INSERT INTO result_uses (name, result) VALUES (:name, "
-                              "last_insert_rowid()) ON CONFLICT DO NOTHING";
-    while (uses != NULL && *uses != '\0') {
-        const size_t size = strcspn(uses, "\n");
-        Use use = {""};
-        if (size > 0 && size < sizeof use.name) {
-            memcpy(use.name, uses, size);
-            TRY(database_change(database, sql, use_columns, &use, NULL, problem));
-        }
-        uses += size + (uses[size] == '\n');
-    }
-    return STATUS_OK;
-}
-
 static Status finish(Database *database, const void *work, Problem *problem) {
     static const char sql[] =
         "INSERT INTO results (id, engine, sample_rate, count, "
@@ -66,12 +45,14 @@ static Status finish(Database *database, const void *work, Problem *problem) {
         "scene, impacts, psd, study) VALUES (:id, :engine, :sample_rate, :count, "
         ":created_unix_ms, :summary, :plan, :warnings, :work, :notes, "
         ":energy, :scene, :impacts, :psd, :study) ON CONFLICT (id) DO NOTHING";
+    static const char uses_sql[] = "INSERT INTO result_uses (name, result) VALUES (:name, "
+                                   "last_insert_rowid()) ON CONFLICT DO NOTHING";
     const Finish *both = work;
     int added = 0;
     if (both->result != NULL)
         TRY(database_change(database, sql, result_columns, both->result, &added, problem));
     if (added > 0)
-        TRY(add_uses(database, both->result->uses, problem));
+        TRY(use_lines_add(database, uses_sql, both->result->uses, problem));
     for (size_t i = 0; i < both->job_count; i++)
         TRY(job_row_save(database, both->jobs[i], problem));
     return STATUS_OK;

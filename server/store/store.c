@@ -32,6 +32,7 @@ struct Store {
     RecordMemory *records;
     ResultFilter *results;
     atomic_uint_fast64_t generation; // of the catalogue
+    atomic_uint_fast64_t measured;   // materials
     atomic_uint_fast64_t evictions;  // of series
     pthread_mutex_t lock;
     pthread_cond_t some;
@@ -187,6 +188,15 @@ uint64_t store_generation(Store *store) {
 
 void store_catalogue_changed(Store *store) {
     atomic_fetch_add(&store->generation, 1);
+}
+
+// Both only rise: their sum is the same only while both are.
+uint64_t store_deeds(Store *store) {
+    return atomic_load(&store->generation) + atomic_load(&store->measured);
+}
+
+void store_material_measured(Store *store) {
+    atomic_fetch_add(&store->measured, 1);
 }
 
 Database *store_take(Store *store) {

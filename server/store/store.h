@@ -53,6 +53,10 @@ void store_settle(Store *store);
 // is durable.
 uint64_t store_generation(Store *store);
 void store_catalogue_changed(Store *store);
+// Rises with that, and when a material was measured: its version is another one then, what its name
+// means is not.
+uint64_t store_deeds(Store *store);
+void store_material_measured(Store *store);
 
 // What was written since the start; counted on.
 typedef struct StoreTotals {
@@ -76,8 +80,10 @@ typedef struct JobRow {
     char *client;          // who sent it; NULL: nobody in particular
     char *idempotency_key; // NULL: none
     char *request;         // with a key: SHA-256 of the body it came with
-    bool has_result;       // loaded rows: its result is there
-    bool is_unsaved;       // no column: the store may not have it yet, so that saving it adds it
+    char *uses;      // when added: the records it names, "record:elcentro", a line each, which
+                     // then are used until it ends; NULL: none
+    bool has_result; // loaded rows: its result is there
+    bool is_unsaved; // no column: the store may not have it yet, so that saving it adds it
 } JobRow;
 void job_row_clear(JobRow *row);
 // With texts of its own; false without memory, and then it has none.

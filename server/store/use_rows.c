@@ -1,8 +1,27 @@
-// Which results were made with what of the catalogue.
+// Which results were made, and which jobs accepted, with what of the catalogue.
 #include <stdlib.h>
+#include <string.h>
 
 #include "server/store/access.h"
 #include "server/store/material_rows.h"
+
+typedef struct UseLine {
+    char name[160];
+} UseLine;
+static const RowColumn line_columns[] = {ROW_COLUMN(UseLine, name, COLUMN_NAME), ROW_END};
+
+Status use_lines_add(Database *database, const char *sql, const char *lines, Problem *problem) {
+    while (lines != NULL && *lines != '\0') {
+        const size_t size = strcspn(lines, "\n");
+        UseLine line = {""};
+        if (size > 0 && size < sizeof line.name) {
+            memcpy(line.name, lines, size);
+            TRY(database_change(database, sql, line_columns, &line, NULL, problem));
+        }
+        lines += size + (lines[size] == '\n');
+    }
+    return STATUS_OK;
+}
 
 typedef struct UseKey {
     char *name;

@@ -217,6 +217,7 @@ def test_token_commands_tell_what_is_wrong():
         for arguments, code, text in (
                 (("create", "--name", "lab"), 1, "another name"),
                 (("create", "--name", "a b"), 2, "letters"),
+                (("create", "--name", "impactd"), 2, "own name"),
                 (("create", "--name", "x" * 65), 2, "64"),
                 (("create", "--name", "x", "--scopes", "write"), 2, "read, submit"),
                 (("create", "--name", "x", "--expires", "0"), 2, "above 0"),

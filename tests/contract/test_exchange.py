@@ -91,6 +91,28 @@ def test_a_lab_brings_its_spreadsheet():
             assert [one["action"] for one in trail] == ["import", "import"], trail
 
 
+def test_a_file_may_come_again():
+    """A test without a number that is there, by hand or from a file, is not taken twice; once more in the file is a fault."""
+    test = {"impactor_mass": 0.11, "base": "fixed", "drops": [{"approach_speed": 0.5, "rebound_speed": 0.2, "contact_time": 0.01}]}
+    other = {**test, "date": "2026-11-20"}
+
+    def document(*measurements):
+        return {"format": "impactd-materials", "version": 1, "materials": [{"slug": "sponge", "measurements": list(measurements)}]}
+
+    with program.daemon() as daemon:
+        made = daemon.request("POST", "/v1/materials/sponge/measurements", json={"comment": "by hand", **test})
+        assert made.status == 201, made
+        for done in ((1, 1), (0, 2), (0, 2)):
+            assert counts(bring(daemon, document({"test": test}, {"test": other}), dry=True))["measurements"] == done
+            assert counts(bring(daemon, document({"test": test}, {"test": other})))["measurements"] == done
+        problem(bring(daemon, document({"measurement": 1, "test": test}, {"test": test})), 422, "/materials/0/measurements/1/test")
+        # Who did it twice says so by its number, and is reminded of it.
+        assert "once more" not in daemon.get("/v1/materials/sponge/proposal").body.decode()
+        assert counts(bring(daemon, document({"measurement": 3, "test": test})))["measurements"] == (1, 0)
+        told = [one for one in daemon.get("/v1/materials/sponge/proposal").json()["warnings"] if "once more" in one["detail"]]
+        assert len(told) == 1 and told[0]["pointer"] == "/measurements/3" and "measurement 1 " in told[0]["detail"], told
+
+
 # Faults, each in a row or material of its own: (what, where it is told).
 
 def table_faults(draw, rows, k):
@@ -314,6 +336,9 @@ def test_what_is_no_file_of_materials_is_refused():
         problem(bring(daemon, b'{"format": "impactd-materials", "version": 1, "materials": [{"slug": "x"},]}'), 400)
         problem(bring(daemon, b"{" * 40), 400)
         assert len(json.loads(export(daemon))["materials"]) == 5
+    with program.daemon("--max-body", "1024") as daemon:
+        assert "--max-body" in problem(bring(daemon, b"x" * 1025), 413)["detail"]
+        assert "--max-body" in problem(bring(daemon, b"x" * 100000), 413)["detail"]
 
 
 def test_who_may_bring_what():
@@ -349,6 +374,22 @@ def test_who_may_bring_what():
             b"bert", b'bert,"[{""status"": ""approved"", ""reason"": ""good"", ""reviewer"": ""bert""}]"').replace(b"cork", b"cork2")
         told = problem(bring(daemon, own, headers=boss), 422)
         assert told["errors"][0]["column"] == "reviews" and "their own" in told["detail"], told
+        # Nor their own by nobody's name: boss wrote it, and nobody is known to have read it.
+        for name in ("boss", None):
+            by_nobody = {"slug": "own", "revisions": [{"name": "Own", "restitution": 0.5, "source": "s", "reviews": [
+                {"status": "approved", "reason": "good", "reviewer": None}], **({"author": name} if name else {})}]}
+            told = problem(bring(daemon, {"format": "impactd-materials", "version": 1, "materials": [by_nobody]}, headers=boss), 422)
+            assert told["errors"][0]["pointer"] == "/materials/0/revisions/0/reviews/0/reviewer", told
+        # Times are an admin's to bring, too, and none lies ahead or before what was reviewed.
+        dated = b"slug,name,restitution,source,created\nlint,Lint,0.5,own,%s\n"
+        told = problem(bring(daemon, dated % b"1999-01-01", headers=anna), 403)
+        assert told["errors"][0]["column"] == "created", told
+        assert problem(bring(daemon, dated % b"2999-01-01", headers=boss), 422)["errors"][0]["column"] == "created"
+        early = dated.replace(b"created\n", b"created,reviews\n").replace(
+            b"%s", b'%s,"[{""status"": ""deprecated"", ""reason"": ""x"", ""created"": ""1998-01-01""}]"')
+        assert problem(bring(daemon, early % b"1999-01-01", headers=boss), 422)["errors"][0]["column"] == "reviews"
+        assert counts(bring(daemon, dated % b"1999-01-01", headers=boss))["revisions"] == (1, 0)
+        assert daemon.get("/v1/materials/lint", headers=anna).json()["created"] == "1999-01-01T00:00:00.000Z"
         whole = export(daemon, headers=anna)
     with program.daemon() as other:
         assert bring(other, whole).status == 200

@@ -72,6 +72,8 @@ def test_the_life_of_a_material():
         assert approved.status == 200 and approved.headers["etag"] == '"felt@1-3"', approved
         assert without(approved.json()["review"], "created") == {"status": "approved", "reason": "looked at", "reviewer": None,
                                                                  "self_approved": True}, approved.json()
+        came = daemon.get("/v1/materials/sponge@1").json()["review"]
+        assert came["reviewer"] == "impactd" and came["self_approved"] is False, came
         assert daemon.get("/v1/materials/felt").json()["revision"] == 1, "what is approved is the head"
         problem(review(daemon, "felt@1"), 409)
         assert review(daemon, "felt@2").json()["status"] == "approved"

@@ -169,6 +169,12 @@ def test_who_comes_second_is_told():
         code, out, errors = materials(url, "revert", "foam", "1", "--comment", "x")
         assert code == 1 and out == "" and "somebody was faster" in errors and "version 6" in errors, (code, errors)
         assert seen[1][2]["If-Match"] == '"foam@2-5"' and seen[1][:2] == ("POST", "/v1/materials/foam/revert"), seen
+    # What was proposed is of the state that it was shown of, whatever has become of it since.
+    proposal = say(body=b'{"revision": {"name": "Foam"}}', ETag='"foam@2-5"')
+    with fake(proposal, stale) as (url, seen):
+        code, _, errors = materials(url, "propose", "foam", "--confirm")
+        assert code == 1 and "somebody was faster" in errors and "version 6" in errors, (code, errors)
+        assert seen[1][2]["If-Match"] == '"foam@2-5"' and seen[1][:2] == ("POST", "/v1/materials/foam/revisions"), seen
     for answers in ((say(body=b'{"history": []}'),), (history, say(201, b"[]")), (history, say(201, b'{"slug": "x"}'))):
         with fake(*answers) as (url, _):
             code, out, errors = materials(url, "revert", "foam", "1", "--comment", "x")

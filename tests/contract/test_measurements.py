@@ -7,6 +7,7 @@ import math
 import os
 import random
 import re
+import sqlite3
 import sys
 import threading
 import time
@@ -143,6 +144,9 @@ def test_a_force_trace_gives_back_what_was_simulated():
             assert revision["separation"] == rule and revision["least_speed"] == 0.5, revision
             row = asked["evaluation"]["rows"][0]
             assert row["from"] == "trace 1, contact 1" and row["contact_time_by"] == "pulse", row
+            seen = row["contact"]
+            assert row["trace"] == 1 and len(seen["pulse"]) == 33 and seen["start"] < seen["end"], seen
+            assert 0 < seen["crossing_time"] <= 1.05 * row["contact_time"] and 0 <= seen["crossing_shortfall"] < 0.6, seen
             assert row["least_contact_time"] < row["contact_time"] < row["most_contact_time"], row
 
 
@@ -190,6 +194,7 @@ def test_faults_are_told_all_at_once_and_nothing_is_kept():
                                       headers={"Content-Type": "application/json"}), 400)
         asking.problem(post(daemon, drops([0.6]), target="/v1/materials/none"), 404)
         asking.problem(daemon.request("POST", f"{SPONGE}/measurements?dry_run=2", json=drops([0.6])), 400)
+        assert daemon.request("POST", f"{SPONGE}/measurements?dry_run=true", json=drops([0.6])).status == 200
         assert daemon.get(f"{SPONGE}/measurements").json()["count"] == 0
 
 
@@ -228,11 +233,46 @@ def test_more_than_can_be_taken_is_told():
         for _ in range(2):
             made = post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120)
             assert made.status == 201, made
-        assert "samples in traces" in asking.problem(daemon.get(f"{SPONGE}/proposal?measurements=22,23"), 422)["detail"]
-        silence = json.dumps({"traces": [{"interval": 1e-6, "force": [0] * 600000}] * 2})
-        asking.problem(post(daemon, None, body=silence, headers={"Content-Type": "application/json"}, timeout=120), 422, "/traces")
+        assert daemon.get(f"{SPONGE}/proposal?measurements=22,23", timeout=120).status == 200
+        test = {"traces": [{"interval": 1e-6, "force": [0] * 600000}] * 2}
+        for query in ("", "?dry_run=1"):
+            reply = daemon.request("POST", f"{SPONGE}/measurements{query}", json=test, timeout=120)
+            assert "must have at most 1048576 samples in all, have 1200000" in json.dumps(asking.problem(reply, 422, "/traces"))
+        kept = {"materials": [{"slug": "sponge", "measurements": [{"comment": "two", "test": test}]}]}
+        asking.problem(daemon.request("POST", "/v1/materials/import", json=kept, timeout=120), 422)
         some = daemon.get(f"{SPONGE}/proposal?measurements=1,2").json()
         assert some["evaluation"]["restitution"]["count"] == 2000, some["evaluation"]["restitution"]
+
+
+def test_what_is_kept_is_shown_whatever_it_comes_to():
+    """A kept trace that cannot be evaluated: 200 with the test, evaluation null, why among the warnings, and no ETag; lists have it."""
+    test = {"notes": "kept before", "drops": [{"contact_time": 0.01}] * 3, "traces": [{"interval": 1e-4, "force": [1, 2]}]}
+    with program.daemon() as daemon:
+        with sqlite3.connect(os.path.join(daemon.data, "impactd.db")) as connection:
+            connection.execute("INSERT INTO material_measurements (material, measurement, comment, created_unix_ms, drops, traces, head, document) "
+                               "SELECT number, 1, 'c', 1, 3, 1, '{\"notes\": \"kept before\"}', ? FROM materials WHERE slug = 'sponge'",
+                               [json.dumps(test)])
+        connection.close()
+        shown = daemon.get(f"{SPONGE}/measurements/1")
+        assert shown.status == 200 and shown.json()["test"] == test and shown.json()["evaluation"] is None, shown
+        assert "it is not evaluated: " in shown.json()["warnings"][0]["detail"] and "etag" not in shown.headers, shown
+        brief = daemon.get(f"{SPONGE}/measurements").json()["measurements"][0]
+        assert (brief["drops"], brief["traces"], brief["test"]) == (3, 1, {"notes": "kept before"}), brief
+        asking.problem(daemon.get(f"{SPONGE}/proposal"), 422)
+
+
+def test_what_was_measured_is_not_asked_twice():
+    """GET of a measurement has an ETag that outlives revisions: 304 under it, another tag under another rule."""
+    with program.daemon() as daemon:
+        post(daemon, drops([0.6]))
+        post(daemon, drops([0.7]))
+        target = f"{SPONGE}/measurements/1"
+        tag = daemon.get(target).headers["etag"]
+        assert daemon.get(target, headers={"If-None-Match": tag}).status == 304
+        assert daemon.get(f"{SPONGE}/measurements/2", headers={"If-None-Match": tag}).status == 200
+        assert daemon.get(f"{target}?separation=zero_force", headers={"If-None-Match": tag}).status == 200
+        asking.problem(daemon.get(f"{SPONGE}/measurements/3", headers={"If-None-Match": "*"}), 404)
+        asking.problem(post(daemon, drops([0.6]), headers={"If-Match": tag}), 412)
 
 
 def test_long_traces_do_not_keep_the_daemon():

@@ -305,7 +305,9 @@ def test_bad_uploads_are_refused_at_their_place():
                                ({"name": ".", "interval": 0, "samples": []}, ["/name", "/interval", "/samples"]),
                                ({"name": "r", "interval": 1, "samples": ["a", 1], "x": 1}, ["/samples/0", "/x"]),
                                ({"name": "r", "interval": 1, "samples": [1e308], "unit": "g"}, ["/samples/0"]),
-                               ({"name": "r", "interval": 1e308, "samples": [1e300, 1e300]}, ["/samples"]),
+                               ({"name": "r", "interval": 1e6, "samples": [1e305, 1e305]}, ["/samples"]),
+                               ({"name": "r", "interval": 1e-310, "samples": [1, 1]}, ["/interval"]),
+                               ({"name": "r", "interval": 1.1e6, "samples": [1, 1]}, ["/interval"]),
                                ({"name": "r", "interval": 1, "samples": [[1]]}, ["/samples/0"]),
                                ({"name": 1, "interval": "1", "samples": 1}, ["/name", "/interval", "/samples"])):
             problem(daemon.request("POST", "/v1/records", json=body), 422, *pointers)

@@ -16,6 +16,8 @@ import urllib.parse
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
+ALONE = True  # it reads what the others said
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 with open(os.path.join(program.SOURCE, "schema", "openapi.json"), encoding="utf-8") as openapi:
     DOCUMENT = json.load(openapi)

@@ -33,7 +33,7 @@ def test_of(draw):
 def revision_of(draw, number, measurements):
     said = {"revision": number, "name": draw.choice(ODD) + "x", "source": draw.choice(ODD) + "x",
             "author": draw.choice([None, "anna", "bert"]), "comment": draw.choice(ODD),
-            "created": "2025-%02d-%02dT%02d:%02d:%02d.%03dZ" % (draw.randint(1, 12), draw.randint(1, 28), draw.randrange(24),
+            "created": "2023-%02d-%02dT%02d:%02d:%02d.%03dZ" % (draw.randint(1, 12), draw.randint(1, 28), draw.randrange(24),
                                                               draw.randrange(60), draw.randrange(60), draw.randrange(1000))}
     for name in ("hardness", "supplier", "notes"):
         if draw.random() < 0.7:
@@ -55,7 +55,7 @@ def revision_of(draw, number, measurements):
     if draw.random() < 0.6:
         said["reviews"] = [{"status": "approved", "reason": draw.choice(ODD) + "x", "reviewer": "carl", "created": said["created"]}]
         if draw.random() < 0.3:
-            said["reviews"].append({"status": "deprecated", "reason": "worn", "reviewer": None, "created": "2026-01-01T00:00:00.000Z"})
+            said["reviews"].append({"status": "deprecated", "reason": "worn", "reviewer": None, "created": "2024-01-01T00:00:00.000Z"})
     return said
 
 
@@ -64,7 +64,7 @@ def material_of(draw, slug, revisions=None):
     material = {"slug": slug, "revisions": [], "measurements": []}
     for number in range(1, tests + 1):
         material["measurements"].append({"measurement": number, "author": draw.choice([None, "anna"]), "comment": draw.choice(ODD),
-                                         "created": "2026-02-%02dT00:00:00.000Z" % number, "test": test_of(draw)})
+                                         "created": "2024-02-%02dT00:00:00.000Z" % number, "test": test_of(draw)})
     for number in range(1, (revisions or draw.randint(1, 4)) + 1):
         material["revisions"].append(revision_of(draw, number, tests))
     if len(material["revisions"]) > 2 and revisions is None:

@@ -83,7 +83,8 @@ TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials) {
             score.found += reading.contacts.count == 1;
             const TraceContact *contact = NULL;
             for (size_t i = 0; i < reading.contacts.count; i++)
-                if (contact == NULL || fabs(reading.contacts.at[i].peak) > fabs(contact->peak))
+                if (contact == NULL ||
+                    fabs(reading.contacts.at[i].seen.peak) > fabs(contact->seen.peak))
                     contact = &reading.contacts.at[i];
             if (contact != NULL) {
                 const bool is_figure = !isnan(contact->contact_time);
@@ -93,7 +94,7 @@ TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials) {
                 score.below += contact->most_contact_time < T;
                 score.above += contact->least_contact_time > T;
                 score.figures += is_figure;
-                score.doubtful += contact->is_doubtful;
+                score.doubtful += is_figure && contact->why != NULL;
                 if (is_figure) {
                     const double off = contact->contact_time / T - 1;
                     score.covered += is_covered;

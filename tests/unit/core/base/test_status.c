@@ -106,6 +106,8 @@ static void texts_are_cut_at_a_character(void **state) {
     assert_string_equal(text, "12345...");
     text_fit(text, 3, "\xC3\xA4\xC3\xA4");
     assert_string_equal(text, "\xC3\xA4");
+    assert_true(text_same(NULL, NULL) && text_same("a", "a"));
+    assert_false(text_same("a", "b") || text_same(NULL, "") || text_same("", NULL));
     text_fit(text, 1, "a");
     assert_string_equal(text, "");
 }

@@ -166,8 +166,78 @@ static void every_reading_is_a_row_with_its_uncertainty(void **state) {
     assert_true(!row[2].restitution_counts && row[2].restitution > 0.9);
     assert_int_equal(evaluation.restitution.count, 2);
     assert_int_equal(evaluation.contact_time.count, 1);
-    assert_near(evaluation.most_speed, 2, 0);
-    assert_near(evaluation.least_temperature, 21, 0);
+    assert_near(evaluation.ranges.most_speed, 2, 0);
+    assert_near(evaluation.ranges.least_temperature, 21, 0);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &test);
+}
+
+static void only_what_counts_widens_the_ranges(void **state) {
+    (void)state;
+    DropTest cold, hot;
+    read("{\"gravity\": 0, \"temperature\": 20, \"drops\": [{\"approach_speed\": 1, "
+         "\"rebound_speed\": 0.6}]}",
+         &cold);
+    read("{\"gravity\": 0, \"temperature\": 80, \"drops\": [{\"approach_speed\": 2, "
+         "\"rebound_speed\": 1.9, \"excluded\": \"slipped\"}]}",
+         &hot);
+    const Measurement tests[] = {{1, &cold}, {2, &hot}};
+    assert_int_equal(evaluation_make(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+                     STATUS_OK);
+    assert_near(evaluation.ranges.most_speed, 1, 0);
+    assert_near(evaluation.ranges.least_temperature, 20, 0);
+    assert_near(evaluation.ranges.most_temperature, 20, 0);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &cold);
+    fields_clear(drop_test_fields, &hot);
+}
+
+static void heights_go_by_the_earth_and_say_so_where_another_gravity_pulls(void **state) {
+    (void)state;
+    DropTest test;
+    read("{\"gravity\": 1000, \"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.04, "
+         "\"contact_time\": 1e-4}, {\"approach_speed\": 2, \"rebound_speed\": 1, "
+         "\"contact_time\": 1e-4}]}",
+         &test);
+    evaluate(&test, SEPARATION_ZERO_FORCE);
+    assert_near(evaluation.rows.at[0].approach_speed, sqrt(2 * 9.80665 * 0.1), 1e-15);
+    assert_true(is_warned("/gravity", "told from heights by 9.80665"));
+    evaluation_clear(&evaluation);
+    free(test.drops.at[0].excluded);
+    test.drops.at[0].excluded = strdup("slipped");
+    evaluate(&test, SEPARATION_ZERO_FORCE);
+    assert_int_equal(evaluation.warnings.count, 0);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &test);
+}
+
+static void a_trace_s_contact_is_shown_as_it_was_detected(void **state) {
+    (void)state;
+    DropTest test;
+    drops_make(&test, 0);
+    test.gravity = 0;
+    test.traces.at = calloc(1, sizeof *test.traces.at);
+    test.traces.count = 1;
+    Trace *trace = test.traces.at;
+    *trace = (Trace){.interval = 1e-4};
+    assert_true(reals_make(&trace->force, 300));
+    for (size_t i = 0; i < 300; i++) {
+        const double s = ((double)i - 100.3) / 50;
+        trace->force.at[i] = 5 + (s >= 0 && s <= 1 ? 8 * sin(3.14159265358979 * s) : 0);
+    }
+    evaluate(&test, SEPARATION_ZERO_FORCE);
+    assert_int_equal(evaluation.rows.count, 1);
+    const EvaluationRow *row = evaluation.rows.at;
+    assert_int_equal(row->trace, 1);
+    assert_near(row->contact.baseline, 5, 1e-3);
+    assert_near(row->contact.peak, 8, 0.05);
+    assert_near(row->contact.start, 0.01003, 1e-5);
+    assert_near(row->contact.end, 0.01503, 1e-5);
+    assert_true(row->contact.threshold > 0 && row->contact.misfit_share < 0.01);
+    assert_true(row->contact.crossing_time < 0.00503 && row->contact.crossing_shortfall > 0);
+    assert_int_equal(row->contact.samples, 50);
+    assert_int_equal(row->contact.pulse.count, TRACE_PULSE);
+    assert_near(row->contact.pulse.at[TRACE_PULSE / 2], 13, 0.05);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
 }
@@ -321,17 +391,58 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
         evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
         STATUS_LIMIT);
     evaluation_clear(&evaluation);
+    // Two tests of the most samples go together, many do not; what is there is not looked at.
+    double nothing[8] = {0};
+    Trace trace = {.interval = 1e-3, .force = {nothing, TRACE_SAMPLES_MOST}};
+    const DropTest large = {.traces = {&trace, 1}};
+    assert_int_equal(drop_test_samples(&large), TRACE_SAMPLES_MOST);
+    for (size_t i = 0; i < COUNT(all); i++)
+        all[i].test = &large;
+    assert_true(evaluation_samples(all, 2) <= EVALUATION_SAMPLES_MOST);
+    problem_clear(&problem);
+    assert_int_equal(
+        evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+        STATUS_LIMIT);
+    evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &one);
     fields_clear(drop_test_fields, &other);
     fields_clear(drop_test_fields, &many);
 }
 
+static bool refuse_third(void *context, double fraction) {
+    (void)fraction;
+    return ++*(int *)context < 3;
+}
+
+static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
+    (void)state;
+    DropTest test;
+    read("{\"gravity\": 9.81, \"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.5, "
+         "\"contact_time\": 0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5, "
+         "\"contact_time\": "
+         "0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5}]}",
+         &test);
+    int asked = 0;
+    const Watch watch = {&asked, refuse_third};
+    const Measurement one = {COUNT_ABSENT, &test};
+    assert_int_equal(
+        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, &watch, &evaluation, &problem),
+        STATUS_CANCELLED);
+    assert_int_equal(asked, 3);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &test);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gravity_is_taken_out_only_while_somebody_waits),
         cmocka_unit_test(simulated_drops_give_back_e_and_contact_time),
         cmocka_unit_test(gravity_is_taken_out_of_drops_that_say_it),
         cmocka_unit_test(the_effect_of_gravity_is_told_where_it_is_left_in),
         cmocka_unit_test(every_reading_is_a_row_with_its_uncertainty),
+        cmocka_unit_test(only_what_counts_widens_the_ranges),
+        cmocka_unit_test(heights_go_by_the_earth_and_say_so_where_another_gravity_pulls),
+        cmocka_unit_test(a_trace_s_contact_is_shown_as_it_was_detected),
         cmocka_unit_test(a_free_base_is_reckoned_with),
         cmocka_unit_test(an_outlier_is_told_and_counts),
         cmocka_unit_test(the_stated_confidence_is_kept),

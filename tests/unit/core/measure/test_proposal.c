@@ -164,6 +164,59 @@ static void a_table_has_a_row_for_each_speed(void **state) {
     assert_true(isnan(proposal.material.restitution));
 }
 
+// What is left out of a table, and what does not count, is not said to be measured.
+static void only_what_stands_behind_a_revision_is_named(void **state) {
+    (void)state;
+    const char *const texts[] = {
+        "{\"gravity\": 0, \"impactor_mass\": 0.11, \"base\": \"fixed\", \"temperature\": 20, "
+        "\"source\": \"a\", \"drops\": ["
+        "{\"approach_speed\": 1, \"rebound_speed\": 0.6, \"contact_time\": 0.02}, "
+        "{\"approach_speed\": 2, \"rebound_speed\": 1.2, \"contact_time\": 0.02}]}",
+        "{\"gravity\": 0, \"impactor_mass\": 0.2, \"base\": \"fixed\", \"temperature\": 80, "
+        "\"source\": \"b\", \"drops\": ["
+        "{\"approach_speed\": 9, \"rebound_speed\": 5.4}]}"};
+    propose(texts, 2, PROPOSAL_TABLE);
+    const Material *material = &proposal.material;
+    assert_int_equal(material->table.count, 2);
+    assert_near(material->most_speed, 2, 0);
+    assert_near(material->most_temperature, 20, 0);
+    assert_string_equal(material->source, "a");
+    assert_int_equal(material->measurements.count, 1);
+    assert_near(material->measurements.at[0], 10, 0);
+    assert_near(material->impactor_mass, 0.11, 0);
+    assert_false(is_warned("/revision/impactor_mass"));
+}
+
+// Mean and deviation are of one kind, in a constant as in a table's row.
+static void readings_weigh_in_a_table_as_in_a_constant(void **state) {
+    (void)state;
+    static const char one[] = "{\"gravity\": 0, \"height_uncertainty\": 0.002, \"drops\": ["
+                              "{\"drop_height\": 0.02, \"rebound_height\": 0.0110}, "
+                              "{\"drop_height\": 0.0201, \"rebound_height\": 0.0030}, "
+                              "{\"drop_height\": 0.0202, \"rebound_height\": 0.0075}, "
+                              "{\"drop_height\": 0.0203, \"rebound_height\": 0.0072}";
+    char constant[800], table[800];
+    snprintf(constant, sizeof constant, "%s]}", one);
+    snprintf(table, sizeof table, "%s, {\"drop_height\": 1, \"rebound_height\": 0.36}]}", one);
+    propose((const char *const[]){constant}, 1, PROPOSAL_CONSTANT);
+    const double mean = proposal.material.restitution;
+    const double deviation = proposal.material.restitution_deviation;
+    const Quantity *e = &evaluation.restitution;
+    assert_true(fabs(e->mean / e->unweighted_mean - 1) > 1e-3);
+    assert_near(deviation, fmax(e->scatter, e->standard_error), 0);
+    assert_true(deviation < e->deviation);
+    proposal_clear(&proposal);
+    evaluation_clear(&evaluation);
+    fields_clear(drop_test_fields, &tests_read[0]);
+    propose((const char *const[]){table}, 1, PROPOSAL_TABLE);
+    assert_int_equal(proposal.material.table.count, 2);
+    assert_near(proposal.material.table.at[0].restitution, mean, 1e-15);
+    assert_near(proposal.material.table.at[0].restitution_deviation, deviation, 1e-15);
+    // Of a single reading nothing but its own uncertainty is known.
+    assert_near(proposal.material.table.at[1].restitution_deviation,
+                evaluation.rows.at[4].restitution_uncertainty, 1e-15);
+}
+
 static void a_table_of_one_speed_is_refused(void **state) {
     (void)state;
     const char *const text[] = {"{\"drops\": [{\"approach_speed\": 1, \"rebound_speed\": 0.6}, "
@@ -194,6 +247,10 @@ int main(void) {
         cmocka_unit_test_setup_teardown(two_tests_add_up_and_their_pairs_must_agree, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(a_table_has_a_row_for_each_speed, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(only_what_stands_behind_a_revision_is_named, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(readings_weigh_in_a_table_as_in_a_constant, set_up,
+                                        tear_down),
         cmocka_unit_test_setup_teardown(a_table_of_one_speed_is_refused, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_changes_with_speed_is_told_of_a_constant, set_up,
                                         tear_down),

@@ -14,6 +14,8 @@
 #include "server/codec/write.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/intake.h"
+#include "server/store/access.h"
+#include "server/store/record_memory.h"
 #include "server/store/record_rows.h"
 #include "tests/support/scratch.h"
 
@@ -114,6 +116,99 @@ static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
     inquiry_clear(&inquiry);
 }
 
+static void samples_are_let_go_of_and_had_again(void **state) {
+    (void)state;
+    Inquiry inquiry;
+    RecordUses uses;
+    add("gone", 5);
+    assert_int_equal(
+        prepare("\"name\": \"a\"",
+                "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": "
+                "[\"b\", \"gone\"]}]}",
+                &inquiry),
+        STATUS_OK);
+    const PinnedRecords *pinned = &((const SweepStudy *)(const void *)inquiry.study)->records;
+    const Shared *samples = record_in(&inquiry)->named;
+    prepare_records_drop(&inquiry);
+    assert_true(record_in(&inquiry)->named == NULL && pinned->at[1].named == NULL);
+    prepare_records_drop(&inquiry); // does nothing
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_ptr_equal(record_in(&inquiry)->named, samples);
+    assert_non_null(pinned->at[1].named);
+    // What was found stays, but it must be there still, with the same samples.
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_OK);
+    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_string_equal(problem.faults[0].pointer, "/study/records/1/name");
+    add("gone", 6);
+    problem_clear(&problem);
+    assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
+    assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
+    assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
+    inquiry_clear(&inquiry);
+}
+
+static void a_sweep_holds_only_so_many_samples(void **state) {
+    (void)state;
+    NamedRecord *large[5];
+    Inquiry inquiry;
+    for (size_t i = 0; i < COUNT(large); i++) {
+        Reals samples;
+        char name[8];
+        snprintf(name, sizeof name, "large%zu", i);
+        assert_true(reals_make(&samples, RECORD_SAMPLES)); // never written
+        large[i] = record_memory_put(store_record_memory(store), store_generation(store),
+                                     named_record_new(name, name, 1, &samples));
+    }
+    assert_int_equal(prepare("\"name\": \"a\"",
+                             "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                             "\"/excitation/name\", \"values\": [\"large0\", \"large1\", "
+                             "\"large2\", \"large3\", \"large4\", \"b\"]}]}",
+                             &inquiry),
+                     STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].pointer, "/study/axes/0/values/4");
+    assert_non_null(strstr(problem.faults[0].detail, "16777216 samples"));
+    inquiry_clear(&inquiry);
+    for (size_t i = 0; i < COUNT(large); i++)
+        shared_drop(&large[i]->shared);
+}
+
+static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(void **state) {
+    (void)state;
+    enum { NAMES = 300 };
+    static const char *const axes[][2] = {{"/excitation/name", "record-"},
+                                          {"/dampers/0/buffer", "spong"}};
+    for (size_t k = 0; k < COUNT(axes); k++) {
+        char text[NAMES * 24 + 512];
+        Inquiry inquiry;
+        Warnings warnings = {NULL, 0};
+        int size =
+            snprintf(text, sizeof text,
+                     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"duration\": 1, "
+                     "\"sample_rate\": 100, \"excitation\": {\"kind\": \"record\", "
+                     "\"name\": \"a\"}, \"study\": {\"kind\": \"sweep\", \"axes\": "
+                     "[{\"pointer\": \"%s\", \"values\": [",
+                     axes[k][0]);
+        for (int i = 0; i < NAMES; i++)
+            size += snprintf(text + size, sizeof text - (size_t)size, "\"%s%d\", ", axes[k][1],
+                             100 + i);
+        snprintf(text + size - 2, sizeof text - (size_t)size, "]}]}}");
+        problem_clear(&problem);
+        assert_int_equal(
+            intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+            STATUS_INVALID);
+        // Nothing was looked up that could not be told.
+        assert_int_equal(problem.count, PROBLEM_FAULTS);
+        assert_non_null(strstr(problem.faults[0].detail, "there are"));
+        assert_non_null(strstr(problem.faults[99].detail, "is called"));
+        assert_null(strstr(problem.faults[99].detail, "there are"));
+        assert_string_equal(problem.faults[99].pointer, "/study/axes/0/values/99");
+        inquiry_clear(&inquiry);
+        warnings_clear(&warnings);
+    }
+}
+
 static void faults_stand_where_the_name_or_the_digest_does(void **state) {
     (void)state;
     static const char axis[] =
@@ -178,6 +273,9 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_share_the_samples_of_the_record_they_name),
         cmocka_unit_test(a_sweep_pins_the_records_of_its_axes_once_each),
+        cmocka_unit_test(samples_are_let_go_of_and_had_again),
+        cmocka_unit_test(a_sweep_holds_only_so_many_samples),
+        cmocka_unit_test(unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred),
         cmocka_unit_test(faults_stand_where_the_name_or_the_digest_does),
         cmocka_unit_test(without_a_daemon_there_are_no_records),
     };

@@ -167,12 +167,38 @@ static void both_kinds_of_exports_are_imports(void **state) {
     store_close(store);
 }
 
+static void an_export_is_made_revision_by_revision(void **state) {
+    (void)state;
+    Store *store = open_store();
+    ImportTally tally;
+    Bytes rows = {.most = 0}, piece = {.most = 0};
+    ExchangeText text;
+    bool is_last = false;
+    size_t pieces = 0;
+    bytes_text(&rows, "slug,number,name,source,restitution,notes\n");
+    for (int i = 1; i <= 50; i++)
+        bytes_format(&rows, "x,%d,X,s,0.5,%0500d\n", i, i);
+    char *table = bytes_take(&rows, NULL);
+    assert_int_equal(bring(store, table, NULL, true, &tally), STATUS_OK);
+    assert_int_equal(exchange_text_open(store, false, &text, NULL), STATUS_OK);
+    for (; !is_last; pieces++) {
+        assert_int_equal(exchange_text_next(&text, &piece, &is_last, NULL), STATUS_OK);
+        assert_true(piece.count < 2000);
+        piece.count = 0;
+    }
+    assert_true(pieces > 55);
+    bytes_clear(&piece);
+    free(table);
+    store_close(store);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faults_are_told_at_their_places_and_nothing_is_written),
         cmocka_unit_test(an_unknown_number_is_the_next_unless_the_newest_says_the_same),
         cmocka_unit_test(who_may_not_speak_for_others_is_told_so),
         cmocka_unit_test(both_kinds_of_exports_are_imports),
+        cmocka_unit_test(an_export_is_made_revision_by_revision),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 
 #include <cmocka.h>
 
+#include "server/store/access.h"
 #include "tests/support/felt.h"
 #include "tests/support/scratch.h"
 
@@ -64,6 +65,22 @@ static void who_has_not_seen_the_present_version_is_told(void **state) {
     store_close(store);
 }
 
+static void a_measurement_changes_what_is_told_but_not_what_a_name_means(void **state) {
+    (void)state;
+    Store *store = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5), head;
+    MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
+    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    assert_int_equal(head_of(store), 1); // and is remembered
+    const uint64_t generation = store_generation(store);
+    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
+    assert_int_equal(store_generation(store), generation);
+    assert_int_equal(store_material(store, "felt", 0, &head, NULL), STATUS_OK);
+    assert_int_equal(head.version, 2);
+    material_revision_clear(&head);
+    store_close(store);
+}
+
 static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) {
     (void)state;
     Store *store = felt_store(NULL);
@@ -99,6 +116,43 @@ static void the_head_is_the_newest_approved_then_the_newest_draft(void **state) 
     assert_int_equal(deeds.count, 1);
     assert_int_equal(deeds.at[0].version, 2);
     material_deeds_clear(&deeds);
+    store_close(store);
+}
+
+// What one statement changes in the database of a store.
+static void change(Store *store, const char *sql) {
+    Database *database = store_take(store);
+    assert_int_equal(database_execute(database, sql, NULL), STATUS_OK);
+    store_put(store, database);
+}
+
+static void what_is_kept_for_good_has_an_end(void **state) {
+    (void)state;
+    Store *store = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5), other = felt_saying(0.5);
+    MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(store_material_add(store, &one, NULL), STATUS_OK);
+    change(store, "INSERT INTO materials (number, slug) VALUES (100000, 'last')");
+    other.slug = "wood";
+    assert_int_equal(store_material_add(store, &other, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "100000 materials"));
+    change(store, "INSERT INTO material_revisions (material, revision, name, restitution, source, "
+                  "comment, created_unix_ms) SELECT number, 10000, 'F', 0.5, 's', '', 1 FROM "
+                  "materials WHERE slug = 'felt'");
+    problem_clear(&problem);
+    assert_int_equal(store_material_revise(store, &one, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "10000 revisions"));
+    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, NULL), STATUS_OK);
+    change(store, "UPDATE material_room SET bytes = (64 << 30) - 300");
+    problem_clear(&problem);
+    assert_int_equal(store_material_measure(store, &made, ANY_VERSION, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "64 GiB"));
+    assert_int_equal(felt_review(store, 1, "approved", NULL, ANY_VERSION), STATUS_LIMIT);
+    MaterialState now;
+    assert_int_equal(store_material_state(store, "felt", &now, NULL), STATUS_OK);
+    assert_int_equal(now.measurements, 1);
     store_close(store);
 }
 
@@ -172,7 +226,9 @@ static void of_eight_writers_each_is_taken_or_told(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(who_has_not_seen_the_present_version_is_told),
+        cmocka_unit_test(a_measurement_changes_what_is_told_but_not_what_a_name_means),
         cmocka_unit_test(the_head_is_the_newest_approved_then_the_newest_draft),
+        cmocka_unit_test(what_is_kept_for_good_has_an_end),
         cmocka_unit_test(nobody_approves_their_own),
         IN_FOLDER(of_eight_writers_each_is_taken_or_told),
     };

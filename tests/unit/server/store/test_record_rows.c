@@ -140,10 +140,11 @@ static void a_list_goes_on_behind_a_name_and_searches_words(void **state) {
     store_end(store);
 }
 
-static void job_add(Store *store, const char *id, int state, const char *scene) {
-    JobRow row = {.state = state, .scene = (char *)scene, .warnings = "[]"};
+static JobRow job_add(Store *store, const char *id, int state, const char *uses) {
+    JobRow row = {.state = state, .scene = "{}", .warnings = "[]", .uses = (char *)uses};
     snprintf(row.id, sizeof row.id, "%s", id);
     assert_int_equal(store_job_add(store, &row, &problem), STATUS_OK);
+    return row;
 }
 
 static void a_record_in_use_is_not_deleted(void **state) {
@@ -153,10 +154,8 @@ static void a_record_in_use_is_not_deleted(void **state) {
     NamedRecord *named;
     add_new(store, "elcentro", 0.1);
     add_new(store, "kobe", 0.3);
-    job_add(store, "j-1", 0, "{\"name\": \"elcentro\", \"digest\": \"00\"}");
-    job_add(store, "j-2", 2, "{\"name\": \"elcentro\", \"digest\": \"00\"}");
-    // Words of a title are no name.
-    job_add(store, "j-3", 0, "{\"title\": \"\\\"name\\\": \\\"kobe\\\", \\\"digest\\\": \\\"\"}");
+    JobRow job = job_add(store, "j-1", 0, "record:elcentro\nrecord:kobe\nrecord:elcentro\n");
+    job_add(store, "j-2", 2, "record:elcentro\n");
     ResultRow result = {.id = "r-1",
                         .engine = "e",
                         .scene = "{}",
@@ -169,10 +168,17 @@ static void a_record_in_use_is_not_deleted(void **state) {
     assert_int_equal(store_result_save(store, &result, NULL, 0, &problem), STATUS_OK);
     assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
     assert_true(uses.results == 1 && uses.jobs == 1);
+    assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_CONFLICT);
+    assert_true(uses.results == 0 && uses.jobs == 1);
     problem_clear(&problem);
     assert_int_equal(store_record_delete(store, "elcentro", &uses, &problem), STATUS_CONFLICT);
     assert_true(uses.results == 1 && uses.jobs == 1);
     assert_non_null(strstr(problem.detail, "1 result and 1 unfinished job:"));
+    // A job that has ended uses nothing any more.
+    job.state = 3;
+    assert_int_equal(store_job_update(store, &job, &problem), STATUS_OK);
+    assert_int_equal(store_record_uses(store, "elcentro", &uses, &problem), STATUS_OK);
+    assert_true(uses.results == 1 && uses.jobs == 0);
     assert_int_equal(store_record_delete(store, "kobe", &uses, &problem), STATUS_OK);
     assert_int_equal(store_record_named(store, "kobe", &named, NULL), STATUS_NOT_FOUND);
     assert_int_equal(store_record_delete(store, "kobe", &uses, NULL), STATUS_NOT_FOUND);
