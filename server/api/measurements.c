@@ -74,7 +74,7 @@ static Status evaluate_kept(Patience *patience, const Measurement *test, int sep
     } else if (status != STATUS_OK) {
         evaluation_clear(evaluation);
         *evaluation = (Evaluation){.separation = separation};
-        reply->retry_after = 0; // that is of a refusal
+        reply->retry_after = -1; // that is of a refusal
         status = warnings_add(&evaluation->warnings, "", "it is not evaluated: %s", why->detail);
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the evaluation");
