@@ -48,7 +48,6 @@ READING = r"/v1/(compare|results/\{id\}/(series|psd|impacts|bundle).*)"
 UNSEEN = {
     (None, READING, "503"): "series that are still being computed anew after a minute, or too many impacts looked at at once",
     (None, r"/v1/materials/\{slug\}/(measurements.*|proposal.*)", "503"): "more long force traces at once than are evaluated",
-    ("GET", r"/v1/materials/\{slug\}/measurements/\{number\}", "422"): "half a minute of fits, on a machine slower than when it was kept",
     ("POST", r"/v1/results/\{id\}/again", "202|422|429|503|507"): "it submits as POST /v1/jobs does, where they are seen",
     ("POST", r"/v1/jobs/\{id\}/retry", "410|429|503|507"): "the same; 410: a sweep with failed points of another engine",
     (None, r"/v1/results/\{id\}/(series.*|bundle.zip)", "422"): "files of 2 or 4 GiB; unit/server/encode/test_encoders.c",
