@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that can be checked: builds with gcc and clang, with address, undefined-behaviour and thread sanitizers,
-# unit and contract tests in each (the core, which has no threads, not under the last), truth tests and the tests of the
+# unit and contract tests in each (under the last what knows threads alone), truth tests and the tests of the
 # program in the release build. --quick: the release build only.
 # On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
 set -uo pipefail

@@ -128,11 +128,11 @@ static bool stop_at(void *context, double fraction) {
 
 static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     (void)state;
-    enum { TITLE = 60000 }; // of a hundred: some steps of copying
+    enum { TITLE = 60000, JOBS = 40 }; // some steps of copying
     Store *store = open_store(data);
     char *title = calloc(1, TITLE);
     memset(title, 'x', TITLE - 1);
-    for (unsigned long number = 0; number < 100; number++) {
+    for (unsigned long number = 0; number < JOBS; number++) {
         JobRow row = job_row(number);
         row.title = title;
         assert_int_equal(store_job_add(store, &row, NULL), STATUS_OK);
