@@ -29,7 +29,9 @@ static const struct {
             {9, 5.1},   {10, 4.6},   {12, 4.4},  {15, 4.3},  {20, 4.0},   {30, 3.85},
             {50, 3.75}, {100, 3.75}, {200, 3.8}, {300, 3.9}, {1000, 4.1}, {3000, 4.3}};
 
-double outlier_cut(size_t count) {
+// How many robust deviations from the middle a reading may be among so many: one sample of normal
+// readings in twenty has one beyond it.
+static double outlier_cut(size_t count) {
     size_t i = 0;
     while (i < COUNT(cuts) && cuts[i].count < count)
         i++;

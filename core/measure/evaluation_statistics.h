@@ -20,8 +20,4 @@ Status quantity_make(Reading *readings, size_t count, const char *name, const ch
 
 void quantity_clear(Quantity *quantity);
 
-// How many robust deviations from the middle a reading may be among so many: one sample of normal
-// readings in twenty has one beyond it.
-double outlier_cut(size_t count);
-
 #endif

@@ -121,8 +121,9 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
     return (TraceResidue){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
 
-TraceResidue trace_residue(const TraceWindow *window, const TracePoint *point,
-                           const TraceBox *box) {
+// INFINITY as sum where there is no such contact, or one of the other sign.
+static TraceResidue residue_at(const TraceWindow *window, const TracePoint *point,
+                               const TraceBox *box) {
     double f[TRACE_BLOCKS_MOST];
     long first, last;
     size_t from, to;
@@ -216,7 +217,7 @@ static bool solve(const TraceFit *fit, const bool *is_free, double damping, doub
 void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
     for (int p = 0; p < TRACE_PARTS; p++)
         fit->at.part[p] = fmin(fmax(fit->at.part[p], box->least[p]), box->most[p]);
-    fit->residue = trace_residue(window, &fit->at, box);
+    fit->residue = residue_at(window, &fit->at, box);
     double damping = 1e-3;
     bool is_derived = false;
     for (int round = 0; round < 60 && isfinite(fit->residue.sum); round++) {
@@ -242,7 +243,7 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
             gain -= step[p] * fit->slope[p];
             size = fmax(size, fabs(next.at.part[p] - fit->at.part[p]));
         }
-        next.residue = trace_residue(window, &next.at, box);
+        next.residue = residue_at(window, &next.at, box);
         if (next.residue.sum < fit->residue.sum) {
             const bool is_done = fit->residue.sum - next.residue.sum <
                                  1e-7 * trace_variance(window, next.residue.sum);
@@ -284,7 +285,7 @@ static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
         for (long last = window->last; last <= window->most_end; last += tail_step) {
             const TraceBox box = trace_box(first, last, 1);
             const TracePoint point = {{(double)first - 0.5, (double)last + 0.5, decay}};
-            const TraceResidue left = trace_residue(window, &point, &box);
+            const TraceResidue left = residue_at(window, &point, &box);
             if (left.sum < fit->residue.sum) {
                 fit->at = point;
                 fit->residue = left;

@@ -56,9 +56,6 @@ TraceBox trace_box(long first, long last, long gaps);
 bool trace_point_shape(const TraceWindow *window, const TracePoint *point, TraceShape *shape,
                        double *contact_time);
 
-// INFINITY as sum where there is no such contact, or one of the other sign.
-TraceResidue trace_residue(const TraceWindow *window, const TracePoint *point, const TraceBox *box);
-
 // The least within a box from `fit->at` on.
 void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit);
 

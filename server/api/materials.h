@@ -25,9 +25,6 @@ Status material_condition(App *app, const Request *request, const char *slug, bo
 // The number of a revision as a path has it. STATUS_NOT_FOUND.
 Status material_revision_number(const char *text, uint64_t *revision, Problem *problem);
 
-// The number of a measurement likewise.
-Status measurement_number(const char *text, uint64_t *number, Problem *problem);
-
 // The head, or of a material that has none (all are deprecated) the newest revision; lists are
 // read. STATUS_NOT_FOUND, and then it is clear.
 Status material_latest(App *app, const char *slug, MaterialRevision *revision, Problem *problem);

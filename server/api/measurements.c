@@ -233,7 +233,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
 
-Status measurement_number(const char *text, uint64_t *number, Problem *problem) {
+static Status measurement_number(const char *text, uint64_t *number, Problem *problem) {
     const size_t size = strlen(text);
     *number = 0;
     if (size > 0 && size <= 9 && strspn(text, "0123456789") == size)

@@ -75,11 +75,7 @@ static ptrdiff_t text_next(void *context, char *target, size_t size) {
             if (sending->text.is_broken || made->is_failed)
                 return STREAM_BROKEN;
         }
-        const size_t left = made->count - sending->taken;
-        const size_t count = left < size - sent ? left : size - sent;
-        memcpy(target + sent, made->at + sending->taken, count);
-        sending->taken += count;
-        sent += count;
+        sent += bytes_hand(made, &sending->taken, target + sent, size - sent);
     }
     return sent > 0 ? (ptrdiff_t)sent : STREAM_END;
 }

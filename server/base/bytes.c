@@ -185,6 +185,14 @@ void bytes_percent(Bytes *bytes, const char *text) {
     }
 }
 
+size_t bytes_hand(const Bytes *bytes, size_t *taken, char *target, size_t size) {
+    const size_t left = bytes->count - *taken, count = left < size ? left : size;
+    if (count > 0)
+        memcpy(target, bytes->at + *taken, count);
+    *taken += count;
+    return count;
+}
+
 char *bytes_take(Bytes *bytes, size_t *size) {
     const bool is_whole = bytes_reserve(bytes, 0);
     char *at = is_whole ? bytes->at : NULL;

@@ -30,6 +30,9 @@ void bytes_json_string(Bytes *bytes, const char *text);
 bool text_is_utf8(const char *text);
 // As part of a URL's query: what is not a letter, a digit or one of -._~ as %XX.
 void bytes_percent(Bytes *bytes, const char *text);
+// What is left behind the first *taken bytes, as much as fits, to target[size]; *taken moves on.
+// Returns how many.
+size_t bytes_hand(const Bytes *bytes, size_t *taken, char *target, size_t size);
 // Takes the text out ("" if there is none), leaving the buffer empty; the caller frees it with
 // free(). NULL if failed.
 char *bytes_take(Bytes *bytes, size_t *size);

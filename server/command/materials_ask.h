@@ -51,12 +51,9 @@ void materials_query_real(Bytes *path, const char *name, double value); // NAN: 
 // that it holds for. The answer is cleared by http_answer_clear in any case.
 Status materials_ask(MaterialsCall *call, const char *method, Bytes *path, const Bytes *body,
                      const char *tag, HttpAnswer *answer, Problem *problem);
-// Writes to `name` of the material `slug` in its state as it is now, or, with --from, as its writer
-// saw it. STATUS_STALE where somebody was faster, with what to do. The answer is cleared by
+// Writes to `name` of the material `slug` in the state that `tag` tells: that of what its writer
+// was shown. STATUS_STALE where somebody was faster, with what to do. The answer is cleared by
 // http_answer_clear in any case.
-Status materials_write(MaterialsCall *call, const char *slug, const char *name, const char *rest,
-                       const Bytes *body, HttpAnswer *answer, Problem *problem);
-// The same in the state that `tag` tells: that of what its writer was shown.
 Status materials_write_seen(MaterialsCall *call, const char *slug, const char *name,
                             const char *rest, const Bytes *body, const char *tag,
                             HttpAnswer *answer, Problem *problem);

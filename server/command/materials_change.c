@@ -65,8 +65,9 @@ Status materials_write_seen(MaterialsCall *call, const char *slug, const char *n
     return stale_tell(slug, status, problem);
 }
 
-Status materials_write(MaterialsCall *call, const char *slug, const char *name, const char *rest,
-                       const Bytes *body, HttpAnswer *answer, Problem *problem) {
+// In the state as it is now, or, with --from, as its writer saw it.
+static Status write_now(MaterialsCall *call, const char *slug, const char *name, const char *rest,
+                        const Bytes *body, HttpAnswer *answer, Problem *problem) {
     // The history has a tag whatever became of the revisions.
     Bytes path;
     HttpAnswer history;
@@ -82,7 +83,7 @@ Status materials_write(MaterialsCall *call, const char *slug, const char *name, 
 static Status write_and_tell(MaterialsCall *call, const char *slug, const char *name,
                              const char *rest, const Bytes *body, Problem *problem) {
     HttpAnswer answer;
-    Status status = materials_write(call, slug, name, rest, body, &answer, problem);
+    Status status = write_now(call, slug, name, rest, body, &answer, problem);
     if (status == STATUS_OK)
         status = materials_print_revision(call, &answer, problem);
     http_answer_clear(&answer);
