@@ -32,13 +32,15 @@ set(index 0)
 foreach(path ${files})
     file(READ ${path} hex HEX)
     file(SIZE ${path} size)
+    file(SHA256 ${path} digest)
+    string(SUBSTRING ${digest} 0 32 digest)
     file(RELATIVE_PATH name ${ROOT} ${path})
     string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
     # 0x..,: 16 bytes a line, and a NUL behind the last one so that a text can be used as it stands.
     string(REGEX REPLACE "(................................................................................)" "\\1\n"
         bytes "${bytes}")
     string(APPEND arrays "static const unsigned char file_${index}[] = {\n${bytes}0x00};\n")
-    string(APPEND rows "    {\"${name}\", (const char *)file_${index}, ${size}},\n")
+    string(APPEND rows "    {\"${name}\", (const char *)file_${index}, ${size}, \"${digest}\"},\n")
     math(EXPR index "${index} + 1")
 endforeach()
 file(WRITE ${SOURCE}

@@ -2,10 +2,13 @@
 # packages.sh LIST...: installs the Debian packages of the lists that are missing; asks no network if none is.
 set -euo pipefail
 
+# Installed packages and what they provide: nodejs from elsewhere than Debian has npm in it.
+present=$({ dpkg-query -W -f '${db:Status-Status} ${Package}, ${Provides}\n' 2>/dev/null || true; } |
+    sed -n 's/^installed //p' | tr ',' '\n' | sed 's/^ *//; s/ .*//')
 missing=()
 while read -r name _; do
     case "$name" in '' | '#'*) continue ;; esac
-    [ "$(dpkg-query -W -f '${db:Status-Status}' "$name" 2>/dev/null)" = installed ] || missing+=("$name")
+    grep -qxF -- "$name" <<<"$present" || missing+=("$name")
 done < <(cat "$@")
 [ ${#missing[@]} -gt 0 ] || exit 0
 

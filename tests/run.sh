@@ -99,27 +99,32 @@ ask() {
     fi
 }
 
-# PRESET FILE...: each in turn while the next one runs beside it. Some hold what the others said against the contract:
-# nothing runs beside them, and they begin when what comes before has ended.
+# PRESET FILE...: each in turn while the next one runs beside it.
 ask_all() {
     local preset=$1
     shift
     while [ $# -gt 0 ]; do
-        [ $# -lt 2 ] || grep -q '^ALONE = True' "$1" "$2" || begin "$2" "$preset"
+        [ $# -lt 2 ] || begin "$2" "$preset"
         IMPACTD_RECORD=$record ask "$1" "$preset"
         shift
     done
 }
 
-# What they say to daemons is recorded for contract/test_traffic.py, which comes after most of them.
+# What they say to daemons is recorded; the judge of that begins when all was said.
+judge=tests/contract/test_traffic.py
+mapfile -t files < <(printf '%s\n' tests/contract/test_*.py | grep -vxF "$judge")
 record=$(mktemp)
 while read -r file; do
     begin "$file" release
     [[ " ${presets[*]} " != *" debug "* ]] || ! grep -q '^SANITIZED = True' "$file" || begin "$file" debug
 done < <(grep -l '^WAITS = True' tests/contract/test_*.py)
-ask_all release tests/contract/test_*.py tests/truth/test_*.py
-rm -f "$record"
+ask_all release "${files[@]}"
+begin "$judge" release
+said_to_daemons=$record
 record=
+ask_all release tests/browser/test_*.py tests/truth/test_*.py
+ask "$judge" release
+rm -f "$said_to_daemons"
 # What faces hostile input is asked once more of the instrumented program.
 if [[ " ${presets[*]} " == *" debug "* ]]; then
     mapfile -t files < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)

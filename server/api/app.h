@@ -30,7 +30,8 @@ extern const char program_version[]; // "0.1.0"
 extern const char program_build[];   // the compiler
 
 // The handlers, by file; routes.c lists them with their patterns.
-Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_events;
+Handler jobs_create, jobs_create_quick, jobs_list, jobs_show, jobs_dismiss, jobs_retry, jobs_scene,
+    jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_series, results_psd,
     results_impacts, results_energy, results_force, results_bundle, results_tradeoff,
     results_ensemble, results_compare, results_sensitivity;
@@ -47,5 +48,6 @@ Handler materials_revisions, materials_history, materials_diff, materials_uses,
 Handler records_create, records_list, records_show, records_samples, records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
+Handler assets_show, assets_show_vendor, assets_show_icon;
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "core/study/inquiry.h"
 #include "server/api/app.h"
+#include "server/api/assets.h"
 #include "server/base/clock.h"
 #include "server/base/embedded.h"
 #include "server/base/link.h"
@@ -31,15 +32,6 @@ static bool name_in_folder(const char *path, const char *folder, char name[64]) 
         return false;
     snprintf(name, 64, "%.*s", (int)(end - from), from);
     return true;
-}
-
-static Status show_file(const Request *request, Reply *reply, const EmbeddedFile *file,
-                        const char *type) {
-    char tag[96];
-    snprintf(tag, sizeof tag, "%s-%zu-%.60s", program_version, file->size, file->path);
-    if (!reply_tagged(reply, request, tag))
-        reply_borrow(reply, 200, type, file->bytes, file->size);
-    return STATUS_OK;
 }
 
 static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
@@ -80,7 +72,7 @@ Status examples_show(App *app, const Request *request, Reply *reply, Problem *pr
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
         if (name_in_folder(file->path, examples_folder, name) &&
             strcmp(name, request->parameters[0]) == 0)
-            return show_file(request, reply, file, type_json);
+            return assets_reply(request, reply, file, type_json);
     return problem_set(problem, STATUS_NOT_FOUND,
                        "there is no example \"%.60s\"; GET /v1/examples lists them",
                        request->parameters[0]);
@@ -127,7 +119,7 @@ Status openapi_show(App *app, const Request *request, Reply *reply, Problem *pro
         return problem_set(problem, STATUS_INTERNAL,
                            "this program was built without its API description");
     if (app->base_url[0] == '\0')
-        return show_file(request, reply, file, type_json);
+        return assets_reply(request, reply, file, type_json);
     const char *url = servers + sizeof before - 1, *rest = strchr(url, '"');
     Bytes bytes = {.most = app->reply_most};
     bytes_put(&bytes, file->bytes, (size_t)(url - file->bytes));

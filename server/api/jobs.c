@@ -285,6 +285,16 @@ Status jobs_show(App *app, const Request *request, Reply *reply, Problem *proble
     return reply_job(app, reply, job, 200, problem);
 }
 
+Status jobs_scene(App *app, const Request *request, Reply *reply, Problem *problem) {
+    char *scene;
+    TRY(store_job_scene(app->store, request->parameters[0], &scene, problem));
+    Bytes bytes = {.most = app->reply_most};
+    bytes_text(&bytes, scene);
+    bytes_text(&bytes, "\n");
+    free(scene);
+    return reply_bytes(reply, 200, type_json, &bytes, problem);
+}
+
 // Whether the request may change what the job of that id came to.
 static Status require_own(App *app, const Request *request, const char *id, Problem *problem) {
     Job *job = NULL;

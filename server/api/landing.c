@@ -1,12 +1,13 @@
-// GET /: how to begin, as lines that can be pasted into a shell as they are. Plain text for curl,
-// the same page as HTML for browsers.
+// GET /: how to begin. Browsers get the dashboard, everyone else lines that can be pasted into a
+// shell as they are.
 #include <stdio.h>
 #include <string.h>
 
 #include "server/api/app.h"
-#include "server/base/link.h"
+#include "server/api/assets.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/http/shield.h"
 
 #define SCENE                                                                                      \
     "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "                   \
@@ -110,44 +111,20 @@ static void write_text(Bytes *bytes, const char *url) {
     }
 }
 
-static void write_escaped(Bytes *bytes, const char *text) {
-    for (; *text != '\0'; text++) {
-        switch (*text) {
-        case '&':
-            bytes_text(bytes, "&amp;");
-            break;
-        case '<':
-            bytes_text(bytes, "&lt;");
-            break;
-        case '>':
-            bytes_text(bytes, "&gt;");
-            break;
-        case '"':
-            bytes_text(bytes, "&quot;");
-            break;
-        default:
-            bytes_put(bytes, text, 1);
-        }
-    }
-}
-
-static void write_html(Bytes *bytes, const char *text) {
-    static const char *const links[] = {"/v1/jobs", "/v1/materials", "/v1/examples",
-                                        "/schemas", "/openapi.json", "/health/ready",
-                                        "/metrics", "/version"};
-    bytes_text(bytes,
-               "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
-               "<meta name=\"viewport\" content=\"width=device-width\">\n<title>impactd</title>\n"
-               "<h1>impactd</h1>\n<p>");
-    for (size_t i = 0; i < COUNT(links); i++)
-        bytes_format(bytes, "<a href=\"%s%s\">%s</a>\n", link_base(), links[i], links[i]);
-    bytes_text(bytes, "</p>\n<pre>");
-    write_escaped(bytes, text);
-    bytes_text(bytes, "</pre>\n</html>\n");
-}
-
 Status landing_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     static const char *const types[] = {"text/plain", "text/html", NULL};
+    reply->varies_by_accept = true;
+    const EmbeddedFile *dashboard = embedded_find(embedded_web, "web/index.html");
+    if (dashboard != NULL && header_accept(request->accept, types) == 1) {
+        // Its links are relative: at a base path without a slash at its end they would miss it.
+        if (request->target[strcspn(request->target, "?") - 1] != '/') {
+            text_fit(reply->location, sizeof reply->location, "/");
+            reply_borrow(reply, 308, NULL, NULL, 0);
+            return STATUS_OK;
+        }
+        reply->policy = shield_page_policy;
+        return assets_reply(request, reply, dashboard, "text/html; charset=utf-8");
+    }
     char url[sizeof app->base_url];
     // The gate lets through no Host but ours, so it can stand in a line for the shell.
     if (app->base_url[0] != '\0')
@@ -156,11 +133,5 @@ Status landing_show(App *app, const Request *request, Reply *reply, Problem *pro
         snprintf(url, sizeof url, "%s://%.80s", app->has_tls ? "https" : "http", request->host);
     Bytes text = {.most = 1 << 16};
     write_text(&text, url);
-    reply->varies_by_accept = true;
-    if (header_accept(request->accept, types) != 1)
-        return reply_bytes(reply, 200, "text/plain; charset=utf-8", &text, problem);
-    Bytes page = {.most = 1 << 18};
-    write_html(&page, text.at != NULL ? text.at : "");
-    bytes_clear(&text);
-    return reply_bytes(reply, 200, "text/html; charset=utf-8", &page, problem);
+    return reply_bytes(reply, 200, "text/plain; charset=utf-8", &text, problem);
 }

@@ -110,21 +110,59 @@ static Status reply_columns(App *app, Reply *reply, const Encoder *encoder, Docu
     return status;
 }
 
+// The window of a ledger that the query asks for; *is_asked is false where it is all.
+static Status impact_window(const Request *request, ImpactWindow *window, bool *is_asked,
+                            Problem *problem) {
+    static const char *const names[] = {"from", "to", "first", "limit"};
+    *is_asked = false;
+    for (size_t i = 0; i < COUNT(names); i++)
+        *is_asked = *is_asked || request_query(request, names[i]) != NULL;
+    TRY(request_number(request, "from", 0, 1e12, 0, &window->from, problem));
+    TRY(request_number(request, "to", 0, 1e12, 1e12, &window->to, problem));
+    TRY(request_count(request, "first", 1, 1000000000, 1, &window->first, problem));
+    TRY(request_count(request, "limit", 1, 1000000000, 1000000000, &window->limit, problem));
+    char text[32], text_to[32];
+    return window->from <= window->to
+               ? STATUS_OK
+               : problem_set(problem, STATUS_USAGE, "\"from\" is %s s, behind \"to\" at %s s",
+                             text_real(text, window->from), text_real(text_to, window->to));
+}
+
+// The document with only the impacts asked for, in `bytes`, if not all are; *text is that then.
+static Status choose_impacts(App *app, const Request *request, bool is_json, const char **text,
+                             Bytes *bytes, Problem *problem) {
+    ImpactWindow window;
+    bool is_asked;
+    TRY(impact_window(request, &window, &is_asked, problem));
+    if (!is_asked)
+        return STATUS_OK;
+    bytes->most = app->reply_most;
+    TRY(kept_impacts_window(*text, &window, is_json, bytes, problem));
+    if (bytes->is_failed)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impacts");
+    *text = bytes->at;
+    return STATUS_OK;
+}
+
 static Status results_part(App *app, const Request *request, Reply *reply, Document document,
                            Problem *problem) {
     const Encoder *encoder = NULL;
     TRY(tables_encoder(request, 1, reply, &encoder, problem));
     ResultRow row = {.count = 0};
     const char *text = NULL;
+    Bytes window = {.most = 0};
     char tag[104];
     Status status = store_result_load(app->store, request->parameters[0], &row, problem);
     if (status == STATUS_OK)
         status = result_document(&row, document, &text, problem);
+    if (status == STATUS_OK && document == DOCUMENT_IMPACTS)
+        status = choose_impacts(app, request, encoder == &encoder_json, &text, &window, problem);
     snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, document_names[document], encoder->extension);
     if (status == STATUS_OK && !reply_immutable(reply, request, tag))
         status = encoder == &encoder_json
                      ? reply_document(app, reply, text, problem)
                      : reply_columns(app, reply, encoder, document, text, problem);
+    bytes_clear(&window);
     result_row_clear(&row);
     return status;
 }

@@ -7,6 +7,7 @@ static const char *const of_jobs[] = {"limit",  "before", "status", "q",     "la
                                       "result", "kind",   "since",  "until", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};
+static const char *const of_impacts[] = {"from", "to", "first", "limit", NULL};
 static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
@@ -17,6 +18,7 @@ static const char *const of_materials[] = {"q",   "kind",  "status", "e",
 static const char *const of_pages[] = {"limit", "before", NULL};
 static const char *const of_diff[] = {"from", "to", NULL};
 static const char *const of_uses[] = {"revision", "limit", "before", NULL};
+static const char *const of_samples[] = {"from", "to", "points", NULL};
 static const char *const of_records[] = {"q", "limit", "after", NULL};
 static const char *const of_record[] = {"name",  "interval",   "unit",    "source", "processing",
                                         "notes", "earthquake", "station", NULL};
@@ -34,6 +36,7 @@ const Route routes[] = {
     {"GET",    "/v1/jobs/{id}",                         "read",   of_job,       "A job's state; ?wait=S waits until it is finished", jobs_show},
     {"GET",    "/v1/jobs/{id}/events",                  "read",   NULL,         "A job's progress as server-sent events", jobs_events},
     {"DELETE", "/v1/jobs/{id}",                         "submit", NULL,         "Cancel a job", jobs_dismiss},
+    {"GET",    "/v1/jobs/{id}/scene",                   "read",   NULL,         "The scene of a job, ready to submit", jobs_scene},
     {"POST",   "/v1/jobs/{id}/retry",                   "submit", NULL,         "Make failed points of a finished sweep again", jobs_retry},
     {"GET",    "/v1/jobs/{id}/table.{format}",          "read",   NULL,         "Rows of a job's sweep so far", sweeps_table},
     {"GET",    "/v1/jobs/{id}/table",                   "read",   NULL,         "Rows of a job's sweep so far, format by Accept", sweeps_table},
@@ -49,8 +52,8 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_series},
     {"GET",    "/v1/results/{id}/psd.{format}",         "read",   NULL,         "Power spectral densities as json, csv, npy, npz or mat", results_psd},
     {"GET",    "/v1/results/{id}/psd",                  "read",   NULL,         "Power spectral densities, format by Accept", results_psd},
-    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   NULL,         "The ledger of impacts as json, csv, npy, npz or mat", results_impacts},
-    {"GET",    "/v1/results/{id}/impacts",              "read",   NULL,         "The ledger of impacts, format by Accept", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts.{format}",     "read",   of_impacts,   "The ledger of impacts as json, csv, npy, npz or mat; ?from= &to= a window of it", results_impacts},
+    {"GET",    "/v1/results/{id}/impacts",              "read",   of_impacts,   "The ledger of impacts, format by Accept", results_impacts},
     {"GET",    "/v1/results/{id}/impacts/{number}/force.{format}", "read", of_force, "One impact in detail, as json, csv, npy, npz or mat", results_force},
     {"GET",    "/v1/results/{id}/impacts/{number}/force", "read", of_force,     "One impact in detail, format by Accept", results_force},
     {"GET",    "/v1/results/{id}/bundle.zip",           "read",   NULL,         "All of a result in one archive", results_bundle},
@@ -91,8 +94,8 @@ const Route routes[] = {
     {"GET",    "/v1/materials/{slug}",                  "read",   NULL,         "A material's approved revision", materials_show},
     {"POST",   "/v1/records",                           "materials", of_record, "Upload a ground motion's file, or its samples as JSON", records_create},
     {"GET",    "/v1/records",                           "read",   of_records,   "Ground motions, by name; ?q= searches", records_list},
-    {"GET",    "/v1/records/{name}/samples.{format}",   "read",   NULL,         "A ground motion's samples as json, csv, npy, npz or mat", records_samples},
-    {"GET",    "/v1/records/{name}/samples",            "read",   NULL,         "A ground motion's samples, format by Accept", records_samples},
+    {"GET",    "/v1/records/{name}/samples.{format}",   "read",   of_samples,   "A ground motion's samples as json, csv, npy, npz or mat; ?points= keeps the extremes of buckets", records_samples},
+    {"GET",    "/v1/records/{name}/samples",            "read",   of_samples,   "A ground motion's samples, format by Accept", records_samples},
     {"GET",    "/v1/records/{name}",                    "read",   NULL,         "A ground motion, and how much uses it", records_show},
     {"DELETE", "/v1/records/{name}",                    "materials", NULL,      "Delete a ground motion that nothing uses", records_delete},
     {"GET",    "/v1/examples",                          "read",   NULL,         "Scenes that run as they are", examples_list},
@@ -104,7 +107,11 @@ const Route routes[] = {
     {"GET",    "/health/ready",                         "open",   NULL,         "The daemon takes jobs; 503 otherwise", health_ready},
     {"GET",    "/metrics",                              "read",   NULL,         "Counters in the Prometheus text format", metrics_show},
     {"GET",    "/version",                              "open",   NULL,         "Program, engine and build", version_show},
-    {"GET",    "/",                                     "open",   NULL,         "How to begin: curl lines", landing_show},
+    {"GET",    "/web/vendor/{library}/{file}",          "open",   NULL,         "What the dashboard is made of", assets_show_vendor},
+    {"GET",    "/web/{folder}/{file}",                  "open",   NULL,         "What the dashboard is made of", assets_show},
+    {"GET",    "/web/{file}",                           "open",   NULL,         "What the dashboard is made of", assets_show},
+    {"GET",    "/favicon.ico",                          "open",   NULL,         "The dashboard's icon", assets_show_icon},
+    {"GET",    "/",                                     "open",   NULL,         "The dashboard for browsers, curl lines for shells", landing_show},
     {NULL, NULL, NULL, NULL, NULL, NULL},
 };
 // clang-format on

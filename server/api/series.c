@@ -1,12 +1,10 @@
 // Time series: which channels, which window, and all its samples or the extremes of buckets of
 // them. They come from the Outcome, which is in memory or is computed anew by a worker while the
 // request sleeps.
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "server/api/tables.h"
-#include "server/encode/buckets.h"
 
 static void list_names(const Columns *columns, char *target, size_t size) {
     target[0] = '\0';
@@ -50,47 +48,6 @@ static Status choose_columns(const Request *request, const Columns *columns, con
     return STATUS_OK;
 }
 
-static Status choose_rows(const Request *request, const Response *response, Table *table,
-                          Problem *problem) {
-    // The half of a rounding on either side keeps a sample that stands at the very time asked for.
-    const double rate = response->sample_rate, end = (double)(response->count - 1) / rate;
-    double from, to;
-    TRY(request_number(request, "from", 0, 1e12, 0, &from, problem));
-    TRY(request_number(request, "to", 0, 1e12, end, &to, problem));
-    const double first = ceil(from * rate * (1 - 1e-12)), last = floor(to * rate * (1 + 1e-12));
-    char text[32], text_to[32];
-    if (first > (double)(response->count - 1))
-        return problem_set(problem, STATUS_USAGE,
-                           "\"from\" is %s s, behind the last sample at %s s",
-                           text_real(text, from), text_real(text_to, end));
-    if (last < first)
-        return problem_set(problem, STATUS_USAGE, "there is no sample from %s s to %s s",
-                           text_real(text, from), text_real(text_to, to));
-    table->first = (size_t)first;
-    table->count =
-        (last < (double)response->count ? (size_t)last : response->count - 1) - table->first + 1;
-    return STATUS_OK;
-}
-
-// "?points=n": at most n buckets, all of one size but the last.
-static Status choose_buckets(const Request *request, Sheet *sheet, Problem *problem) {
-    Table *table = &sheet->table;
-    size_t most;
-    if (request_query(request, "points") == NULL)
-        return STATUS_OK;
-    TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
-    const size_t samples = table->count;
-    const size_t bucket = (samples + most - 1) / most;
-    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket,
-                     &sheet->own, problem));
-    TRY(sheet_own(sheet, problem));
-    // Without channels too there is a time for each.
-    table->count = (samples + bucket - 1) / bucket;
-    table->bucket = bucket;
-    table->samples = samples;
-    return STATUS_OK;
-}
-
 static Status choose(const Request *request, Sheet *sheet, Problem *problem) {
     const Response *response = &sheet->outcome->response;
     sheet->table =
@@ -100,8 +57,8 @@ static Status choose(const Request *request, Sheet *sheet, Problem *problem) {
     TRY(sheet_make(sheet, response->series.count, problem));
     TRY(choose_columns(request, &response->series, sheet->chosen, &sheet->table.column_count,
                        problem));
-    TRY(choose_rows(request, response, &sheet->table, problem));
-    return choose_buckets(request, sheet, problem);
+    TRY(tables_window(request, response->count, &sheet->table, problem));
+    return tables_buckets(request, sheet, problem);
 }
 
 Status results_series(App *app, const Request *request, Reply *reply, Problem *problem) {

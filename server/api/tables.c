@@ -1,12 +1,14 @@
 #include "server/api/tables.h"
 #include "server/api/results.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/base/clock.h"
 #include "server/base/shortest.h"
+#include "server/encode/buckets.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 
@@ -49,6 +51,44 @@ Status sheet_own_axis(Sheet *sheet, Problem *problem) {
     table->axis = axis->values;
     table->columns = sheet->chosen + 1;
     table->column_count--;
+    return STATUS_OK;
+}
+
+Status tables_window(const Request *request, size_t count, Table *table, Problem *problem) {
+    // The half of a rounding on either side keeps a sample that stands at the very time asked for.
+    const double rate = table->axis_rate, end = (double)(count - 1) / rate;
+    double from, to;
+    TRY(request_number(request, "from", 0, 1e12, 0, &from, problem));
+    TRY(request_number(request, "to", 0, 1e12, end, &to, problem));
+    const double first = ceil(from * rate * (1 - 1e-12)), last = floor(to * rate * (1 + 1e-12));
+    char text[32], text_to[32];
+    if (first > (double)(count - 1))
+        return problem_set(problem, STATUS_USAGE,
+                           "\"from\" is %s s, behind the last sample at %s s",
+                           text_real(text, from), text_real(text_to, end));
+    if (last < first)
+        return problem_set(problem, STATUS_USAGE, "there is no sample from %s s to %s s",
+                           text_real(text, from), text_real(text_to, to));
+    table->first = (size_t)first;
+    table->count = (last < (double)count ? (size_t)last : count - 1) - table->first + 1;
+    return STATUS_OK;
+}
+
+Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
+    Table *table = &sheet->table;
+    size_t most;
+    if (request_query(request, "points") == NULL)
+        return STATUS_OK;
+    TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
+    const size_t samples = table->count;
+    const size_t bucket = (samples + most - 1) / most;
+    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket,
+                     &sheet->own, problem));
+    TRY(sheet_own(sheet, problem));
+    // Without channels too there is a time for each.
+    table->count = (samples + bucket - 1) / bucket;
+    table->bucket = bucket;
+    table->samples = samples;
     return STATUS_OK;
 }
 

@@ -25,6 +25,11 @@ Status sheet_own(Sheet *sheet, Problem *problem);
 // The same with the first of them as the axis.
 Status sheet_own_axis(Sheet *sheet, Problem *problem);
 
+// "?from=&to=": which of `count` samples, at the table's rate, its rows are.
+Status tables_window(const Request *request, size_t count, Table *table, Problem *problem);
+// "?points=n": the rows in at most n buckets, all of one size but the last, the sheet's own.
+Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem);
+
 // The table of spectra as they were saved. (ledgers.c)
 Status sheet_psd(Sheet *sheet, const char *text, Problem *problem);
 

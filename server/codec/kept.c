@@ -64,8 +64,9 @@ static size_t count_objects(const char *text) {
     return count;
 }
 
+static const char list[] = "\"impacts\": [";
+
 Status kept_impacts(const char *text, Impacts *impacts, Problem *problem) {
-    static const char list[] = "\"impacts\": [";
     *impacts = (Impacts){NULL, 0};
     const char *at = strstr(text, list);
     if (at == NULL)
@@ -88,4 +89,46 @@ Status kept_impacts(const char *text, Impacts *impacts, Problem *problem) {
         *impacts = (Impacts){NULL, 0};
     }
     return status;
+}
+
+// A number of the impact that begins at `row`; what is null is not yet there.
+static double impact_time(const char *row, const char *name) {
+    const char *at = strstr(row, name);
+    char *end = NULL;
+    const double value = at == NULL ? (double)INFINITY : strtod(at + strlen(name), &end);
+    return at == NULL || end == at + strlen(name) ? (double)INFINITY : value;
+}
+
+// Only the two times of a row are read, and none behind the window: 200,000 rows are 60 MB of text.
+Status kept_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
+                           Bytes *bytes, Problem *problem) {
+    const char *at = strstr(text, list);
+    if (at == NULL)
+        return refuse("impacts", problem);
+    at += sizeof list - 1;
+    bytes_put(bytes, text, (size_t)(at - text));
+    size_t number = 0, matching = 0, written = 0;
+    while (*at == '{' || *at == ',') {
+        const char *row = strchr(at, '{'), *end = strchr(at, '}');
+        if (row == NULL || end == NULL)
+            return refuse("impacts", problem);
+        at = end + 1;
+        number++;
+        if (impact_time(row, "\"start\": ") > window->to)
+            break; // they stand in the order of their starts
+        if (impact_time(row, "\"end\": ") < window->from)
+            continue;
+        matching++;
+        if (number < window->first || written == window->limit)
+            continue;
+        bytes_text(bytes, written++ > 0 ? ", {" : "{");
+        if (is_numbered)
+            bytes_format(bytes, "\"number\": %zu, ", number);
+        bytes_put(bytes, row + 1, (size_t)(end - row));
+    }
+    bytes_text(bytes, "]");
+    if (is_numbered)
+        bytes_format(bytes, ", \"matching\": %zu", matching);
+    bytes_text(bytes, "}");
+    return STATUS_OK;
 }

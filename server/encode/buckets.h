@@ -1,5 +1,5 @@
 // Columns thinned out without losing a peak: the least and the largest value of each bucket of
-// samples. Not an average. Used by api/series.c.
+// samples. Not an average. Used by api/tables.c.
 #ifndef SERVER_ENCODE_BUCKETS_H
 #define SERVER_ENCODE_BUCKETS_H
 

@@ -108,6 +108,7 @@ typedef struct Reply {
     char etag[112];     // with quotes, "" for none
     char cache_control[64];
     char link[2048];          // likewise
+    const char *policy;       // Content-Security-Policy; NULL: nothing may load anything
     const char *authenticate; // WWW-Authenticate; NULL: none
     char preference_applied[48];
     char allow[64];

@@ -110,6 +110,8 @@ static void add_headers(struct MHD_Response *response, const Reply *reply, bool 
     add_header(response, MHD_HTTP_HEADER_ACCEPT_RANGES, reply->accepts_ranges ? "bytes" : NULL);
     add_header(response, MHD_HTTP_HEADER_VARY, vary(reply));
     add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, reply->authenticate);
+    add_header(response, "Content-Security-Policy",
+               reply->policy != NULL ? reply->policy : shield_policy);
     for (const ShieldHeader *header = shield_headers; header->name != NULL; header++)
         add_header(response, header->name, header->value);
     if (has_tls)

@@ -270,9 +270,10 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
     } else if (status != STATUS_CANCELLED) {
         fail(run, status, problem);
     }
+    // Before the run is let go: another may be the last one then, and free it.
+    shift_free(run, shift);
     const bool is_ended = let_go(run);
     pthread_mutex_unlock(&intake->lock);
-    shift_free(run, shift);
     if (is_ended)
         study_finish(worker, run, problem);
 }

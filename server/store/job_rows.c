@@ -154,6 +154,35 @@ Status store_job_load(Store *store, const char *id, JobRow *row, Problem *proble
     return is_found ? STATUS_OK : not_found(id, problem);
 }
 
+typedef struct Asked {
+    char id[40], result[72];
+    char *scene;
+} Asked;
+static const RowColumn asked_columns[] = {ROW_COLUMN(Asked, id, COLUMN_NAME),
+                                          ROW_COLUMN(Asked, result, COLUMN_NAME),
+                                          ROW_COLUMN(Asked, scene, COLUMN_TEXT), ROW_END};
+
+Status store_job_scene(Store *store, const char *id, char **scene, Problem *problem) {
+    static const char sql[] =
+        "SELECT coalesce((SELECT scene FROM jobs WHERE id = :id AND scene <> ''), "
+        "(SELECT scene FROM results WHERE id = :result)) AS scene";
+    JobRow row;
+    Asked asked = {.scene = NULL};
+    bool is_found;
+    *scene = NULL;
+    TRY(store_job_load(store, id, &row, problem));
+    memcpy(asked.id, row.id, sizeof asked.id);
+    memcpy(asked.result, row.result, sizeof asked.result);
+    job_row_clear(&row);
+    TRY(store_first(store, sql, asked_columns, &asked, asked_columns, &asked, &is_found, problem));
+    *scene = asked.scene;
+    return *scene != NULL ? STATUS_OK
+                          : problem_set(problem, STATUS_GONE,
+                                        "the scene of the job \"%.40s\" went with its result, "
+                                        "which was deleted",
+                                        id);
+}
+
 typedef struct Keyed {
     char *client, *key;
 } Keyed;

@@ -103,6 +103,9 @@ Status store_job_update_post(Store *store, const JobRow *row, const StoreDone *d
 // All but the scene, here and in the list; the unfinished ones come with theirs. `row` may be
 // uninitialised.
 Status store_job_load(Store *store, const char *id, JobRow *row, Problem *problem);
+// The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
+// went with a deleted result.
+Status store_job_scene(Store *store, const char *id, char **scene, Problem *problem);
 // The job that `client` (NULL: nobody in particular) sent under that key. STATUS_NOT_FOUND.
 Status store_job_keyed(Store *store, const char *client, const char *key, JobRow *row,
                        Problem *problem);

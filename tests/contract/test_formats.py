@@ -293,6 +293,33 @@ def test_an_impact_meets_the_ledger():
         assert reply.status == 404 and "ledger" in reply.json()["detail"], reply
 
 
+def test_a_window_of_the_ledger():
+    """from, to, first and limit take out the rows of the whole ledger that meet them, in every format."""
+    with program.daemon() as daemon:
+        for name in ("paper_free_sponge", "contact_hunt_crossley_textbook", "paper_free_impulse_sponge"):
+            base = finished(daemon, program.scene(name))
+            whole = get(daemon, f"{base}/impacts.json").json()
+            rows = [dict(row, number=number) for number, row in enumerate(whole["impacts"], 1)]
+            assert "matching" not in whole and len(rows) > 4
+            a, b = rows[2]["start"], rows[-3]["end"]
+            for query, start, end, first, limit in (
+                    ("first=1", 0, 1e9, 1, 1e9), ("from=0", 0, 1e9, 1, 1e9), (f"from={a!r}&to={b!r}", a, b, 1, 1e9),
+                    (f"to={a!r}", 0, a, 1, 1e9), (f"from={b!r}&limit=1", b, 1e9, 1, 1), ("first=3&limit=2", 0, 1e9, 3, 2),
+                    (f"from={a!r}&first=4&limit=1000", a, 1e9, 4, 1000), ("from=1e9", 1e9, 1e9, 1, 1e9)):
+                met = [row for row in rows if row["start"] <= end and (row["end"] is None or row["end"] >= start)]
+                wanted = [row for row in met if row["number"] >= first][:int(limit)]
+                part = get(daemon, f"{base}/impacts.json?{query}").json()
+                assert part == {"count": whole["count"], "resting": whole["resting"], "impacts": wanted,
+                                "matching": len(met)}, (name, query, part)
+                numbers = npz_columns(get(daemon, f"{base}/impacts.npz?{query}").body)
+                assert same(numbers["start"], [row["start"] for row in wanted]) and "number" not in numbers, (name, query)
+                lines = get(daemon, f"{base}/impacts.csv?{query}").body.decode().splitlines()
+                assert len(lines) == 1 + len(wanted), (name, query)
+            for query in ("from=-1", "from=2&to=1", "limit=0", "first=0", "from=x", "points=3"):
+                reply = daemon.request("GET", f"{base}/impacts.json?{query}")
+                assert reply.status == 400, (query, reply)
+
+
 def test_a_long_scene_is_looked_at_beside_the_jobs():
     """Where the run again takes long, the request sleeps; a client that leaves stops it; the daemon ends well meanwhile."""
     with program.daemon() as daemon:

@@ -172,7 +172,7 @@ def test_formats_are_negotiated():
         for part in ("series", "psd", "impacts"):
             problem(daemon.get(f"{base}/{part}", headers={"Accept": "image/png"}), 406)
         page = daemon.get("/", headers={"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
-        assert page.headers["content-type"] == "text/html; charset=utf-8" and b"<pre>" in page.body, page
+        assert page.headers["content-type"] == "text/html; charset=utf-8" and b'<main id="main"' in page.body, page
         assert daemon.get("/").headers["content-type"] == "text/plain; charset=utf-8"
 
 

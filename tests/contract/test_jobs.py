@@ -341,6 +341,39 @@ def test_a_result_is_deleted_and_its_jobs_say_so():
         daemon.request("DELETE", f"/v1/jobs/{running}")
 
 
+def test_a_jobs_scene_is_there_whatever_became_of_it():
+    """GET /v1/jobs/{id}/scene: of a successful, cached, running, dismissed and failed job, also after a start; it runs as it stands."""
+    with program.daemon("--workers", "1") as daemon:
+        sent = quick(1)
+        jobs = {state: daemon.submit(sent).json() for state in ("successful", "cached")}
+        assert jobs["cached"]["cached"] and not jobs["successful"]["cached"]
+        scene = daemon.get(f"/v1/results/{jobs['cached']['result']}").json()["scene"]
+        jobs["running"] = daemon.submit(slow(1, 100), headers=ASYNC).json()
+        jobs["waiting"] = daemon.submit({**slow(2, 100), "study": {"kind": "tradeoff"}}, headers=ASYNC).json()
+        asked = {state: daemon.get(f"/v1/jobs/{job['id']}/scene") for state, job in jobs.items()}
+        assert asked["successful"].json() == asked["cached"].json() == scene, asked
+        assert asked["running"].json()["accuracy"] == {"solver": "rk4", "step": 1e-5}, asked["running"]
+        assert asked["waiting"].json()["study"]["kind"] == "tradeoff", asked["waiting"]
+        assert daemon.request("POST", "/v1/jobs?dry_run=1", json=asked["waiting"].json()).status == 200
+        assert daemon.submit(asked["successful"].json()).json()["result"] == jobs["successful"]["result"]
+        for state in ("waiting", "running"):
+            assert daemon.request("DELETE", f"/v1/jobs/{jobs[state]['id']}").status == 200
+        daemon.stop()
+        daemon.start()
+        for state, job in jobs.items():
+            assert daemon.get(f"/v1/jobs/{job['id']}/scene").json() == asked[state].json(), state
+        # A fault that only running shows: a narrow clearance where the start is far out.
+        axes = [{"pointer": "/dampers/0/clearance", "values": [0.02, 0.01, 0.02]},
+                {"pointer": "/dampers/0/position", "from": 0, "to": 0.006, "count": 3000}]
+        failed = daemon.finished(daemon.submit(quick(2, study={"kind": "sweep", "axes": axes})).json()["id"])
+        assert failed["status"] == "failed", failed
+        assert daemon.get(f"/v1/jobs/{failed['id']}/scene").json()["study"]["kind"] == "sweep"
+        assert daemon.get("/v1/jobs/j-none/scene").status == 404
+        assert daemon.request("DELETE", f"/v1/results/{jobs['successful']['result']}").status == 204
+        for state in ("successful", "cached"):
+            assert daemon.get(f"/v1/jobs/{jobs[state]['id']}/scene").status == 410
+
+
 def test_a_page_whose_place_is_gone_goes_on():
     """Retention between two pages: the next page has what is still there behind that place, no 404."""
     folder = tempfile.mkdtemp(prefix="impactd-jobs-")

@@ -142,6 +142,27 @@ def test_samples_are_had_in_every_format():
         assert daemon.get("/v1/records/r/samples.xml").status == 404
 
 
+def test_a_window_and_extremes_of_samples():
+    """from, to and points are those of a result's series: both ends, every peak, faults of the query told."""
+    with program.daemon() as daemon:
+        given = numpy.array(shake()["samples"])
+        upload(daemon, "r")
+        get = lambda query: daemon.get(f"/v1/records/r/samples.json?{query}").json()  # noqa: E731
+        part = get("from=1&to=2.5")
+        assert part["start"] == 1 and part["count"] == 76
+        assert part["channels"]["acceleration"]["values"] == given[50:126].tolist()
+        thin = get("from=1&to=2.5&points=10")
+        assert (thin["start"], thin["bucket"]) == (1, 8)
+        buckets = [given[at:min(at + 8, 126)] for at in range(50, 126, 8)]
+        assert thin["channels"]["acceleration"]["min"] == [each.min() for each in buckets]
+        assert thin["channels"]["acceleration"]["max"] == [each.max() for each in buckets]
+        table = numpy.load(io.BytesIO(daemon.get("/v1/records/r/samples.npy?points=10").body))
+        assert table.shape == (10, 3) and table[:, 1].min() == given.min() and table[:, 2].max() == given.max()
+        assert len(get("from=7.98")["channels"]["acceleration"]["values"]) == 1
+        for query in ("from=8", "from=2&to=1", "points=0", "points=x", "channels=acceleration"):
+            problem(daemon.get(f"/v1/records/r/samples.json?{query}"), 400)
+
+
 def test_a_named_record_is_the_same_as_its_samples():
     """A scene that names a record has to the byte the series of one with those samples; its canonical form is small."""
     with program.daemon() as daemon:

@@ -12,7 +12,8 @@
 
 static void every_embedded_file_equals_its_source(void **state) {
     (void)state;
-    const EmbeddedFile *const tables[] = {embedded_sql, embedded_schemas, embedded_examples};
+    const EmbeddedFile *const tables[] = {embedded_sql, embedded_schemas, embedded_examples,
+                                          embedded_web};
     size_t files = 0;
     for (size_t t = 0; t < sizeof(tables) / sizeof(tables[0]); t++)
         for (const EmbeddedFile *file = tables[t]; file->path != NULL; file++, files++) {

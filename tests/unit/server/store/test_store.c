@@ -341,15 +341,16 @@ static void a_full_disk_is_told_and_what_was_there_stays(void **state) {
 }
 
 static const EmbeddedFile two_steps[] = {
-    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT; INSERT INTO a VALUES (7);", 60},
-    {"schema/sql/002_b.sql", "ALTER TABLE a ADD COLUMN y INTEGER; UPDATE a SET y = x;", 55},
+    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT; INSERT INTO a VALUES (7);", 60,
+     ""},
+    {"schema/sql/002_b.sql", "ALTER TABLE a ADD COLUMN y INTEGER; UPDATE a SET y = x;", 55, ""},
     {0},
 };
 static const EmbeddedFile one_step[] = {
-    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT;", 34}, {0}};
+    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT;", 34, ""}, {0}};
 static const EmbeddedFile broken_step[] = {
-    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT;", 34},
-    {"schema/sql/002_b.sql", "CREATE TABLE c (x INTEGER) STRICT; CREATE TABEL d (x);", 54},
+    {"schema/sql/001_a.sql", "CREATE TABLE a (x INTEGER) STRICT;", 34, ""},
+    {"schema/sql/002_b.sql", "CREATE TABLE c (x INTEGER) STRICT; CREATE TABEL d (x);", 54, ""},
     {0},
 };
 

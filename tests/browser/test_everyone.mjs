@@ -1,0 +1,79 @@
+// What the dashboard owes to everyone: something to read before data is there, paper, an address that is the whole state.
+// Names, contrast and width of every page are test_pages.mjs's.
+import assert from "node:assert/strict";
+import { settle } from "./pages.mjs";
+import { overflow, says, test, until } from "./support.mjs";
+
+const sponge = async (daemon) => ({ hash: `#/results/${(await daemon.run("paper_free_sponge")).result}`, wants: /impact/ });
+
+test("The title, a heading and the way on are there before any answer of the service", async ({ page, url }) => {
+  await page.route(/\/(v1|schemas|version)/, () => {}); // never answered
+  await page.goto(url());
+  await page.getByRole("heading", { level: 1 }).waitFor();
+  await page.getByRole("navigation").getByRole("link", { name: "Materials" }).waitFor();
+  await page.getByRole("img").first().waitFor(); // the paper's sponge, drawn
+  await page.getByRole("button", { name: /^Run/ }).first().waitFor();
+});
+
+test("On paper a page has its content and no buttons, dark on white, all of its tables", async ({ daemon, url, newPage }) => {
+  const page = await newPage({ colorScheme: "dark", viewport: { width: 760, height: 900 } });
+  const result = await sponge(daemon);
+  await settle(page, url(result.hash), result);
+  await page.emulateMedia({ media: "print" });
+  assert.equal(await page.getByRole("button").count(), 0);
+  assert.equal(await page.getByRole("navigation").count(), 0);
+  await until("the page to fit", async () => (await overflow(page)) === 0, 2000);
+  const light = await page.evaluate(() => getComputedStyle(document.body).color.match(/\d+/g).slice(0, 3).every((part) => Number(part) < 90));
+  assert.ok(light, "text on paper is dark");
+  const cut = await page.evaluate(() => [...document.querySelectorAll("main *")].filter((node) => node.checkVisibility() &&
+    getComputedStyle(node).overflowY === "auto" && node.scrollHeight > node.clientHeight + 2).map((node) => node.ariaLabel ?? node.className));
+  assert.deepEqual(cut, [], "nothing on paper can be scrolled to");
+  assert.ok((await page.pdf()).length > 20000);
+});
+
+// Pictures of all that is drawn: [section, PNG].
+const charts = async (page) => {
+  const pictures = [], all = await page.locator("main canvas, main svg").all();
+  for (const one of all) if (await one.isVisible()) await one.scrollIntoViewIfNeeded(); // some begin when they are seen
+  await until("all to be drawn", async () => !/loading …/i.test(await page.locator("main").innerText()));
+  for (const one of all)
+    if (await one.isVisible())
+      pictures.push([await one.evaluate((node) => node.closest("section")?.id), (await one.screenshot({ animations: "disabled" })).toString("base64")]);
+  return pictures;
+};
+// The sections whose pictures differ.
+const differing = (some, others) => some.filter(([, picture], at) => picture !== others[at]?.[1]).map(([section]) => section);
+
+test("A result's address with its window and impact is the same picture in a fresh profile, after a reload and after back", async ({ page, daemon, url, newPage }) => {
+  const result = await sponge(daemon);
+  const shared = { ...result, hash: `${result.hash}?from=1&to=1.8&impact=5` };
+  await settle(page, url(result.hash), result);
+  const whole = await charts(page);
+  await settle(page, url(shared.hash), shared);
+  const zoomed = await charts(page);
+  assert.ok(whole.length >= 3 && zoomed.length === whole.length, `${whole.length} and ${zoomed.length} charts`);
+  assert.ok(differing(whole, zoomed).length >= 2, "the window of time is seen in the charts");
+  const other = await newPage();
+  await settle(other, url(shared.hash), shared);
+  assert.deepEqual(differing(zoomed, await charts(other)), [], "a fresh profile");
+  await settle(page, () => page.reload(), shared);
+  assert.deepEqual(differing(zoomed, await charts(page)), [], "a reload");
+  await settle(page, () => page.goBack(), result);
+  assert.deepEqual(differing(whole, await charts(page)), [], "back");
+});
+
+test("The theme is chosen by a button and stays; the link over the navigation leads into the content", async ({ page, url }) => {
+  const back = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  await page.goto(url("#/shell"));
+  await says(page.getByRole("main"), /curl/);
+  const light = await back();
+  await page.getByRole("button", { name: "Use dark colours" }).click();
+  const dark = await back();
+  assert.notEqual(light, dark);
+  await page.reload();
+  await page.getByRole("button", { name: "Use light colours" }).waitFor();
+  assert.equal(await back(), dark);
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "main");
+});

@@ -1,0 +1,84 @@
+// Runs: the list, one run while it goes on, cancelling, failing, a daemon that starts anew.
+import assert from "node:assert/strict";
+import { leads, says, tabTo, test, until } from "./support.mjs";
+
+// A scene of some ten seconds in fixed small steps, and a sweep of it over 400 points.
+const slow = async (daemon, changes = {}) => ({ ...(await daemon.example("paper_sine_aluminium")), title: "A slow one", duration: 400,
+  sample_rate: 100, output: { channels: [], psd: null }, accuracy: { solver: "rk4", step: 1e-5 }, ...changes });
+const sweep = { kind: "sweep", axes: [{ pointer: "/dampers/0/clearance", from: 0.01, to: 0.02, count: 400 }] };
+const submit = (daemon, scene) => daemon.ask("POST", "/v1/jobs", scene, { Prefer: "respond-async" });
+const state = async (daemon, id) => (await daemon.get(`/v1/jobs/${id}`)).status;
+
+test("A long sweep shows how far it is and its rows, and a click cancels it", async ({ page, daemon, url }) => {
+  const { id } = await submit(daemon, await slow(daemon, { title: "A long sweep", duration: 20, study: sweep }));
+  await page.goto(url(`#/jobs/${id}`));
+  await says(page.getByRole("heading", { level: 1 }), /A long sweep/);
+  await says(page.getByText(/% after/), /\d %? ?after .* left/);
+  assert.ok((await page.getByRole("progressbar").evaluate((bar) => bar.position)) > 0);
+  await page.getByText("As a table").first().waitFor();
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await says(page.getByRole("main"), /Cancelled[\s\S]*Ended after/);
+  assert.equal(await state(daemon, id), "dismissed");
+  assert.equal(await page.getByRole("button", { name: "Cancel" }).count(), 0);
+  const change = page.getByRole("link", { name: "Change the scene" });
+  await until("the focus to go on to the link", () => change.evaluate((node) => node === document.activeElement));
+  await page.keyboard.press("Enter");
+  await leads(page, /#\/scene\?job=j-/);
+  await says(page.getByRole("heading", { level: 1 }), /./);
+});
+
+test("Runs are found by title, state and study, by a URL too, and one is cancelled by keyboard", async ({ page, daemon, url, newPage }) => {
+  await daemon.run("paper_free_sponge");
+  await daemon.run("compare_sponge");
+  const { id } = await submit(daemon, await slow(daemon));
+  await page.goto(url("#/jobs"));
+  await page.getByRole("link", { name: /sponge/ }).first().waitFor();
+  await page.getByRole("combobox", { name: "Study" }).selectOption("compare");
+  await until("the comparison alone", async () => (await page.getByRole("row").count()) === 2);
+  await page.getByRole("combobox", { name: "Study" }).selectOption("");
+  await page.getByLabel("Title or label").fill("slow");
+  await leads(page, /q=slow/);
+  await until("the slow one alone", async () => (await page.getByRole("row").count()) === 2);
+  const other = await newPage();
+  await other.goto(page.url());
+  await other.getByRole("link", { name: "A slow one" }).waitFor();
+  assert.equal(await other.getByRole("row").count(), 2);
+  await tabTo(page, page.getByRole("button", { name: "Cancel A slow one" }));
+  await page.keyboard.press("Enter");
+  await page.getByRole("cell", { name: "Cancelled" }).waitFor();
+  assert.equal(await state(daemon, id), "dismissed");
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), "A slow one");
+});
+
+test("A page of many runs leads to the older ones and back", async ({ page, daemon, url }) => {
+  const scene = await daemon.example("paper_free_sponge");
+  for (let number = 0; number < 25; number++) await daemon.run(scene, { title: `Run ${number}.` });
+  await page.goto(url("#/jobs"));
+  await page.getByRole("link", { name: "Run 24." }).waitFor();
+  await page.getByRole("link", { name: "Older runs" }).click();
+  await page.getByRole("link", { name: "Run 4." }).waitFor();
+  await page.goBack();
+  await page.getByRole("link", { name: "Run 24." }).waitFor();
+});
+
+test("A run that fails says why", async ({ page, daemon, url }) => {
+  const scene = await daemon.example("paper_free_sponge");
+  const axes = [{ pointer: "/dampers/0/clearance", values: [0.02, 0.01, 0.02] },
+    { pointer: "/dampers/0/position", from: 0, to: 0.006, count: 3000 }];
+  const { id } = await submit(daemon, { ...scene, study: { kind: "sweep", axes } });
+  await page.goto(url(`#/jobs/${id}`));
+  await says(page.getByRole("alert"), /must be between the stops/);
+  await page.getByRole("link", { name: "Change the scene" }).waitFor();
+});
+
+test("A run's page outlasts a daemon that starts anew, and ends at the result", async ({ page, daemon, url, refused }) => {
+  refused(0, 503);
+  const { id } = await submit(daemon, await slow(daemon, { duration: 60 }));
+  await page.goto(url(`#/jobs/${id}`));
+  await says(page.getByRole("main"), /% after/);
+  await daemon.stop();
+  await says(page.getByRole("main"), /does not answer/);
+  await daemon.start();
+  await until("the result", () => /#\/results\/r-/.test(page.url()), 60000);
+  await page.getByRole("heading", { level: 1 }).waitFor();
+});

@@ -1,0 +1,81 @@
+// What studies found: each kind's sentence, pictures with their tables, and the way from a point to its run.
+import assert from "node:assert/strict";
+import { axe, leads, overflow, says, tabTo, test, until } from "./support.mjs";
+
+const open = async (page, daemon, url, name, query = "") => {
+  const { result } = await daemon.run(name);
+  await page.goto(url(`#/results/${result}${query}`));
+  return page.getByRole("main");
+};
+
+test("A sweep's map: a cell tells its number, a click opens its point, the point runs", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "sweep_clearance_buffer", "?metric=peak_contact_force");
+  await says(main, /2\.277 N at buffer sponge@1, clearance 2 mm to 566\.1 N at buffer aluminium@1, clearance 28 mm/);
+  const cells = page.getByRole("grid", { name: "Peak contact force: buffer up, clearance across" }).getByRole("row", { name: /sponge/ }).getByRole("gridcell");
+  await cells.nth(25).hover();
+  await says(main, /buffer sponge@1, clearance 27 mm: \d/);
+  await cells.last().click();
+  await says(main, /Point 26\s+Buffer\s+sponge@1\s+Clearance\s+28 mm/);
+  await leads(page, /point=26/);
+  await page.getByRole("button", { name: "Run this point" }).click();
+  await leads(page, /#\/results\/r-\w+$/);
+});
+
+test("A sweep's map by keyboard, and its URL gives the same point again", async ({ page, daemon, url, newPage }) => {
+  const main = await open(page, daemon, url, "sweep_clearance_buffer");
+  const grid = page.getByRole("grid", { name: /RMS displacement:/ });
+  await tabTo(page, grid.locator("[tabindex='0']"));
+  for (const key of ["ArrowRight", "ArrowUp"]) await page.keyboard.press(key);
+  await says(main, /buffer soft_rubber@1, clearance 3 mm: /);
+  await page.keyboard.press("Enter");
+  await says(main, /Point 28/);
+  assert.deepEqual(await axe(page), []);
+  const other = await newPage({ viewport: { width: 360, height: 800 }, colorScheme: "dark" });
+  await other.goto(page.url());
+  await says(other.getByRole("main"), /Point 28\s+Buffer\s+soft_rubber@1/);
+  assert.equal(await overflow(other), 0);
+});
+
+test("A sweep over one number is lines, whose points open", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "sweep_frequency");
+  await says(main, /12\.09 mm at excitation frequency 3\.819 Hz/);
+  await page.getByText("All points as a table").click();
+  await page.getByRole("table", { name: "61 points" }).getByRole("button", { name: "28", exact: true }).click();
+  await says(main, /Point 28\s+Excitation frequency\s+3\.819 Hz/);
+});
+
+test("Points that fail are told with their reason, and can be made again", async ({ page, daemon, url }) => {
+  const job = await daemon.run("paper_free_sponge", { accuracy: { solver: "rk4", step: 0.001 },
+    study: { kind: "sweep", axes: [{ pointer: "/dampers/0/buffer", values: ["sponge", "aluminium"] }], metrics: ["rms_displacement"] } });
+  await page.goto(url(`#/results/${job.result}`));
+  await says(page.getByRole("main"), /1 failed[^]*1 from point 1 on: rk4 is unstable/);
+  await page.getByRole("button", { name: "Make the failed ones again" }).click();
+  await leads(page, /#\/(jobs|results)\//);
+});
+
+test("The trade of error against cost names what to take, and a way leads into the scene", async ({ page, daemon, url }) => {
+  const main = page.getByRole("main");
+  const job = await daemon.run("paper_free_sponge", { study: { kind: "tradeoff", repeats: 1, solvers: ["exact", "rk4"] } });
+  await page.goto(url(`#/results/${job.result}`));
+  await says(main, /Take exact\./);
+  await says(main, /cheapest that keeps displacement within 0\.001/);
+  assert.match(await until("a link with the way", () => page.getByRole("link", { name: "rk4, step 0.0001 s" }).getAttribute("href").then((href) => /s=/.test(href) && href)), /#\/scene\?s=/);
+  assert.match(await until("a link with the scene", () => page.getByRole("link", { name: "Use it in the scene" }).getAttribute("href").then((href) => /s=/.test(href) && href)), /#\/scene\?s=/);
+});
+
+test("Many seeds: how many were enough, bands of mean and runs, the seed of the largest is in the scene", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "ensemble_random_sponge");
+  await says(main, /44 of 200 runs keep the mean of RMS displacement within 0\.05/);
+  await says(page.getByRole("figure", { name: "Spectrum of the mean acceleration" }), /mean, 95 %/);
+  assert.deepEqual(await axe(page), []);
+  await page.getByRole("link", { name: "seed 44" }).first().press("Enter");
+  await leads(page, /#\/scene/);
+});
+
+test("Errors of the buffers: bands, settled slopes and those that are none, k_b and c_b", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "sensitivity_sponge");
+  await says(main, /peak contact force from 5\.04 N to 6\.73 N \(stated 5\.72 N\)/);
+  await says(page.getByRole("table", { name: /Slopes/ }), /not settled/);
+  await says(page.getByRole("table", { name: /stiffness and damping/ }), /1\.656 kN\/m ± 20\.1 %/);
+  assert.deepEqual(await axe(page), []);
+});

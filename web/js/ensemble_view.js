@@ -1,0 +1,22 @@
+// A study of kind "ensemble": many seeds of one random base, their means with confidence, and their spread.
+import { table } from "./dom.js";
+import { plot } from "./plot.js";
+import { between, lesson, plain, sceneLink, spectrum, spread } from "./study_bits.js";
+import { number, quantity, words } from "./units.js";
+
+export function show(host, { result: { scene, study } }) {
+  const { made, failed, failures, target, trust } = study, sure = `mean, ${number(study.confidence * 100, 2)} %`;
+  host.append(lesson(target ? `${target.is_kept ? "" : "Not kept: "}${words(target.why)}.` : `${made} runs were made.`,
+    `${trust.whole} of ${made} paths are right to their ends, ${trust.beyond} outlast what rounding lets be known.`,
+    failed > 0 && `${failed} runs failed and count in nothing: ${failures[0].detail}`));
+  for (const { channel, unit, mean, low, high } of study.spectra) {
+    const most = mean.indexOf(Math.max(...mean)), band = { label: sure, color: 2, low, high };
+    plot(host, { ...spectrum(channel, unit), at: study.frequency, series: [...(low ? [band] : []), { label: "mean", y: mean }],
+      summary: `The mean is largest at ${quantity(study.frequency[most], "Hz", 3)}: ${quantity(mean[most], unit, 3)}.` });
+  }
+  const seeded = (seed) => sceneLink(`seed ${seed}`, { ...plain(scene), excitation: { ...scene.excitation, seed } });
+  host.append(table(`Each number over ${made} runs`, [...spread("Mean", "mean"),
+    { label: `The ${sure}`, numeric: true, cell: ({ low, high, unit }) => between(low, high, unit) },
+    { label: "Largest", numeric: true, cell: (one) => [quantity(one.maximum, one.unit, 3), " ", seeded(one.maximum_seed)] },
+  ], Object.entries(study.statistics).map(([metric, one]) => ({ ...one, metric })).filter(({ count }) => count > 0)));
+}

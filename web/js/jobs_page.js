@@ -1,0 +1,84 @@
+// The runs, newest first: what became of each, and a way to stop those that go on. Not one run (job_page.js).
+import { link, note, read } from "./address.js";
+import { ask, remove } from "./api.js";
+import { button, failure, fill, h, table, tell } from "./dom.js";
+import { moment, quantity, title } from "./units.js";
+
+const STATES = { accepted: "Waiting", running: "Running", successful: "Done", failed: "Failed", dismissed: "Cancelled" };
+const COLOURS = { running: "warn", successful: "ok", failed: "bad" };
+const KINDS = ["none", "compare", "sensitivity", "tradeoff", "sweep", "ensemble"];
+const AGAIN_MS = 1500; // between looks at what goes on
+
+export const isOpen = (job) => job.status === "accepted" || job.status === "running";
+export const badge = ({ status }) => h("span", { class: `badge ${COLOURS[status] ?? ""}` }, STATES[status]);
+export const named = (job) => job.title ?? `A ${job.study ?? "run"} without a title`;
+
+export const page = {
+  title: () => "Runs",
+  show(host) {
+    let last = "", isAgain = false;
+    const list = h("div", { class: "runs" }, "Loading …");
+    const choice = (values) => h("select", null, h("option", { value: "" }, "All"),
+      values.map((value) => h("option", { value }, STATES[value] ?? title(value))));
+    const fields = { q: h("input", { type: "search" }), status: choice(Object.keys(STATES)), kind: choice(KINDS) };
+    const labelled = (text, field) => h("label", null, text, " ", field);
+    fill(host, h("h1", null, "Runs"),
+      h("form", { class: "row", role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
+        labelled("Title or label", fields.q), labelled("State", fields.status), labelled("Study", fields.kind)), list);
+
+    function choose() {
+      note({ ...Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])), before: null });
+      load();
+    }
+
+    async function load() {
+      const asked = location.hash, { query } = read();
+      try {
+        const response = await ask("GET", "v1/jobs", { query }), text = await response.text();
+        if (asked !== location.hash || text === last) return;
+        last = text;
+        draw(JSON.parse(text).jobs, query, /[?&]before=([^&>]+).*rel="next"/.exec(response.headers.get("Link"))?.[1]);
+      } catch (error) {
+        if (asked === location.hash) fill(list, failure(error));
+        last = "";
+        isAgain = true;
+      }
+    }
+
+    function draw(jobs, query, before) {
+      const focused = list.contains(document.activeElement) ? document.activeElement.id : "";
+      isAgain = jobs.some(isOpen);
+      fill(list, jobs.length > 0 ? table("Runs, newest first", columns, jobs)
+        : h("p", null, "There is no such run. ", h("a", { href: "#/scene" }, "Begin with a scene")),
+      before && h("a", { href: link("jobs", { ...query, before }) }, "Older runs"));
+      if (focused) (document.getElementById(focused) ?? list.querySelector("a"))?.focus({ preventScroll: true });
+    }
+
+    async function cancel(job, pressed) {
+      document.getElementById(job.id).focus();
+      pressed.disabled = true;
+      await remove(`v1/jobs/${job.id}`).then(() => tell(`Cancelled: ${named(job)}`), (error) => pressed.after(failure(error)));
+      load();
+    }
+    const target = (job) => (job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`);
+    const columns = [
+      { label: "Run", cell: (job) => [h("a", { id: job.id, href: link(target(job)) }, named(job)), " ",
+        isOpen(job) && button("Cancel", ({ target }) => cancel(job, target),
+          { id: `stop-${job.id}`, "aria-label": `Cancel ${named(job)}` })] },
+      { label: "State", cell: badge },
+      { label: "Study", cell: (job) => job.study && title(job.study) },
+      { label: "Submitted", cell: (job) => moment(job.created) },
+      { label: "Took", numeric: true, cell: (job) => (job.cached ? "known already" : isOpen(job) ? `${Math.floor(job.progress)} %`
+        : quantity(job.timing.run, "s", 2)) },
+    ];
+
+    function follow() {
+      const { query } = read();
+      for (const [name, field] of Object.entries(fields)) field.value = query[name] ?? "";
+      load();
+    }
+    follow();
+    const timer = setInterval(() => isAgain && !document.hidden && load(), AGAIN_MS);
+    return { change: follow, leave: () => clearInterval(timer) };
+  },
+};

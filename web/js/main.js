@@ -1,0 +1,106 @@
+// Which page is shown, and what stands around it: navigation, theme, token.
+import { read } from "./address.js";
+import { get, onUnauthorised, setToken, token } from "./api.js";
+import { failure, fill, h, tell } from "./dom.js";
+
+// A module's `page` is {title(address), show(host, address)}; show may return, or promise, {change(address)?, leave()?}: for
+// a new query on the same path, and for the end.
+const pages = [
+  [/^(scene)?$/, "scene"], [/^jobs$/, "jobs"], [/^jobs\/[^/]+$/, "job", "jobs"], [/^results\/[^/]+$/, "result", "jobs"],
+  [/^compare$/, "compare"], [/^materials$/, "materials"], [/^materials\/[^/]+$/, "material", "materials"],
+  [/^materials\/[^/]+\/measure$/, "measure", "materials"], [/^records$/, "records"],
+  [/^records\/[^/]+$/, "record", "records"], [/^shell$/, "shell"],
+]; // a pattern of the path, the module's name before "_page.js", the link in the navigation where it is another
+
+const main = document.getElementById("main");
+let shown = null, turn = 0; // {path, controller: promise}
+
+async function show() {
+  const address = read(), path = address.path.join("/");
+  if (shown !== null && shown.path === path) {
+    const controller = await shown.controller.catch(() => null);
+    if (controller?.change) return void controller.change(address);
+  }
+  const mine = ++turn;
+  shown?.controller.then((controller) => controller?.leave?.(), () => {});
+  const [, name, within = name] = pages.find(([pattern]) => pattern.test(path)) ?? [];
+  for (const anchor of document.querySelectorAll("#pages a"))
+    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within}` ? "page" : null;
+  const isFirst = shown === null, { promise: controller, resolve: settle } = Promise.withResolvers();
+  shown = { path, controller };
+  try {
+    if (!name) throw new Error(`There is no page "${path}" here.`);
+    const { page } = await import(`./${name}_page.js`);
+    if (mine !== turn) return settle(null);
+    const title = page.title(address);
+    document.title = `${title} · impactd`;
+    const host = h("div", { class: "page" });
+    fill(main, host);
+    if (!isFirst) {
+      scrollTo(0, 0);
+      main.focus({ preventScroll: true });
+      tell(title);
+    }
+    settle(await page.show(host, address));
+  } catch (error) {
+    settle(null);
+    if (mine === turn && error.name !== "AbortError") {
+      if (main.querySelector(".page h1") === null) fill(main, h("h1", null, "This page could not be shown"));
+      main.append(failure(error));
+    }
+  }
+}
+
+// The theme: the system's until the reader chooses.
+const themeButton = document.getElementById("theme");
+const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)");
+const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
+function setTheme(theme) {
+  if (theme) root.dataset.theme = theme;
+  themeButton.textContent = isDark() ? "Light" : "Dark";
+  themeButton.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
+  dispatchEvent(new Event("themechange")); // plots draw themselves anew
+}
+themeButton.addEventListener("click", () => {
+  setTheme(isDark() ? "light" : "dark");
+  localStorage.setItem("impactd.theme", root.dataset.theme);
+});
+system.addEventListener("change", () => setTheme());
+setTheme(localStorage.getItem("impactd.theme"));
+
+// The token, asked for where the service wants one, kept until the tab is closed.
+const tokenButton = document.getElementById("token");
+let asking = null;
+function askToken() {
+  asking ??= new Promise((resolve) => {
+    const input = h("input", { type: "password", autocomplete: "off", required: true });
+    const button = (text, value) => h("button", { value, formnovalidate: true }, text);
+    const dialog = h("dialog", { onclose }, h("form", { method: "dialog" }, h("h2", null, "A token is asked for"),
+      h("p", null, "Whoever runs this service makes one with ", h("code", null, "impactd token create"), "."),
+      h("label", null, "Token ", input), h("div", { class: "row" }, h("button", { class: "primary", value: "use" }, "Use it"),
+        button("Not now", ""), token() && button("Forget the one in use", "forget"))));
+    function onclose() {
+      const isUsed = dialog.returnValue === "use";
+      if (dialog.returnValue) setToken(isUsed ? input.value.trim() : "");
+      tokenButton.hidden = !token();
+      dialog.remove();
+      asking = null;
+      resolve(isUsed);
+    }
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+  return asking;
+}
+onUnauthorised(askToken);
+tokenButton.hidden = !token();
+tokenButton.addEventListener("click", () => askToken().then(show));
+
+document.getElementById("skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  main.focus();
+});
+addEventListener("hashchange", show);
+show();
+get("version").then(({ version, engine }) =>
+  (document.getElementById("version").textContent = `impactd ${version}, engine ${engine}`), () => {});

@@ -1,0 +1,65 @@
+// One material: what is known of it and how surely, its drop tests, and how it came to be said. Drop tests are entered on
+// measure_page.js.
+import { link } from "./address.js";
+import { get, schema } from "./api.js";
+import { figures, fill, folded, h, table } from "./dom.js";
+import { writeForm } from "./material_form.js";
+import { badge, differences, FIGURES, panel, path, readMaterial, shown, STATUS } from "./material_parts.js";
+import { moment, title } from "./units.js";
+
+const to = (text, page, query, kind) => h("a", { href: link(`materials/${page}`, query), class: kind }, text);
+const byWhom = ({ author, reviewer, created }) => `${author ?? reviewer ?? "the local user"}, ${moment(created)}`;
+
+function facts(material, properties) {
+  const others = Object.keys(properties).filter((name) => !/^(name|comment|measurem|table|restitution|contact_time)/.test(name));
+  const pairs = [...FIGURES.map(({ label, cell }) => [label, cell(material)]),
+    ...others.map((name) => [title(name), shown(material[name], properties[name]["x-unit"])])];
+  return panel("What is known", figures(pairs.filter(([, value]) => value !== "–")),
+    h("p", { class: "hint" }, "± is one standard deviation; a drop test gives it."),
+    material.table?.length > 0 && table("Over approach speed",
+      [{ label: "Speed", value: (row) => shown(row.approach_speed, "m/s") }, ...FIGURES], material.table));
+}
+
+// What can be written of it: a review; a revision, from what it says without what it does not.
+function changes(material, properties) {
+  const known = JSON.parse(JSON.stringify(material, (_, value) => (value === null || value.length === 0 ? undefined : value)));
+  const { comment, ...said } = Object.fromEntries(Object.keys(properties).map((name) => [name, known[name]]));
+  return panel("Review and change",
+    folded("Approve or deprecate it", () => writeForm("material_review", { status: "approved" }, "Review it", material,
+      `@${material.revision}/review`), material.status === "draft"),
+    folded("Change what it says", () => writeForm("material_revision", said, "Make it a revision", material, "/revisions")));
+}
+
+const tests = (slug, { count, measurements }) => panel("Drop tests", h("p", null, `Kept here: ${count}`),
+  h("ul", null, measurements.map(({ measurement, drops, traces, ...one }) => h("li", null,
+    to(`Test ${measurement}`, `${slug}/measure`, { measurement }), `, ${byWhom(one)}, drops: ${drops}, traces: ${traces}`))));
+
+// What changed since the revision that is shown, or since the one before the newest, and the way back to it.
+async function history(material, revisions) {
+  const { slug, revision, latest } = material;
+  return panel("Revisions", table("The newest first", [
+    { label: "Revision", cell: ({ revision }) => to(`Revision ${revision}`, slug, { revision }) }, ...FIGURES, STATUS,
+    { label: "Why", value: (row) => `${row.comment} (${byWhom(row)})` },
+    { label: "Review", value: ({ review }) => review && `${review.reason} (${byWhom(review)})` },
+  ], revisions),
+  latest > 1 && await differences(slug, Math.min(revision, latest - 1), latest),
+  revision < latest
+    && await writeForm("material_revert", { to: revision, comment: `as revision ${revision}` }, "Revert", material, "/revert"));
+}
+
+export const page = {
+  title: ({ path: [, slug] }) => slug,
+  async show(host, { path: [, slug], query }) {
+    const list = (part) => get(path(slug, part), { limit: 100 });
+    const [material, { revisions }, measured, { properties }] = await Promise.all([readMaterial(slug, query.revision),
+      list("/revisions"), list("/measurements"), schema("material_revision")]);
+    const { revision, latest, status, name } = material, buffer = `${slug}@${revision}`;
+    fill(host, h("h1", null, name, " ", badge(status)),
+      h("p", { class: "quiet" }, h("code", null, buffer), ` of ${latest}. Scenes without a revision take the newest approved.`),
+      h("div", { class: "row" }, h("a", { href: link("scene", { buffer }), class: "button" }, "Simulate with it"),
+        to("Enter a drop test", `${slug}/measure`, {}, "button")),
+      h("div", { class: "columns" }, facts(material, properties),
+        h("div", null, changes(material, properties), tests(slug, measured))),
+      await history(material, revisions));
+  },
+};

@@ -1,0 +1,121 @@
+// A scene: described at the left, drawn at the right, run from here. The first thing that people see.
+import { accuracyWidget } from "./accuracy.js";
+import { go } from "./address.js";
+import { check, schema, submit } from "./api.js";
+import { button, failure, faults, fill, h } from "./dom.js";
+import { makeDraft } from "./draft.js";
+import { drawing } from "./drawing.js";
+import { examplesDialog } from "./examples.js";
+import { focusField } from "./form.js";
+import { outcome, places } from "./outcome.js";
+import { bufferWidget } from "./picker.js";
+import { recordWidget } from "./record_widget.js";
+import { sceneForm } from "./scene_form.js";
+import { keep, open, sponge } from "./scene_state.js";
+
+const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/, recordWidget], [/^\/accuracy$/, accuracyWidget]];
+
+// The scene as text to edit, in step with the form while it is not typed in.
+function jsonView(draft) {
+  const name = "The scene as JSON", fault = h("p", { class: "fault", role: "status" });
+  const area = h("textarea", { class: "code", rows: "28", spellcheck: "false", "aria-label": name, oninput() {
+    fault.textContent = "";
+    try {
+      draft.replace(Object.assign({}, JSON.parse(area.value)));
+    } catch (error) {
+      fault.textContent = `No scene yet: ${error.message}`; // browsers name the line
+    }
+  } });
+  const element = h("details", { class: "panel" }, h("summary", null, h("h2", null, name)), fault, area);
+  return { element, refresh() {
+    if (document.activeElement === area) return;
+    fault.textContent = "";
+    area.value = JSON.stringify(draft.scene, null, 2);
+  } };
+}
+
+async function show(host, address) {
+  const stop = new AbortController(), { signal } = stop, draft = makeDraft(sponge(), signal), json = jsonView(draft);
+  const steps = h("div", null, "The form is on its way …"), drawn = h("div", { class: "panel drawn" });
+  const told = h("div"), state = h("p", { class: "hint", role: "status" }), comes = h("div");
+  const run = button("Run", runScene, { class: "primary run", "aria-keyshortcuts": "Control+Enter" });
+  fill(host, h("h1", null, "Scene"),
+    h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
+      button("Examples", examplesDialog)), told,
+    h("div", { class: "scene" }, h("div", null, steps, json.element), h("div", { class: "beside" }, drawn,
+      h("div", null, h("div", { class: "row" }, run, h("span", { class: "hint" }, "Ctrl + Enter")),
+        h("div", { class: "panel" }, h("h2", null, "What it comes to"), state, comes)))));
+  const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
+  draw();
+
+  let timer = null, turn = 0, isEdited = false;
+  const goTo = (pointer) => focusField(steps, pointer);
+
+  // Keeps the scene and asks the service, by check() or submit(); only the last question's answer counts.
+  async function ask(question, answered) {
+    const mine = ++turn;
+    clearTimeout(timer);
+    timer = null;
+    try {
+      const fits = !isEdited || await keep(draft.scene, signal), answer = await question(draft.scene, signal);
+      if (mine === turn) answered(answer);
+      state.textContent = fits ? "" : "Too long for a link: copy the JSON to keep it.";
+    } catch (error) {
+      if (mine !== turn) return;
+      const { errors = [] } = error;
+      draft.say(null, errors);
+      state.textContent = "";
+      fill(comes, errors.length > 0 ? places("bad", "To be mended before it runs", errors, goTo) : failure(error));
+    }
+  }
+  function settle() {
+    state.textContent = "Being worked out …";
+    ask(check, (answer) => {
+      draft.say(answer, []);
+      outcome(comes, answer, goTo);
+      draw();
+    });
+  }
+  draft.onChange(({ pointer }) => {
+    if (pointer === undefined) return;
+    isEdited = true;
+    draw();
+    json.refresh();
+    clearTimeout(timer);
+    timer = setTimeout(settle, 250); // ms without a change
+  });
+
+  async function runScene() {
+    if (run.ariaBusy === "true") return;
+    run.ariaBusy = "true"; // not disabled: it keeps the focus
+    state.textContent = "Running …";
+    await ask(submit, ({ id, status, result }) => go(status === "successful" ? `results/${result}` : `jobs/${id}`));
+    run.ariaBusy = "false";
+    comes.querySelector(".bad")?.focus();
+  }
+  addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;
+    event.preventDefault();
+    runScene();
+  }, { signal });
+  steps.addEventListener("change", () => timer && settle()); // leaving a field keeps it before a link is followed
+
+  async function load(query) {
+    fill(told);
+    draft.replace(await open(query, signal).catch((error) => faults(told)(error) ?? sponge()));
+    isEdited = false;
+  }
+  Promise.all([schema("scene"), load(address.query)]).then(([scene]) => {
+    fill(steps);
+    sceneForm(steps, { schema: scene, draft, widgets });
+  }).catch(faults(steps));
+  return {
+    change: ({ query }) => load(query),
+    leave() {
+      clearTimeout(timer);
+      stop.abort();
+    },
+  };
+}
+
+export const page = { title: () => "Scene", show };

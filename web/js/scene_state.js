@@ -1,0 +1,46 @@
+// Which scene the page begins with, and where it is kept: in the URL.
+import { link, pack, read, unpack } from "./address.js";
+import { get } from "./api.js";
+
+// The paper's structure and ball between two sponges: there before anything is fetched.
+export const sponge = () => ({
+  title: "The paper's sponge, released from 15 mm",
+  structure: { mass: 1.35, stiffness: 865, damping: 1.092 },
+  dampers: [{ mass: 0.1107, clearance: 0.015, buffer: "sponge" }],
+  excitation: { kind: "free", displacement: 0.015 },
+  duration: 10, sample_rate: 1000,
+});
+
+// The scene that the query asks for.
+export async function open({ s, example, result, job, buffer, record }, signal) {
+  const { title, ...scene } = sponge();
+  const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`, undefined, signal);
+  if (s) return unpack(s).catch(() => Promise.reject(new Error("The scene in this link cannot be read. Was it cut off?")));
+  if (example) return ask("examples", example);
+  if (result) return typical((await ask("results", result)).scene);
+  if (job) return typical(await ask("jobs", job, "/scene"));
+  if (buffer) return { ...scene, dampers: [{ ...scene.dampers[0], buffer }] };
+  if (record) return { ...scene, excitation: { kind: "record", name: record },
+    duration: Math.ceil((await ask("records", record)).duration) || 1 };
+  return sponge();
+}
+
+export const storeysOf = ({ structure } = {}) => [structure?.masses ?? structure?.mass].flat().length;
+
+// A scene that was run as one would type it: materials by name, the usual channels unsaid. It is the same scene.
+function typical(scene) {
+  const { dampers = [], output, study = {} } = scene, { channels } = output;
+  for (const damper of dampers) for (const name in damper) damper[name] = damper[name].material ?? damper[name];
+  if (channels.length === 3 * storeysOf(scene) + 2 * dampers.length
+    && /^(displacement|velocity|acceleration|damper_displacement|contact_force|_\d+|,)*$/.test(channels)) delete output.channels;
+  delete study.materials;
+  delete study.records;
+  return scene;
+}
+
+// Keeps a scene in the URL of its page; false where it is too long for one.
+export async function keep(scene, signal) {
+  const s = await pack(scene), fits = s.length <= 100000;
+  if (!signal.aborted && /^(scene)?$/.test(read().path.join())) history.replaceState(null, "", link("scene", fits ? { s } : {}));
+  return fits;
+}

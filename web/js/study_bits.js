@@ -1,0 +1,51 @@
+// What the views of studies and comparisons share: ways to scenes and runs, pieces of text and tables.
+import { go, link, pack } from "./address.js";
+import { failure, h } from "./dom.js";
+import { quantity, title, words } from "./units.js";
+
+// The scene alone, without its study.
+export const plain = ({ study, ...scene }) => scene;
+
+// A link to the form with this scene, which is in the URL.
+export function sceneLink(label, scene) {
+  const anchor = h("a", { href: "#/scene" }, label);
+  pack(scene).then((packed) => (anchor.href = link("scene", { s: packed })));
+  return anchor;
+}
+
+// A button that makes a job and goes to its result, or to the job while it runs.
+export function jobButton(label, make) {
+  const act = () => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
+    (error) => button.after(failure(error)));
+  const button = h("button", { type: "button", onclick: act }, label);
+  return button;
+}
+
+export const lesson = (...texts) => h("div", { class: "notice" }, texts.filter(Boolean).map((text) => h("p", null, text)));
+export const column = (label, unit, value) => ({ label, numeric: true, value, cell: (row) => quantity(value(row), unit) });
+export const between = (low, high, unit) => `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
+export const told = (value, unit) => (typeof value === "number" ? quantity(value, unit)
+  : typeof value === "string" ? value : value ? JSON.stringify(value).slice(0, 80) : "–");
+
+// Columns for rows {metric, unit, q05, q95, …}: the metric, its value of this name, where 90 of 100 runs are.
+export const spread = (label, name) => [{ label: "Number", value: ({ metric }) => title(metric) },
+  { label, numeric: true, cell: (row) => quantity(row[name], row.unit) },
+  { label: "5 to 95 %", numeric: true, cell: ({ q05, q95, unit }) => between(q05, q95, unit) }];
+
+// A bar from one number to another within a range, beside numbers in a table.
+export function strip([low, high], [[from, to]]) {
+  const part = (size) => `${high > low ? (100 * size) / (high - low) : 0}%`;
+  return h("div", { class: "strip", "aria-hidden": "true" },
+    h("span", { style: { left: part(Math.min(from, to) - low), width: part(Math.abs(to - from)) } }));
+}
+
+// [smallest, largest] of the numbers among values.
+export function extent(values) {
+  let low = Infinity, high = -Infinity;
+  for (const value of values) if (typeof value === "number") [low, high] = [Math.min(low, value), Math.max(high, value)];
+  return [low, high];
+}
+
+// What plot() wants for a spectrum.
+export const spectrum = (channel, unit) => ({ title: `Spectrum of the ${words(channel)}`, height: 300,
+  x: { label: "Frequency", unit: "Hz", log: true }, y: { label: "Density", unit, log: true } });
