@@ -19,7 +19,7 @@ async function show(host, context) {
   if (!ledger.isListed || total === 0) return host.append(`No impact is listed; there were ${number(count)}.`);
   const choose = (nth) => context.change({ impact: Math.min(total, Math.max(1, nth)) }, true);
   const field = h("input", { type: "number", min: 1, max: total, onchange: () => choose(field.value) });
-  const step = (by) => () => choose(Number(field.value) + by), one = h("div"), all = h("div");
+  const step = (by) => () => choose((Number(context.view.impact) || shown?.number || 1) + by), one = h("div"), all = h("div");
   fill(host, h("div", { class: "row" }, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
     button("Next →", step(1)), button("See it in the series", see)), one, all);
   const columns = [

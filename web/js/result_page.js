@@ -73,8 +73,10 @@ export const page = {
       const inner = h("div"), part = { faults: h("div") };
       host.append(h("section", { class: "panel", id: section.id, "aria-labelledby": `${section.id}-title` },
         h("h2", { id: `${section.id}-title` }, section.title), part.faults, inner));
+      const { view } = context;
       part.controller = await attempt(part, () => section.show(inner, context));
       context.parts.push(part);
+      if (context.view !== view) context.follow(context.view); // it changed meanwhile
     });
     await Promise.all(shown);
     return {
