@@ -33,14 +33,14 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
 
   async function measure() {
     const asked = JSON.stringify(study());
-    job = submit(study(), draft.signal);
+    job = submit(study());
     fill(news, "Every solver runs this scene …");
     refresh();
     try {
       const now = await follow((await job).id, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
       fill(news, now.status !== "successful" && (now.problem?.detail ?? "Cancelled: nothing was measured."));
       if (now.status === "successful") {
-        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`, null, draft.signal));
+        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`));
         measured = asked;
         whole.href = link(`results/${now.result}`);
       }

@@ -2,30 +2,23 @@
 import { go, link, note, read, swap } from "./address.js";
 import { get } from "./api.js";
 import { differing, numbers, spectra } from "./beside.js";
-import { faults, fill, h } from "./dom.js";
+import { faults, fill, h, hint, panel } from "./dom.js";
 import { plot } from "./plot.js";
 import { between, extent, lesson, told } from "./study_bits.js";
 import { brief, moment, number, quantity, title, words } from "./units.js";
 
 const LETTERS = [..."abcd"];
+const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
 const lettered = (ids) => Object.fromEntries(LETTERS.map((letter, at) => [letter, ids[at]]));
 
 export const page = {
   title: () => "Compare",
-  show(host, address) {
-    let stop = new AbortController(), shown = null, motion = null;
-    const chooser = h("form", { class: "panel" }), body = h("div");
+  show(host, { query }) {
+    const ids = idsOf(query), chooser = h("form", { class: "panel" }), body = h("div", null, "Loading …");
+    let motion = null;
     fill(host, h("h1", null, "Compare"), chooser, body);
-    function change({ query }) {
-      const ids = LETTERS.map((letter) => query[letter]).filter(Boolean);
-      if (shown === ids.join()) return motion?.(query);
-      stop.abort();
-      [stop, shown, motion] = [new AbortController(), ids.join(), null];
-      fill(body, "Loading …");
-      return load(ids, stop.signal).catch(faults(body));
-    }
-    async function load(ids, signal) {
-      const { jobs } = await get("v1/jobs", { status: "successful", kind: "none", limit: 100 }, signal);
+    async function load() {
+      const { jobs } = await get("v1/jobs", { status: "successful", kind: "none", limit: 100 });
       const names = new Map(jobs.filter((job) => job.result).map((job) =>
         [job.result, `${job.title ?? brief(job.result)}, ${moment(job.finished)}`]));
       if (ids.length === 0 && names.size > 1) return swap("compare", lettered([...names.keys()].slice(0, 2).reverse()));
@@ -37,16 +30,16 @@ export const page = {
         ids[at] && h("a", { href: link(`results/${ids[at]}`) }, "Open"))),
       h("button", { class: "primary" }, "Compare"));
       if (ids.length < 2) return void fill(body, "Choose two results or more to see what differs.");
-      motion = await compare(body, await Promise.all(ids.map((id, at) => run(id, at, signal))), signal);
+      motion = await compare(body, await Promise.all(ids.map(run)));
     }
-    change(address);
-    return { change, leave: () => stop.abort() };
+    load().catch(faults(body));
+    return { change: (next) => `${idsOf(next.query)}` === `${ids}` && void motion?.(next.query) };
   },
 };
 
 // A result with its spectrum and its first impact, where there are such.
-async function run(id, at, signal) {
-  const load = (name) => get(`v1/results/${encodeURIComponent(id)}${name}`, undefined, signal);
+async function run(id, at) {
+  const load = (name) => get(`v1/results/${encodeURIComponent(id)}${name}`);
   const result = await load(""), { links, plan, summary } = result;
   const hasForce = links.impacts && summary.impacts > 0 && plan.contact_model !== "impulse";
   const [psd, impact] = await Promise.all([links.psd && load("/psd.json"), hasForce && load("/impacts/1/force.json")]);
@@ -55,9 +48,9 @@ async function run(id, at, signal) {
 }
 
 // Shows them -> what follows the query.
-async function compare(host, runs, signal) {
+async function compare(host, runs) {
   const [first, ...others] = runs, inputs = new Map();
-  const pairs = await Promise.all(others.map((other) => get("v1/compare", { a: first.id, b: other.id }, signal)));
+  const pairs = await Promise.all(others.map((other) => get("v1/compare", { a: first.id, b: other.id })));
   pairs.forEach((pair, at) => pair.inputs.forEach(({ pointer, a, b }) =>
     inputs.set(pointer, (inputs.get(pointer) ?? runs.map(() => a)).with(at + 1, b))));
   // A run is called by the first word that differs, else by the first number.
@@ -66,18 +59,17 @@ async function compare(host, runs, signal) {
   const name = isWord(telling) ? "" : words(telling[0].split("/").at(-1));
   runs.forEach((one, at) => (one.label = ["ABCD"[at], name, told(telling[1][at])].filter(Boolean).join(" ")));
   const push = h("div"), motion = h("div"), spectrum = h("div");
-  const panel = (heading, ...content) => h("section", { class: "panel" }, h("h2", null, heading), content);
   fill(host, panel("What it comes to", lesson(...others.map((other) => pushes(first, other))),
     h("div", { class: "columns" }, push, numbers(runs, first.units, []))), panel("Motion", motion), panel("Spectra", spectrum),
   panel("Inputs", differing("Inputs that differ", runs, all.map(([input, list]) => [input, "", list])),
-    pairs.flatMap((pair) => pair.warnings).map(({ detail }) => h("p", { class: "hint" }, detail))));
+    pairs.flatMap((pair) => pair.warnings).map(({ detail }) => hint(detail))));
 
   firstImpacts(push, runs.filter((one) => one.impact?.time.values.length > 2));
   const { channel, unit } = pairs[0].psd[0] ?? {}, some = runs.filter((one) => one.psd?.channels[channel]);
   if (channel) spectra(spectrum, channel, unit, some.map((one) => ({ ...one, x: one.psd.frequency.values,
     y: one.psd.channels[channel].values, level: pairs[one.color - 2]?.psd[0]?.level })));
   else fill(spectrum, "They have no spectrum in common.");
-  return motions(motion, runs, signal);
+  return motions(motion, runs);
 }
 
 // Which of two pushes harder, and why.
@@ -105,7 +97,7 @@ function firstImpacts(host, runs) {
 }
 
 // One channel that all have over a window of time, both in the URL -> what follows it.
-async function motions(host, runs, signal) {
+function motions(host, runs) {
   const channels = runs[0].channels.filter((one) => runs.every((other) => other.channels.includes(one))), failed = h("div");
   if (channels.length === 0) return void fill(host, "They have no channel in common.");
   const end = Math.max(...runs.map((one) => one.end)), show = (changes) => (note(changes, true), follow(read().query));
@@ -118,7 +110,7 @@ async function motions(host, runs, signal) {
   async function load({ channel = channels[0], from = 0, to = end }) {
     const mine = ++turn, range = [Number(from), Number(to)], there = runs.filter((one) => from <= one.end);
     const answers = await Promise.all(there.map(({ id }) =>
-      get(`v1/results/${id}/series.json`, { channels: channel, from, to, points: 600 }, signal)));
+      get(`v1/results/${id}/series.json`, { channels: channel, from, to, points: 600 })));
     if (mine !== turn) return;
     select.value = channel;
     const { unit } = answers[0].channels[channel];
@@ -130,6 +122,6 @@ async function motions(host, runs, signal) {
     fill(failed);
   }
   const follow = (query) => load(query).catch(faults(failed));
-  await follow(read().query);
+  follow(read().query);
   return follow;
 }

@@ -1,6 +1,6 @@
 // A study of kind "compare": contact models over one scene, beside the scene's own run, which is the first.
 import { numbers, spectra } from "./beside.js";
-import { h } from "./dom.js";
+import { hint } from "./dom.js";
 import { lesson } from "./study_bits.js";
 import { number, quantity, words } from "./units.js";
 
@@ -14,5 +14,5 @@ export function show(host, { result: { study, units } }) {
   host.append(numbers(runs, units, [["Mean contact", "s", (run) => run.contacts.mean_duration],
     ["Spectrum apart by", "dB", (run) => run.level], [`Parts by ${study.part * 100} %`, "s", (run) => run.divergence.time]]),
   ...study.entries.filter(({ status }) => status !== "run").map(({ name, why }) =>
-    h("p", { class: "hint" }, `Not run: ${words(name)}. ${why}`)));
+    hint(`Not run: ${words(name)}. ${why}`)));
 }

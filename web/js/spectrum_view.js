@@ -1,7 +1,7 @@
 // The power spectra of a result on log axes, others laid over them, the largest peak named. In the URL: psd (channel),
 // psd_from, psd_to (Hz), overlay (ids of results).
 import { get } from "./api.js";
-import { fill, h } from "./dom.js";
+import { fill, h, hint } from "./dom.js";
 import { plot } from "./plot.js";
 import { spectrum } from "./study_bits.js";
 import { brief, number, pretty, words } from "./units.js";
@@ -9,10 +9,10 @@ import { brief, number, pretty, words } from "./units.js";
 export const section = { id: "spectrum", title: "Spectrum", show };
 
 async function show(host, context) {
-  const { result: { id, links, plan }, signal } = context;
+  const { result: { id, links, plan } } = context;
   if (!links.psd) return host.append("The scene asked for no spectrum.");
-  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`, undefined, signal);
-  const recent = get("v1/jobs", { status: "successful", kind: "none", limit: 50 }, signal);
+  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`);
+  const recent = get("v1/jobs", { status: "successful", kind: "none", limit: 50 });
   const [psd, { jobs }] = await Promise.all([load(id), recent]), frequency = psd.frequency.values;
   const names = new Map(jobs.map(({ result, title }) => [result, title ?? brief(result)]));
 
@@ -23,7 +23,7 @@ async function show(host, context) {
   const one = list("psd", Object.keys(psd.channels), words), box = h("div");
   const others = list("overlay", [...names.keys()], (result) => names.get(result), { multiple: true, size: 4 });
   fill(host, h("label", null, "Channel ", one), h("div", null, h("label", null, "Lay over it (Ctrl for several) ", others)), box,
-    h("p", { class: "hint" }, `Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
+    hint(`Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
 
   let chart = null, wanted = "";
   async function follow(view) {
@@ -49,6 +49,7 @@ async function show(host, context) {
       lines: plan.modes.slice(0, 12).map((mode, at) => ({ x: mode.frequency, label: `mode ${at + 1}` })),
       onZoom: (left, right) => context.change({ psd_from: left, psd_to: right }, true),
     });
+    return follow(context.view); // its range may have changed meanwhile
   }
   await follow(context.view);
   return { follow };

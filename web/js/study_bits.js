@@ -1,6 +1,6 @@
 // What the views of studies and comparisons share: ways to scenes and runs, pieces of text and tables.
 import { go, link, pack } from "./address.js";
-import { failure, h } from "./dom.js";
+import { failure, h, once } from "./dom.js";
 import { quantity, title, words } from "./units.js";
 
 // The scene alone, without its study.
@@ -8,15 +8,15 @@ export const plain = ({ study, ...scene }) => scene;
 
 // A link to the form with this scene, which is in the URL.
 export function sceneLink(label, scene) {
-  const anchor = h("a", { href: "#/scene" }, label);
+  const anchor = h("a", null, label);
   pack(scene).then((packed) => (anchor.href = link("scene", { s: packed })));
   return anchor;
 }
 
 // A button that makes a job and goes to its result, or to the job while it runs.
 export function jobButton(label, make) {
-  const act = () => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
-    (error) => button.after(failure(error)));
+  const act = once(() => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
+    (error) => button.after(failure(error))));
   const button = h("button", { type: "button", onclick: act }, label);
   return button;
 }

@@ -37,8 +37,8 @@ function show(host, { result: { summary, units, id, count, sample_rate: rate, wo
 
 // Whether the service counts what comes or what goes; each part goes on where the last one ended.
 const SIGNS = { initial: 1, input: 1, structural_damping: -1, contact: -1, kinetic: -1, strain: -1 };
-async function showEnergy(host, { path, signal }) {
-  const energies = await get(`${path}/energy.json`, undefined, signal);
+async function showEnergy(host, { path }) {
+  const energies = await get(`${path}/energy.json`);
   let level = 0, whole = 0;
   const parts = Object.entries(SIGNS).filter(([name]) => energies[name] !== 0).map(([name, sign]) => {
     const flow = sign * energies[name];

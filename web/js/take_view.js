@@ -1,7 +1,6 @@
 // What a reader takes along: files in every format there is, and lines that run this very scene elsewhere.
 import { address, save } from "./api.js";
-import { copyButton } from "./copy.js";
-import { button, failure, folded, h } from "./dom.js";
+import { button, copied, failure, folded, h } from "./dom.js";
 
 export const section = { id: "take", title: "Take it along", show };
 
@@ -14,7 +13,7 @@ function show(host, { result: { id, links, scene } }) {
   // Apostrophes, which only stand in texts, are escaped: so any language can quote it.
   const text = JSON.stringify(scene, null, 2).replaceAll("'", "\\u0027"), url = address("").replace(/\/$/, "");
   host.append(h("div", { class: "row" }, files), ...Object.entries(languages(url, text)).map(([name, lines]) =>
-    folded(`Run this scene from ${name}`, () => [copyButton(lines), h("pre", { tabindex: "0" }, lines)])));
+    folded(`Run this scene from ${name}`, () => copied(lines))));
 }
 
 const languages = (url, scene) => ({
