@@ -1,4 +1,4 @@
-// One value, one control, by its schema: what is typed, and choices. Each is {element, refresh()}. Objects are form.js's.
+// One value, one control, by its schema: what is typed, and choices. Each is {element, refresh()}.
 import { fill, fresh, h, sentence } from "./dom.js";
 import { pretty, quantity, scale, words } from "./units.js";
 

@@ -1,4 +1,4 @@
-// The scene's form in the steps that one thinks in. Any schema's is form.js.
+// The scene's form in the steps that one thinks in.
 import { h } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice } from "./fields.js";
