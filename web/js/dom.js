@@ -13,8 +13,12 @@ function put(node, attributes, children) {
   return node;
 }
 
-// h("p", {class: "quiet", onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
-export const h = (tag, attributes, ...children) => put(document.createElement(tag), attributes, children);
+// h("p.quiet", {onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
+export function h(name, attributes, ...children) {
+  const [tag, ...classes] = name.split("."), node = document.createElement(tag);
+  node.classList.add(...classes);
+  return put(node, attributes, children);
+}
 
 // The same for SVG.
 export const s = (tag, attributes, ...children) => put(document.createElementNS(SVG, tag), attributes, children);

@@ -1,5 +1,5 @@
-// The impacts in the window of time as rows, and one at full detail: its force and the part of it that pulls. Which one is
-// view.impact, its number in the ledger from 1; unless that is said, the hardest of the rows.
+// The impacts in the window of time as rows, and one at full detail with the part that pulls: view.impact, its number from 1,
+// else the hardest of the rows.
 import { get } from "./api.js";
 import { button, figures, fill, h, table } from "./dom.js";
 import { plot } from "./plot.js";
@@ -20,7 +20,7 @@ async function show(host, context) {
   const choose = (nth) => context.change({ impact: Math.min(total, Math.max(1, nth)) }, true);
   const field = h("input", { type: "number", min: 1, max: total, onchange: () => choose(field.value) });
   const step = (by) => () => choose((Number(context.view.impact) || shown?.number || 1) + by), one = h("div"), all = h("div");
-  fill(host, h("div", { class: "row" }, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
+  fill(host, h("div.row", null, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
     button("Next →", step(1)), button("See it in the series", see)), one, all);
   const columns = [
     { label: "Impact", numeric: true, value: (row) => row.number, cell: ({ number: nth }) =>
@@ -43,7 +43,7 @@ async function show(host, context) {
     if (impacts !== listed) fill(all, table(`${number(here)} in this window of time${isCut ? `, here the first ${MOST}` : ""}`,
       columns, impacts, { sort: !isCut }));
     if (impact.number !== shown?.number) {
-      const box = h("div", { class: "columns" }, !force && "An impulse takes no time and has no force.");
+      const box = h("div.columns", null, !force && "An impulse takes no time and has no force.");
       fill(one, figures(columns.slice(1).map(({ label, value, cell = value }) => [label, cell(impact)])), box);
       if (force) charts(box, impact, force);
     }

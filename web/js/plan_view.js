@@ -17,7 +17,7 @@ function show(host, { result: { plan: { decisions, derived, modes }, engine } })
     h("b", null, words(chose)), `: ${why}`, value !== null && ` (${quantity(value, unit)})`,
     saving && `; saves ${share(saving, 2)}`)];
   const known = FIGURES.filter(([, key]) => derived.some((row) => row[key] !== null));
-  host.append(h("dl", { class: "decisions" }, decisions.map(decision)),
+  host.append(h("dl.decisions", null, decisions.map(decision)),
   derived.length === 0 ? "No damper." : table("Each stop, for its pair of masses", [
     { label: "Damper, stop", value: ({ damper, side }) => `${damper}, ${side}` },
     { label: "Material", cell: ({ material }) =>

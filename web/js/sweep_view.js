@@ -1,10 +1,10 @@
-// The points of a sweep that are there so far: over two axes a map, over one of numbers a line, else a table. Each opens.
+// The points of a sweep so far: over two axes a map, over one of numbers a line, else a table. Each opens.
 import { note, read } from "./address.js";
 import { get, post, submit } from "./api.js";
 import { button, figures, fill, folded, h, notice, table } from "./dom.js";
 import { heat } from "./heat.js";
 import { plot } from "./plot.js";
-import { jobButton, told } from "./study_bits.js";
+import { jobButton, sceneLink, told } from "./study_bits.js";
 import { title, words } from "./units.js";
 
 export const show = (host, { path, result: { study }, signal }) => (study.points <= 100000
@@ -53,8 +53,8 @@ export async function sweepView(host, path, { signal, job } = {}) {
     drawn = wanted;
     if (query.point !== opened) open(opened = query.point);
   }
-  const maker = async () => job ?? (await get("v1/jobs", { result: answer.result, kind: "sweep" })).jobs[0].id;
-  const retry = async () => post(`v1/jobs/${await maker()}/retry`);
+  const retry = async () =>
+    post(`v1/jobs/${job ?? (await get("v1/jobs", { result: answer.result, kind: "sweep" })).jobs[0].id}/retry`);
   function draw({ label, name, si, value, cell }, chosen) {
     const made = [...points.values()].filter((point) => value(point) !== null).sort((a, b) => value(a) - value(b));
     const ends = [made[0], made.at(-1)].filter(Boolean), [low, high] = ends.map(value), isLog = low > 0 && high > 50 * low;
@@ -66,7 +66,7 @@ export async function sweepView(host, path, { signal, job } = {}) {
     const show = (i, j, point = pointAt(i, j)) => ({ value: value(point), isChosen: `${point?.index}` === chosen,
       pick: () => pick(point),
       text: point ? `${place(point)}: ${value(point) === null ? point.status : cell(point)}` : "Not there yet" });
-    box.append(h("p", { class: "hint" }, summary), heat({ title: `${label}: ${y.name} up, ${x.name} across`,
+    box.append(h("p.hint", null, summary), heat({ title: `${label}: ${y.name} up, ${x.name} across`,
       x: x.texts, y: y.texts, ends: ends.map(cell), isLog, cell: show }));
   }
   function all() {
@@ -77,8 +77,8 @@ export async function sweepView(host, path, { signal, job } = {}) {
   function open(index) {
     const point = points.get(Number(index)), scene = answer.links.scene.replace("{index}", index);
     fill(opening, point ? [h("h3", null, `Point ${index}`), figures(fields.map(({ label, cell }) => [label, cell(point)])),
-      jobButton("Run this point", async () => submit(await get(scene)))]
-      : h("p", { class: "hint" }, "A click or Enter opens a point."));
+      jobButton("Run this point", async () => submit(await get(scene))), " ", sceneLink("Change its scene", get(scene))]
+      : h("p.hint", null, "A click or Enter opens a point."));
   }
   follow();
   return { follow, refresh: () => load().then(() => box.contains(document.activeElement) || follow()) };
