@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
-import { says, test, until } from "./support.mjs";
+import { leads, says, test, until } from "./support.mjs";
 
 const region = (page, name) => page.getByRole("region", { name, exact: true });
 
@@ -37,7 +37,7 @@ test("One impact shows how long and how hard it pulls; others are a key away, an
   await field.press("Enter");
   await says(impact, /Impact 22: force over penetration/);
   await impact.getByRole("button", { name: "See it in the series" }).click();
-  assert.match(page.url(), /from=6\.\d+&to=6\.\d/);
+  await leads(page, /from=6\.\d+&to=6\.\d/);
   await says(impact.getByRole("table"), /^1 in this window/);
 });
 

@@ -33,14 +33,14 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
 
   async function measure() {
     const asked = JSON.stringify(study());
-    job = submit(study(), draft.signal);
+    job = submit(study());
     fill(news, "Every solver runs this scene …");
     refresh();
     try {
       const now = await follow((await job).id, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
       fill(news, now.status !== "successful" && (now.problem?.detail ?? "Cancelled: nothing was measured."));
       if (now.status === "successful") {
-        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`, null, draft.signal));
+        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`));
         measured = asked;
         whole.href = link(`results/${now.result}`);
       }
@@ -66,8 +66,8 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
     slider.ariaValueText = said.textContent;
     const best = stops.filter(({ isBest }) => isBest).map(({ name }) => name).join("; ");
     lead.textContent = measured !== JSON.stringify(study()) ? "Measured on another scene."
-      : `Worth having: ${best}. The other ways err more and cost more.`;
+      : `Worth having: ${best}. All others err and cost more.`;
   }
   refresh();
-  return { element: h("div.accuracy", null, byHand, trade, h("div.row", null, act, bar), news), refresh };
+  return { element: h("div", null, byHand, trade, h("div.row", null, act, bar), news), refresh };
 }

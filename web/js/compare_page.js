@@ -2,31 +2,23 @@
 import { go, link, note, read, swap } from "./address.js";
 import { get, schema } from "./api.js";
 import { differing, numbers, partings, spectra } from "./compare_view.js";
-import { faults, fill, h } from "./dom.js";
+import { faults, fill, h, hint, panel } from "./dom.js";
 import { plot } from "./plot.js";
-import { place } from "./scene_form.js";
+import { place, unitOf } from "./scene_form.js";
 import { extent, latest, lesson, told } from "./study_bits.js";
 import { brief, number, quantity, title, words } from "./units.js";
 
 const LETTERS = [..."abcd"];
+const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
 
 export const page = {
   title: () => "Compare",
-  show(host, address) {
-    let stop = new AbortController(), shown = null, motion = null;
-    const chooser = h("form.panel"), body = h("div");
+  show(host, { query }) {
+    const ids = idsOf(query), chooser = h("form.panel"), body = h("div", null, "Loading …");
+    let motion = null;
     fill(host, h("h1", null, "Compare"), chooser, body);
-    function change({ query }) {
-      const ids = LETTERS.map((letter) => query[letter]).filter(Boolean);
-      if (shown === ids.join()) return motion?.(query);
-      stop.abort();
-      [stop, shown, motion] = [new AbortController(), ids.join(), null];
-      fill(body, "Loading …");
-      return load(ids, stop.signal).catch(faults(body));
-    }
-    async function load(ids, signal) {
-      const names = await latest(100, signal);
-      const [b, a] = names.keys();
+    async function load() {
+      const names = await latest(100), [b, a] = names.keys();
       if (ids.length === 0 && a) return swap("compare", { a, b });
       for (const id of ids) if (!names.has(id)) names.set(id, brief(id));
       chooser.onsubmit = () => go("compare", Object.fromEntries(new FormData(chooser))) ?? false;
@@ -35,16 +27,16 @@ export const page = {
           h("option", { value, selected: value === ids[at] }, text)))), " ",
       ids[at] && h("a", { href: link(`results/${ids[at]}`) }, "Open"))), h("button.primary", null, "Compare"));
       if (ids.length < 2) return void fill(body, "Choose two results or more to see what differs.");
-      motion = await compare(body, await Promise.all(ids.map((id, at) => run(id, at, signal))), signal);
+      motion = await compare(body, await Promise.all(ids.map(run)));
     }
-    change(address);
-    return { change, leave: () => stop.abort() };
+    load().catch(faults(body));
+    return { change: (next) => `${idsOf(next.query)}` === `${ids}` && void motion?.(next.query) };
   },
 };
 
 // A result with its spectrum and its first impact, where there are such.
-async function run(id, at, signal) {
-  const load = (name) => get(`v1/results/${encodeURIComponent(id)}${name}`, undefined, signal);
+async function run(id, at) {
+  const load = (name) => get(`v1/results/${encodeURIComponent(id)}${name}`);
   const result = await load(""), { links, plan, summary } = result;
   const hasForce = links.impacts && summary.impacts > 0 && plan.contact_model !== "impulse";
   const [psd, impact] = await Promise.all([links.psd && load("/psd.json"), hasForce && load("/impacts/1/force.json")]);
@@ -53,9 +45,9 @@ async function run(id, at, signal) {
 }
 
 // Shows them -> what follows the query.
-async function compare(host, runs, signal) {
+async function compare(host, runs) {
   const [first, ...others] = runs, inputs = new Map();
-  const pairs = await Promise.all(others.map((other) => get("v1/compare", { a: first.id, b: other.id }, signal)));
+  const pairs = await Promise.all(others.map((other) => get("v1/compare", { a: first.id, b: other.id })));
   pairs.forEach((pair, at) => pair.inputs.forEach(({ pointer, a, b }) =>
     inputs.set(pointer, (inputs.get(pointer) ?? runs.map(() => a)).with(at + 1, b))));
   // A run is called by the first word that differs, else by the first number.
@@ -65,21 +57,19 @@ async function compare(host, runs, signal) {
   runs.forEach((one, at) => Object.assign(one, { label: ["ABCD"[at], name, told(telling[1][at])].filter(Boolean).join(" "),
     divergence: pairs[at - 1]?.divergence, level: pairs[at - 1]?.psd?.[0]?.level }));
   const fields = JSON.stringify(await schema("scene"));
-  const unitOf = (input) => RegExp(`"${/([a-z_]+)[/\d]*$/.exec(input)[1]}":{[^{}]*"x-unit":"([^"]*)`).exec(fields)?.[1];
   const push = h("div"), motion = h("div"), spectrum = h("div");
-  const panel = (heading, ...content) => h("section.panel", null, h("h2", null, heading), content);
   fill(host, panel("What it comes to", lesson(...others.map((other) => pushes(first, other)), partings(runs).said),
     h("div.columns", null, push, numbers(runs, first.units, []))), panel("Motion", motion), panel("Spectra", spectrum),
   panel("Inputs", differing("Inputs that differ", runs, all.map(([input, values]) =>
-    ({ label: title(place(input)), unit: unitOf(input), values }))),
-  pairs.flatMap((pair) => pair.warnings).map(({ detail }) => h("p.hint", null, detail))));
+    ({ label: title(place(input)), unit: unitOf(input, fields), values }))),
+  pairs.flatMap((pair) => pair.warnings).map(({ detail }) => hint(detail))));
 
   firstImpacts(push, runs.filter((one) => one.impact?.time.values.length > 2));
   const [psd] = pairs[0].psd ?? [], channel = psd?.channel, some = runs.filter((one) => one.psd?.channels[channel]);
   if (channel) spectra(spectrum, channel, psd.unit, some.map((one) => ({ ...one, x: one.psd.frequency.values,
     y: one.psd.channels[channel].values })));
   else fill(spectrum, "They have no spectrum in common.");
-  return motions(motion, runs, signal);
+  return motions(motion, runs);
 }
 
 // Which of two pushes harder, and why.
@@ -104,7 +94,7 @@ function firstImpacts(host, runs) {
 }
 
 // One channel that all have over a window of time, both in the URL -> what follows it.
-async function motions(host, runs, signal) {
+function motions(host, runs) {
   const channels = runs[0].channels.filter((one) => runs.every((other) => other.channels.includes(one))), failed = h("div");
   if (channels.length === 0) return void fill(host, "They have no channel in common.");
   const end = Math.max(...runs.map((one) => one.end)), show = (changes) => (note(changes, true), follow(read().query));
@@ -117,7 +107,7 @@ async function motions(host, runs, signal) {
   async function load({ channel = channels[0], from = 0, to = end }) {
     const mine = ++turn, range = [Number(from), Number(to)], there = runs.filter((one) => from <= one.end);
     const answers = await Promise.all(there.map(({ id }) =>
-      get(`v1/results/${id}/series.json`, { channels: channel, from, to, points: 600 }, signal)));
+      get(`v1/results/${id}/series.json`, { channels: channel, from, to, points: 600 })));
     if (mine !== turn) return;
     select.value = channel;
     const { unit } = answers[0].channels[channel];
@@ -127,6 +117,6 @@ async function motions(host, runs, signal) {
     fill(failed);
   }
   const follow = (query) => load(query).catch(faults(failed));
-  await follow(read().query);
+  follow(read().query);
   return follow;
 }

@@ -1,6 +1,6 @@
 // Runs beside each other, {label, color, summary, level, divergence, x, y}, x and y a spectrum: the others are told by the
 // first. In a study of kind "compare" they are contact models, the first the scene's own run.
-import { h, table } from "./dom.js";
+import { h, hint, table } from "./dom.js";
 import { plot } from "./plot.js";
 import { lesson, spectrum, told } from "./study_bits.js";
 import { number, quantity, title, words } from "./units.js";
@@ -33,7 +33,7 @@ export function numbers(runs, units, more) {
 export function partings(runs, part = 0.01) {
   const all = runs.slice(1).filter(({ divergence }) => (divergence?.time ?? null) !== null);
   const lines = all.map(({ divergence: { time }, color, label }) => ({ x: time, color, label: all.length < 3 && `${label} parts` }));
-  return { lines, said: all.length > 0 && `Apart from ${runs[0].label} by ${100 * part} % of the largest displacement: ${
+  return { lines, said: all.length === 0 ? null : `Apart from ${runs[0].label} by ${100 * part} % of the largest displacement: ${
     all.map(({ label, divergence }) => `${label} from ${quantity(divergence.time, "s")} on${
       divergence.is_trusted ? "" : " (or by rounding)"}`).join(", ")}.` };
 }
@@ -61,12 +61,12 @@ export function show(host, { result: { study, units } }) {
     + `its contacts take no time, these ${quantity(runs[0].contacts.mean_duration, "s", 2)} on average.`));
   const { lines, said } = partings(runs, study.part);
   plot(host, { title: "Displacement over time", height: 300, x: { label: "Time", unit: "s" }, y: { label: "Displacement", unit: "m" },
-    lines, summary: said || "They never part.", series: runs.map(({ label, color, trace: { minimum: low, maximum: high } }) =>
+    lines, summary: said, series: runs.map(({ label, color, trace: { minimum: low, maximum: high } }) =>
       ({ label, color, x: low.map((_, k) => k / study.trace_rate), low, high })) });
   spectra(host, study.channel, study.unit, runs);
   host.append(numbers(runs, units, [{ label: "Mean contact", unit: "s", of: (run) => run.contacts.mean_duration },
     { label: "Spectrum apart by", unit: "dB", of: (run) => run.level },
     { label: "Parts at", unit: "s", of: (run) => run.divergence.time }]),
   ...study.entries.filter(({ status }) => status !== "run").map(({ name, why }) =>
-    h("p.hint", null, `Not run: ${words(name)}. ${why}`)));
+    hint(`Not run: ${words(name)}. ${why}`)));
 }

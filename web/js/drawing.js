@@ -1,6 +1,6 @@
 // A scene as a picture that can be posed: displacements and clearances share one scale, which a bar states. What it cannot
 // read it leaves out.
-import { fill, h, s } from "./dom.js";
+import { fill, h, hint, s } from "./dom.js";
 import { number, quantity, words } from "./units.js";
 
 const MOST = 12; // storeys, from the top, and dampers
@@ -120,7 +120,7 @@ function build(scene, { plan, stroke }, width) {
   return {
     drawn: { storeys: storeys.map(({ k }) => k), dampers: dampers.map(({ index }) => index) },
     nodes: [s("svg", { viewBox: `0 0 ${width} ${y + 44}`, width, role: "img", "aria-label": told }, parts),
-      h("p.hint", null, "To scale; twice the free mass, twice its area; a longer contact, a thicker pad.",
+      hint("To scale; twice the free mass, twice its area; a longer contact, a thicker pad.",
         all.length + every.length > storeys.length + dampers.length && ` At most ${MOST} storeys and dampers are drawn.`)],
     pose: (displacements, positions) =>
       moved.forEach((place) => place((k) => middle + (displacements[k] ?? 0) * scale, positions)),

@@ -9,7 +9,7 @@ export function examplesDialog() {
   const list = h("div", null, "Loading …"), close = () => dialog.close();
   const dialog = h("dialog.wide", { "aria-label": "Examples", onclose: () => dialog.remove() },
     button("Close", close), list);
-  document.body.append(dialog);
+  document.querySelector("main").append(dialog); // gone with the page
   dialog.showModal();
   get("v1/examples").then((answer) => {
     const examples = answer.examples.sort((a, b) => a.title.localeCompare(b.title, "en", { numeric: true }));

@@ -62,7 +62,7 @@ function node(context) {
 // A place with its name and help; a plain one has them from what is around it.
 const group = ({ pointer, schema, label, isPlain }, ...content) =>
   h(isPlain ? "div" : "fieldset", { class: isPlain ? null : "wide", "data-pointer": pointer },
-    !isPlain && [h("legend", null, label), h("p.hint", null, schema.description)], content);
+    !isPlain && [h("legend", null, label), hint(schema.description)], content);
 
 function object(context) {
   const { pointer, schema, draft, options, only } = context, { properties, required = [] } = schema;

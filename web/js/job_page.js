@@ -9,8 +9,8 @@ const span = (seconds) => (seconds < 120 ? `${number(seconds, 2)} s` : `${Math.r
 
 export const page = {
   title: () => "Run",
-  async show(host, address) {
-    const id = address.path[1], path = `v1/jobs/${encodeURIComponent(id)}`, stop = new AbortController();
+  async show(host, address, signal) {
+    const id = address.path[1], path = `v1/jobs/${encodeURIComponent(id)}`;
     fill(host, h("h1", null, "Run"), "Loading …");
     let job = await get(path), heard = 0, rows = null, isLooking = false;
     const state = h("p"), time = h("p", { class: "quiet" }), told = h("div"), table = h("div");
@@ -49,7 +49,7 @@ export const page = {
     async function look() {
       isLooking = true;
       const { sweepView } = await import("./sweep_view.js");
-      rows ??= await sweepView(table, `${path}/table.json`, { signal: stop.signal, job: id });
+      rows ??= await sweepView(table, `${path}/table.json`, id);
       await rows.refresh();
       isLooking = !isOpen(job);
     }
@@ -68,13 +68,7 @@ export const page = {
 
     const timer = setInterval(tick, 1000);
     draw(job);
-    if (isOpen(job)) follow(id, draw, stop.signal).catch(fail);
-    return {
-      leave() {
-        stop.abort();
-        clearInterval(timer);
-        rows?.leave?.();
-      },
-    };
+    if (isOpen(job)) follow(id, draw, signal).catch(fail);
+    return { leave: () => clearInterval(timer) };
   },
 };

@@ -12,10 +12,10 @@ export class Ledger {
   }
 
   async ask(query) {
-    const { kept, context: { path, result, signal } } = this, key = JSON.stringify(query);
+    const { kept, context: { path, result } } = this, key = JSON.stringify(query);
     if (!this.isListed) return { count: result.summary?.impacts ?? 0, resting: 0, impacts: [], matching: 0 };
     if (kept.size > 60) kept.clear();
-    if (!kept.has(key)) kept.set(key, get(`${path}/impacts.json`, query, signal));
+    if (!kept.has(key)) kept.set(key, get(`${path}/impacts.json`, query));
     kept.get(key).catch(() => kept.delete(key));
     return kept.get(key);
   }

@@ -50,6 +50,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     box.hidden = draft.get(pointer) === undefined && !(isBoth && same.checked);
     if (box.hidden) return;
     if (text !== shown) {
+      if (shown?.split("@")[0] !== slug()) revisions = [];
       shown = text;
       revision.element.hidden = way || !text;
       fill(inner);
@@ -62,8 +63,8 @@ export function bufferWidget({ pointer, label, schema, draft }) {
   }
 
   async function list(text) {
-    materials ??= (await get("v1/materials", { limit: 200 }, draft.signal)).materials;
-    const answer = revision.element.hidden ? {} : await get(path(slug(), "/revisions"), { limit: 100 }, draft.signal);
+    materials ??= (await get("v1/materials", { limit: 200 })).materials;
+    const answer = revision.element.hidden ? {} : await get(path(slug(), "/revisions"), { limit: 100 });
     if (shown !== text) return;
     revisions = answer.revisions ?? [];
     material.refresh();
@@ -82,7 +83,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     known = key;
     if (plan.contact_model !== "spring_damper") return void fill(derived);
     const { contacts = [], warnings, least_speed, most_speed } = one.material === null ? {}
-      : await get(`v1/materials/${one.material}/derived`, query, draft.signal).catch(() => ({})); // the values stand without ±
+      : await get(`v1/materials/${one.material}/derived`, query).catch(() => ({})); // the values stand without ±
     if (key !== known) return;
     const [first] = contacts, last = contacts.at(-1); // several where they depend on the speed
     const same = Math.abs(first?.stiffness.value / one.stiffness - 1) < 1e-6 ? first : null;

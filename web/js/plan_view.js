@@ -5,9 +5,9 @@ import { column } from "./study_bits.js";
 import { share } from "./summary_view.js";
 import { quantity, title, words } from "./units.js";
 
-export const section = { id: "plan", title: "How it was computed", show };
+export const section = { title: "How it was computed", show };
 
-const figure = ([label, key, unit]) => column(label, unit, (row) => row[key]);
+export const figure = ([label, key, unit]) => column(label, unit, (row) => row[key]);
 const FIGURES = [["e", "restitution"], ["T_c", "contact_time", "s"], ["k_b", "stiffness", "N/m"], ["c_b", "damping", "N s/m"],
   ["ζ", "damping_ratio"], ["n (k_b in N/mⁿ)", "exponent"], ["e reached", "reached_restitution"],
   ["T_c reached", "reached_contact_time", "s"]];

@@ -106,7 +106,10 @@ export function plot(host, given) {
     state.range = places?.map((left) => Number(valueAt(left).toPrecision(8)));
     show();
     clearTimeout(settling);
-    settling = setTimeout(() => state.onZoom?.(...(state.range ?? [null, null])), 200);
+    settling = setTimeout(() => {
+      settling = 0;
+      if (box.isConnected) state.onZoom?.(...(state.range ?? [null, null]));
+    }, 200);
   }
   function select() {
     const { left, width } = chart.select;
@@ -193,7 +196,7 @@ export function plot(host, given) {
   addEventListener("themechange", fit, stop);
   paper.addEventListener("change", fit, stop);
   function set(changes) {
-    Object.assign(state, changes);
+    Object.assign(state, changes, settling && { range: state.range }); // the reader's, about to be told
     if (changes.series || changes.y) renew();
     else show();
   }

@@ -2,7 +2,7 @@
 import { accuracyWidget } from "./accuracy.js";
 import { go } from "./address.js";
 import { check, schema, submit } from "./api.js";
-import { button, failure, faults, fill, h } from "./dom.js";
+import { button, failure, faults, fill, h, once, panel } from "./dom.js";
 import { makeDraft } from "./draft.js";
 import { drawing } from "./drawing.js";
 import { examplesDialog } from "./examples.js";
@@ -34,34 +34,34 @@ function jsonView(draft) {
   } };
 }
 
-async function show(host, address) {
-  const stop = new AbortController(), { signal } = stop, draft = makeDraft(sponge(), signal), json = jsonView(draft);
+async function show(host, address, signal) {
+  const draft = makeDraft(sponge(), signal), json = jsonView(draft);
   const steps = h("div", null, "The form is on its way …"), drawn = h("div.panel.drawn");
   const told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
-  const run = button("Run", runScene, { class: "primary run", "aria-keyshortcuts": "Control+Enter" });
+  const run = button("Run", () => runScene(), { class: "primary run", title: "Ctrl + Enter", "aria-keyshortcuts": "Control+Enter" });
   fill(host, h("h1", null, "Scene"),
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
       button("Examples", examplesDialog)), told,
-    h("div.scene", null, h("div", null, steps, json.element), h("div.beside", null, drawn,
-      h("div", null, h("div.row", null, run, h("span.hint", null, "Ctrl + Enter")),
-        h("div.panel", null, h("h2", null, "What it comes to"), state, comes)))));
+    h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
+      h("div", null, h("p", null, run), panel("What it comes to", state, comes)))));
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
-  let timer = null, turn = 0, isEdited = false;
+  let timer = null, turn = 0, isEdited = false, loading;
   const goTo = (pointer) => focusField(steps, pointer);
 
   // Keeps the scene and asks the service; only the last question's answer counts.
   async function ask(question, answered) {
-    const mine = ++turn;
+    const mine = ++turn, isLast = () => mine === turn && !signal.aborted;
     clearTimeout(timer);
     timer = null;
     try {
-      const fits = !isEdited || await keep(draft.scene, signal), answer = await question(draft.scene, signal);
-      if (mine === turn) answered(answer);
+      const fits = !isEdited || await keep(draft.scene, isLast), answer = await question(draft.scene);
+      if (!isLast()) return;
       state.textContent = fits ? "" : "Too long for a link: copy the JSON to keep it.";
+      answered(answer);
     } catch (error) {
-      if (mine !== turn) return;
+      if (!isLast()) return;
       const { errors = [] } = error;
       draft.say(null, errors);
       state.textContent = "";
@@ -85,14 +85,14 @@ async function show(host, address) {
     timer = setTimeout(settle, 250); // ms without a change
   });
 
-  async function runScene() {
-    if (run.ariaBusy === "true") return;
+  const runScene = once(async () => {
     run.ariaBusy = "true"; // not disabled: it keeps the focus
     state.textContent = "Running …";
+    await loading;
     await ask(submit, ({ id, status, result }) => go(status === "successful" ? `results/${result}` : `jobs/${id}`));
     run.ariaBusy = "false";
     comes.querySelector(".bad")?.focus();
-  }
+  });
   addEventListener("keydown", (event) => {
     if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;
     event.preventDefault();
@@ -102,19 +102,22 @@ async function show(host, address) {
 
   async function load(query) {
     fill(told);
-    draft.replace(await open(query, signal).catch((error) => faults(told)(error) ?? sponge()));
+    turn++;
     isEdited = false;
+    const mine = loading = open(query).catch((error) => faults(told)(error) ?? sponge()), scene = await mine;
+    if (mine !== loading) return; // another one was asked for since
+    const wasEdited = isEdited; // the URL may hold what was there before
+    draft.replace(scene);
+    isEdited = wasEdited;
   }
   Promise.all([schema("scene"), load(address.query)]).then(([scene]) => {
     fill(steps);
     sceneForm(steps, { schema: scene, draft, widgets });
+    steps.after(json.element);
   }).catch(faults(steps));
   return {
     change: ({ query }) => load(query),
-    leave() {
-      clearTimeout(timer);
-      stop.abort();
-    },
+    leave: () => clearTimeout(timer),
   };
 }
 

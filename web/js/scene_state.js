@@ -12,9 +12,9 @@ export const sponge = () => ({
 });
 
 // The scene that the query asks for.
-export async function open({ s, example, result, job, buffer, record }, signal) {
+export async function open({ s, example, result, job, buffer, record }) {
   const { title, ...scene } = sponge();
-  const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`, undefined, signal);
+  const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`);
   if (s) return unpack(s).catch(() => Promise.reject(new Error("The scene in this link cannot be read. Was it cut off?")));
   if (example) return ask("examples", example);
   if (result) return typical((await ask("results", result)).scene);
@@ -38,9 +38,9 @@ function typical(scene) {
   return scene;
 }
 
-// Keeps a scene in the URL of its page; false where it is too long for one.
-export async function keep(scene, signal) {
+// Keeps a scene in the URL of its page while it is the last one; false where it is too long for one.
+export async function keep(scene, isLast) {
   const s = await pack(scene), fits = s.length <= 100000;
-  if (!signal.aborted && /^(scene)?$/.test(read().path.join())) history.replaceState(null, "", link("scene", fits ? { s } : {}));
+  if (isLast() && /^(scene)?$/.test(read().path.join())) history.replaceState(null, "", link("scene", fits ? { s } : {}));
   return fits;
 }

@@ -2,7 +2,7 @@
 // each pixel, finer ones with each zoom; never the whole series.
 import { go } from "./address.js";
 import { get, post } from "./api.js";
-import { button, failure, faults, fill, h, notice } from "./dom.js";
+import { button, failure, faults, fill, h, hint, notice, once } from "./dom.js";
 import { plot } from "./plot.js";
 import { number, quantity, title, words } from "./units.js";
 
@@ -14,13 +14,13 @@ const USUAL = ["displacement", "contact_force", "acceleration"]; // what people 
 const kind = (channel) => channel.replace(/_\d+$/, "");
 const hue = (nth) => ((nth - 1) % 8) + 1;
 
-export const section = { id: "motion", title: "Motion over time", show };
+export const section = { title: "Motion over time", show };
 
 function show(host, context) {
   const { result, ledger, path } = context, { sample_rate: rate, channels = [], units = {}, summary } = result;
   const horizon = summary.trust_horizon;
   if (channels.length === 0) return void fill(host, h("p", null, "The scene asked for no channels."));
-  const state = h("p.hint"), marksNote = h("p.hint"), box = h("div");
+  const state = hint(), marksNote = hint(), box = h("div");
   let chosen = null, charts = [], shown, fetching, waiting; // a chart is {drawn, chart}
   const choose = () => context.change(
     { channels: boxes.filter((one) => one.checked).map((one) => one.value).join() || "none" }, true);
@@ -67,7 +67,7 @@ function show(host, context) {
         : [failure(error), button("Try again", load)]);
     }
   }
-  const again = () => post(`${path}/again`).then(({ id }) => go(`jobs/${id}`), faults(state));
+  const again = once(() => post(`${path}/again`).then(({ id }) => go(`jobs/${id}`), faults(state)));
 
   // Marks of the impacts in view, rules at the one chosen and at the animation's instant.
   async function mark() {

@@ -1,25 +1,25 @@
 // The power spectra of a result, others laid over them. In the URL: psd (channel), psd_from, psd_to (Hz), overlay (ids).
 import { get } from "./api.js";
-import { fill, h } from "./dom.js";
+import { fill, folded, h, hint } from "./dom.js";
 import { plot } from "./plot.js";
 import { latest, spectrum } from "./study_bits.js";
 import { number, pretty, words } from "./units.js";
 
-export const section = { id: "spectrum", title: "Spectrum", show };
+export const section = { title: "Spectrum", show };
 
 async function show(host, context) {
-  const { result: { id, links, plan }, signal, view: { overlay = "" } } = context;
+  const { result: { id, links, plan }, view: { overlay = "" } } = context;
   if (!links.psd) return host.append("The scene asked for no spectrum.");
-  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`, undefined, signal);
-  const [psd, names] = await Promise.all([load(id), latest(20, signal)]), frequency = psd.frequency.values;
+  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`);
+  const [psd, names] = await Promise.all([load(id), latest(20)]), frequency = psd.frequency.values;
   names.delete(id);
   const one = h("select", { onchange: () => context.change({ psd: one.value }, true) },
     Object.keys(psd.channels).map((value) => h("option", { value }, words(value)))), box = h("div");
   const boxes = Array.from(names.keys(), (value) => h("input", { type: "checkbox", value, onchange: () =>
     context.change({ overlay: boxes.filter(({ checked }) => checked).map((other) => other.value).join() }, true) }));
-  fill(host, h("label", null, "Channel ", one), h("details", { open: overlay !== "" }, h("summary", null, "Lay other results over it"),
-    boxes.map((other) => h("div", null, h("label", null, other, " ", names.get(other.value))))), box,
-    h("p.hint", null, `Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
+  fill(host, h("label", null, "Channel ", one), folded("Lay other results over it", () =>
+    boxes.map((other) => h("div", null, h("label", null, other, " ", names.get(other.value)))), overlay !== ""), box,
+    hint(`Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
 
   let chart = null, wanted = "";
   async function follow(view) {
@@ -45,6 +45,7 @@ async function show(host, context) {
       lines: plan.modes.slice(0, 12).map((mode, at) => ({ x: mode.frequency, label: `mode ${at + 1}` })),
       onZoom: (left, right) => context.change({ psd_from: left, psd_to: right }, true),
     });
+    return follow(context.view); // its range may have changed meanwhile
   }
   await follow(context.view);
   return { follow };

@@ -1,7 +1,7 @@
 // What views of studies and comparisons share: ways to scenes and runs, pieces of text and tables.
 import { go, link, pack } from "./address.js";
 import { get } from "./api.js";
-import { failure, h } from "./dom.js";
+import { failure, h, once } from "./dom.js";
 import { brief, moment, quantity, title, words } from "./units.js";
 
 // The scene alone, without its study.
@@ -15,14 +15,14 @@ export function sceneLink(label, scene) {
 }
 
 // The names of the latest results, by their ids.
-export const latest = async (limit, signal) => new Map((await get("v1/jobs", { status: "successful", kind: "none", limit }, signal))
-  .jobs.filter(({ result }) => result).map(({ result, title: name, finished }) =>
+export const latest = async (limit) => new Map((await get("v1/jobs", { status: "successful", kind: "none", limit })).jobs
+  .filter(({ result }) => result).map(({ result, title: name, finished }) =>
     [result, `${name ?? brief(result)}, ${moment(finished)}`]));
 
 // A button that makes a job and goes to its result, or to the job while it runs.
 export function jobButton(label, make) {
-  const act = () => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
-    (error) => button.after(failure(error)));
+  const act = once(() => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
+    (error) => button.after(failure(error))));
   const button = h("button", { type: "button", onclick: act }, label);
   return button;
 }
@@ -37,13 +37,6 @@ export const told = (value, unit) => (typeof value === "number" ? quantity(value
 export const spread = (label, name) => [{ label: "Number", value: ({ metric }) => title(metric) },
   { label, numeric: true, cell: (row) => quantity(row[name], row.unit) },
   { label: "5 to 95 %", numeric: true, cell: ({ q05, q95, unit }) => between(q05, q95, unit) }];
-
-// A bar from one number to another within a range, beside numbers in a table.
-export function strip([low, high], [[from, to]]) {
-  const part = (size) => `${high > low ? (100 * size) / (high - low) : 0}%`;
-  return h("div.strip", { "aria-hidden": "true" },
-    h("span", { style: { left: part(Math.min(from, to) - low), width: part(Math.abs(to - from)) } }));
-}
 
 // [smallest, largest] of the numbers among values.
 export function extent(values) {

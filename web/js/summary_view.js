@@ -2,11 +2,11 @@
 import { link } from "./address.js";
 import { get } from "./api.js";
 import { figures, h, table } from "./dom.js";
-import { column, strip } from "./study_bits.js";
+import { column } from "./study_bits.js";
 import { number, quantity, title } from "./units.js";
 
-export const section = { id: "summary", title: "Summary", show };
-export const energy = { id: "energy", title: "Energy", show: showEnergy };
+export const section = { title: "Summary", show };
+export const energy = { title: "Energy", show: showEnergy };
 
 // "12.3 %"; what is next to nothing as a power of ten.
 export const share = (part, digits = 3) =>
@@ -36,16 +36,18 @@ function show(host, { result: { summary, units, id, count, sample_rate: rate, wo
 
 // Whether the service counts what comes or what goes; each part goes on where the last one ended.
 const SIGNS = { initial: 1, input: 1, structural_damping: -1, contact: -1, kinetic: -1, strain: -1 };
-async function showEnergy(host, { path, signal }) {
-  const energies = await get(`${path}/energy.json`, undefined, signal);
+async function showEnergy(host, { path }) {
+  const energies = await get(`${path}/energy.json`);
   let level = 0, whole = 0;
   const parts = Object.entries(SIGNS).filter(([name]) => energies[name] !== 0).map(([name, sign]) => {
     const flow = sign * energies[name];
     whole += Math.max(0, flow);
-    return { name, flow, bar: [level, (level += flow)] };
+    return { name, flow, ends: [level, (level += flow)] };
   });
+  const part = (size) => `${(100 * size) / whole}%`, bar = ([from, to]) => h("div.strip", { "aria-hidden": "true" },
+    h("span", { style: { left: part(Math.min(from, to)), width: part(Math.abs(to - from)) } }));
   host.append(whole === 0 ? "Nothing moved: there was no energy." : table("What came and, negative, what went", [
-    { label: "Part", cell: ({ name, bar }) => [title(name), strip([0, whole], [bar])] },
+    { label: "Part", cell: ({ name, ends }) => [title(name), bar(ends)] },
     column("Energy", "J", ({ flow }) => flow),
     { label: "Share", numeric: true, value: ({ flow }) => share(flow / whole) }], parts));
 }

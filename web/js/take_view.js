@@ -1,10 +1,9 @@
 // What a reader takes along: files in every format, and lines that run this scene elsewhere.
 import { address, save } from "./api.js";
-import { copyButton } from "./copy.js";
-import { failure, figures, folded, h } from "./dom.js";
+import { copied, failure, figures, folded, h } from "./dom.js";
 import { title } from "./units.js";
 
-export const section = { id: "take", title: "Take it along", show };
+export const section = { title: "Take it along", show };
 
 function show(host, { result: { id, links, scene } }) {
   const files = Map.groupBy(Object.values(links).map((path) => /^[^{]+\/((\w+)\.(\w+))$/.exec(path)).filter(Boolean),
@@ -16,7 +15,7 @@ function show(host, { result: { id, links, scene } }) {
   // Apostrophes, which only stand in texts, are escaped: so any language can quote it.
   const text = JSON.stringify(scene, null, 2).replaceAll("'", "\\u0027"), url = address("").replace(/\/$/, "");
   host.append(figures([...files].map(([what, all]) => [title(what), all.map(file)])), ...Object.entries(languages(url, text)).map(([name, lines]) =>
-    folded(`Run this scene from ${name}`, () => [copyButton(lines), h("pre", { tabindex: "0" }, lines)])));
+    folded(`Run this scene from ${name}`, () => copied(lines))));
 }
 
 const languages = (url, scene) => ({
