@@ -41,7 +41,7 @@ async function refusal(response) {
   return new Refusal(response.status, problem);
 }
 
-let shown = null; // until this is aborted somebody reads the page that asks
+let shown = null; // aborted when the page that asks is left
 export const readUntil = (signal) => (shown = signal);
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query

@@ -28,7 +28,7 @@ export function fill(node, ...children) {
   return put(node, null, children);
 }
 
-// What it does is not begun again while it goes on: some click twice.
+// Not begun again while it goes on: some click twice.
 export function once(act) {
   let going = null;
   return () => (going ??= act().finally(() => (going = null)));

@@ -54,7 +54,7 @@ async function show(host, context) {
   const see = () => ledger.at(current()).then((row) => {
     const { start, end, duration, number: nth } = row ?? shown, around = 4 * duration || 40 / result.sample_rate;
     context.change({ impact: nth, from: Math.max(0, start - around), to: (end ?? start) + around }, true);
-  }, () => {}); // what fails is told where the impact would be
+  }, () => {}); // follow() tells it
   await follow(context.view);
   fill(host, h("div.row", null, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
     button("Next →", step(1)), button("See it in the series", see)), one, all);
