@@ -1,6 +1,6 @@
 // A JSON Schema as a form over a draft: objects, their kinds, lists; single values are fields.js. What need not be said
 // waits under "More"; what the schema does not know is kept.
-import { button, fill, h, sentence } from "./dom.js";
+import { button, fill, h, hint, sentence } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice, frame, typed } from "./fields.js";
 import { title, words } from "./units.js";
