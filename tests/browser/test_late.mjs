@@ -23,6 +23,19 @@ test("A run's page that is left before its answer came leads nowhere", async ({ 
   assert.equal(await heading(page, "Ground motions").count(), 1);
 });
 
+test("A run is followed though the service was lost right after its first answer", async ({ page, daemon, url, refused }) => {
+  refused(0);
+  const long = { ...(await daemon.example("paper_sine_aluminium")), duration: 2000, sample_rate: 100,
+    output: { channels: [], psd: null }, accuracy: { solver: "rk4", step: 1e-5 } };
+  const { id } = await daemon.ask("POST", "/v1/jobs", long, { Prefer: "respond-async" });
+  let asked = 0;
+  await page.route(`**/v1/jobs/${id}`, (route) => (++asked === 2 ? route.abort() : route.fallback()));
+  await page.goto(url(`#/jobs/${id}`));
+  await until("it to be asked for again", () => asked >= 3);
+  await daemon.ask("DELETE", `/v1/jobs/${id}`);
+  await says(main(page), /Cancelled/);
+});
+
 test("A search that another page overtook does not come back", async ({ page, url }) => {
   await page.goto(url("#/records"));
   await heading(page, "Ground motions").waitFor();
@@ -121,6 +134,40 @@ test("One zoom after another goes on from the last one, not from where its data 
   while (!isHere) for (const arrow of ["Right", "Left"]) await page.keyboard.press(`Shift+Arrow${arrow}`); // to and fro, at rest never
   await come;
   await says(main(page), /Samples from 3\.75 s to 6\.25 s/);
+});
+
+test("A drag goes on while finer data come", async ({ page, daemon, url }) => {
+  const { result: a } = await daemon.run("paper_free_sponge"), { result: b } = await daemon.run("paper_free_aluminium");
+  await page.goto(url(`#/compare?a=${a}&b=${b}`));
+  const chart = page.getByRole("application", { name: "Over time" });
+  await says(main(page), /Samples from 0 s to 10 s/);
+  await chart.focus();
+  const series = await hold(page, /series\.json/, 2);
+  await page.keyboard.press("+");
+  await leads(page, /from=2\.5&to=7\.5/);
+  await series.asked(2);
+  await chart.scrollIntoViewIfNeeded();
+  const { x, y, width, height } = await chart.boundingBox();
+  await page.mouse.move(x + width * 0.3, y + height / 2);
+  await page.mouse.down();
+  await page.mouse.move(x + width * 0.5, y + height / 2, { steps: 3 });
+  await series.letGo();
+  await page.mouse.move(x + width * 0.6, y + height / 2, { steps: 3 });
+  await page.mouse.up();
+  const [, from, to] = await leads(page, /from=(?!2\.5&)([\d.]+)&to=([\d.]+)/);
+  assert.ok(from > 3 && to < 7, `${from} to ${to}`);
+  await says(main(page), new RegExp(`Samples from ${Number(from).toPrecision(3)} s`));
+});
+
+test("What was typed last is there again, though a link was followed at once", async ({ page, url }) => {
+  await page.goto(url("#/scene"));
+  const mass = page.getByRole("group", { name: "Damper 1" }).getByLabel(/^Mass/);
+  await mass.fill("0.2");
+  await menu(page, "Records");
+  await heading(page, "Ground motions").waitFor();
+  await page.goBack();
+  await until("the mass", async () => (await mass.inputValue()) === "0.2");
+  await leads(page, /#\/scene\?s=/);
 });
 
 test("The revisions of another material are not offered", async ({ page, url }) => {

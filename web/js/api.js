@@ -80,16 +80,16 @@ export const check = (scene) => post("v1/jobs?dry_run=1", scene);
 
 // Follows a job to its end, which is returned: `onChange(job)` after each news of it. Where the connection breaks the state is
 // asked for instead; while nobody answers (a daemon that starts anew takes its jobs up again) the job has `isLost`.
-export async function follow(id, onChange, signal) {
-  const path = `v1/jobs/${encodeURIComponent(id)}`;
-  for (let job = null; ; ) {
+export async function follow(job, onChange, signal) {
+  const path = `v1/jobs/${job.id}`;
+  for (;;) {
     try {
       job = await get(path, undefined, signal);
       onChange(job);
       if (job.finished) return job;
       await events(`${path}/events`, (news) => onChange({ ...job, ...news }), signal);
     } catch (error) {
-      if (job === null || error.name === "AbortError" || (error.status >= 400 && error.status < 500)) throw error;
+      if (error.name === "AbortError" || (error.status >= 400 && error.status < 500)) throw error;
       if (error.status === 0) onChange({ ...job, isLost: true });
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }

@@ -115,7 +115,7 @@ function list(context) {
   const { pointer, schema, draft, options, label, required } = context;
   const one = label.replace("Axes", "Axis").replace(/(?<!i)s$/, "");
   const add = button(`Add ${one.toLowerCase()}`, () => put(value().length, 0, options.start?.(`${pointer}/N`) ?? {}));
-  const holder = h("div"), note = h("p.hint"), value = () => [draft.get(pointer) ?? []].flat();
+  const holder = h("div"), note = hint(), value = () => [draft.get(pointer) ?? []].flat();
   let nodes = [];
   function put(at, gone, ...items) {
     const next = value().toSpliced(at, gone, ...items);

@@ -1,7 +1,7 @@
 // One run while it goes on: how far it is, how to stop it, why it failed. What came out is the result's page.
 import { link, swap } from "./address.js";
 import { follow, get, remove } from "./api.js";
-import { button, failure, fill, h, notice, tell } from "./dom.js";
+import { button, failure, faults, fill, h, notice, tell } from "./dom.js";
 import { badge, isOpen, named } from "./jobs_page.js";
 import { moment, number } from "./units.js";
 
@@ -20,7 +20,7 @@ export const page = {
     fill(host, h("h1", null, named(job)),
       h("section", { class: "panel" }, state, bar, time, told, h("div", { class: "row" }, cancelButton, change)), table);
 
-    const fail = (error) => error.name !== "AbortError" && told.append(failure(error));
+    const fail = faults(told);
 
     function draw(news) {
       job = news;
@@ -68,7 +68,7 @@ export const page = {
 
     const timer = setInterval(tick, 1000);
     draw(job);
-    if (isOpen(job)) follow(id, draw, signal).catch(fail);
+    if (isOpen(job)) follow(job, draw, signal).catch(fail);
     return { leave: () => clearInterval(timer) };
   },
 };

@@ -5,12 +5,10 @@ import { failure, fill, h, tell } from "./dom.js";
 
 // A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, leave()?}:
 // for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
-const pages = [
-  [/^(scene)?$/, "scene"], [/^jobs$/, "jobs"], [/^jobs\/[^/]+$/, "job", "jobs"], [/^results\/[^/]+$/, "result", "jobs"],
-  [/^compare$/, "compare"], [/^materials$/, "materials"], [/^materials\/[^/]+$/, "material", "materials"],
-  [/^materials\/[^/]+\/measure$/, "measure", "materials"], [/^records$/, "records"],
-  [/^records\/[^/]+$/, "record", "records"], [/^shell$/, "shell"],
-]; // a pattern of the path, the module's name before "_page.js", the link in the navigation where it is another
+const pages = new Map(Object.entries({ // by its path, the module's name before "_page.js"
+  "": "scene", scene: "scene", jobs: "jobs", "jobs/*": "job", "results/*": "result", compare: "compare", materials: "materials",
+  "materials/*": "material", "materials/*/measure": "measure", records: "records", "records/*": "record", shell: "shell",
+}));
 
 const main = document.getElementById("main");
 let shown = null; // {path, controller: promise, stop}
@@ -27,9 +25,9 @@ async function show() {
   const address = read(), path = address.path.join("/"), stop = new AbortController(), { signal } = stop;
   readUntil(signal);
   if (last) fill(main, "Loading …"); // what is left takes no clicks
-  const [, name, within = name] = pages.find(([pattern]) => pattern.test(path)) ?? [];
+  const name = pages.get(path.replace(/\/[^/]+/, "/*")), [within = "scene"] = address.path;
   for (const anchor of document.querySelectorAll("#pages a"))
-    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within}` ? "page" : null;
+    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within === "results" ? "jobs" : within}` ? "page" : null;
   const { promise: controller, resolve: settle } = Promise.withResolvers();
   shown = { path, controller, stop };
   try {
