@@ -114,11 +114,10 @@ export const hint = (...children) => h("p", { class: "hint" }, children);
 // Something that opens: the content is made when it is first seen.
 export function folded(summary, make, open = false) {
   const inner = h("div"), box = h("details", { open, ontoggle: show }, h("summary", null, summary), inner);
-  function show() {
+  async function show() {
     if (!box.open || inner.hasChildNodes()) return;
-    const content = make();
-    fill(inner, content instanceof Promise ? "Loading …" : content);
-    if (content instanceof Promise) content.then((node) => fill(inner, node), (error) => fill(inner, failure(error)));
+    fill(inner, "Loading …");
+    fill(inner, await Promise.try(make).catch(failure));
   }
   show();
   return box;
