@@ -3,7 +3,7 @@ import { go, link, note, read } from "./address.js";
 import { ask, get, save } from "./api.js";
 import { button, faults, figures, fill, h } from "./dom.js";
 import { plot } from "./plot.js";
-import { moment, number, quantity, words } from "./units.js";
+import { moment, number, quantity, title } from "./units.js";
 
 const UNITS = { duration: "s", interval: "s", peak: "m/s^2", peak_time: "s", peak_velocity: "m/s", end_velocity: "m/s" };
 const POINTS = 1500; // buckets of a view, some 60 kB
@@ -24,7 +24,7 @@ export const page = {
         act(`.${format}`, () => save(`${path}/samples.${format}`, `${name}.${format}`))),
       act("Delete", async () => confirm(`Delete ${name} for good?`) && (await ask("DELETE", path), go("records")))),
     news, picture, h("div", { class: "panel" }, figures(Object.entries({ ...facts, uploaded: moment(created), ...used_by })
-      .map(([fact, value]) => [words(fact), told(fact, value)]))));
+      .filter(([, value]) => value !== null).map(([fact, value]) => [title(fact), told(fact, value)]))));
 
     const say = (fact) => told(fact, facts[fact]);
     const chart = plot(picture, { title: `Base acceleration of ${name}`, whole: [0, facts.duration],
@@ -39,7 +39,7 @@ export const page = {
         = await get(`${path}/samples.json`, { from, to, points: POINTS });
       if (asked !== location.hash) return; // zoomed on
       const x = min.map((_, at) => start + (at * bucket) / rate), values = bucket > 1 ? { low: min, high: max } : { y: min };
-      chart.set({ range: [from, to], series: [{ label: "acceleration", color: 1, x, ...values }] });
+      chart.set({ range: [from, to], series: [{ label: "acceleration", x, ...values }] });
     }
     const draw = () => load().catch(faults(news));
     draw();
