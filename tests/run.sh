@@ -3,6 +3,9 @@
 # unit and contract tests in each (under the last what knows threads alone), truth tests and the tests of the
 # program in the release build. --quick: the release build only.
 # On a bare Debian 12 it first installs what is missing (as root or with sudo). The last line counts.
+#
+# The release build comes first and is tested while the others are made, one by one, of what the tests leave of the
+# processors. Two tests are at work at a time; those of the browser have no other beside them.
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
@@ -24,117 +27,150 @@ export ASAN_OPTIONS=detect_leaks=1 UBSAN_OPTIONS=halt_on_error=1:print_stacktrac
 python=/usr/bin/python3
 passed=0
 failed=0
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
-
-folder() {
-    if [ "$1" = release ]; then echo build; else echo "build-$1"; fi
+work=$(mktemp -d)
+builder=                           # the process of the build that is being made
+declare -A made                    # by preset: yes, no
+declare -A running log began       # by process: "PRESET TEST", what it says, when it began
+finish() {
+    [ -z "$builder" ] || kill -- "-$builder" 2>/dev/null
+    [ ${#running[@]} -eq 0 ] || kill "${!running[@]}" 2>/dev/null
+    rm -rf "$work"
 }
+trap finish EXIT
+trap 'exit 130' INT TERM
 
 # gcc's thread sanitizer cannot live with as much address randomisation as some kernels use.
 still=()
 if setarch "$(uname -m)" -R true 2>/dev/null; then still=(setarch "$(uname -m)" -R); fi
 
-for preset in "${presets[@]}"; do
-    echo "== $preset (at $SECONDS s)"
-    if ! { cmake --preset "$preset" -DIMPACTD_TESTS=ON && cmake --build --preset "$preset"; } >"$log" 2>&1; then
-        tail -n 60 "$log"
-        echo "FAIL  the $preset build"
-        failed=$((failed + 1))
-        continue
-    fi
-    runner=()
-    [ "$preset" != tsan ] || runner=("${still[@]}")
-    "${runner[@]}" ctest --preset "$preset" -j "$(nproc)" >"$log" 2>&1
-    # "100% tests passed, 0 tests failed out of 27"
-    if read -r wrong all < <(sed -n 's/.*tests passed, \([0-9]*\) tests\{0,1\} failed out of \([0-9]*\).*/\1 \2/p' "$log"); then
-        [ "$wrong" -eq 0 ] || cat "$log"
-        echo "$((all - wrong)) programs passed, $wrong failed"
-        passed=$((passed + all - wrong))
-        failed=$((failed + wrong))
-    else
-        cat "$log"
-        echo "FAIL  ctest found no tests in $preset"
-        failed=$((failed + 1))
-    fi
-done
+# What is asked, in this order, each "PRESET TEST" where the test is ctest or a file. What faces hostile input is asked
+# of the instrumented program as well, what concerns threads of the one that watches them.
+judge=tests/contract/test_traffic.py
+files() { grep -l "$@" tests/contract/test_*.py; }
+queue=()
+mapfile -t -O 0 queue < <(
+    echo release tests/browser/test_browser.py
+    printf '%s ctest\n' "${presets[@]}"
+    files '^WAITS = True' | sed 's/^/release /'
+    files -L '^WAITS = True' | grep -vxF "$judge" | sed 's/^/release /'
+    printf 'release %s\n' "$judge" tests/truth/test_*.py
+    files '^THREADED = True' | sed 's/^/tsan /'
+    files '^SANITIZED = True' | sed 's/^/debug /'
+)
+for at in "${!queue[@]}"; do [[ " ${presets[*]} " == *" ${queue[at]% *} "* ]] || unset "queue[at]"; done
 
-# Python tests that run beside the others: their process by "FILE PRESET", and what they say.
-declare -A beside said
+# What the program's tests say to daemons is recorded; the judge of that begins when all was said.
+is_recorded() { [[ $1 == "release tests/contract/"* && $1 != *" $judge" ]]; }
+unsaid=0
+for one in "${queue[@]}"; do ! is_recorded "$one" || unsaid=$((unsaid + 1)); done
+
+# Builds with this niceness. A session of its own, as some kernels share out time by sessions first.
+make_build() {
+    setsid nice -n "$2" bash -c 'echo "$1" >/proc/self/autogroup
+        cmake --preset "$0" -DIMPACTD_TESTS=ON && cmake --build --preset "$0"' "$1" "$2" >"$work/$1" 2>&1 &
+    builder=$!
+}
+
+# PRESET CODE
+build_ended() {
+    builder=
+    if [ "$2" -eq 0 ]; then
+        made[$1]=yes
+        echo "== $1 is built (at $SECONDS s)"
+        return
+    fi
+    made[$1]=no
+    tail -n 60 "$work/$1"
+    echo "FAIL  the $1 build"
+    failed=$((failed + 1))
+    for at in "${!queue[@]}"; do [ "${queue[at]% *}" != "$1" ] || unset "queue[at]"; done
+}
+
+is_ready() { [ "${made[${1% *}]-}" = yes ] && { [ "$1" != "release $judge" ] || [ "$unsaid" -eq 0 ]; }; }
+
+# How many of the two places a test takes.
+places() {
+    case "$1" in
+    *" ctest") echo 1 ;;
+    *" tests/browser/"*) echo 3 ;;
+    *) if grep -q '^WAITS = True' "${1#* }"; then echo 0; else echo 1; fi ;;
+    esac
+}
+
+# PRESET TEST, in place of this process.
+run() {
+    local runner=() folder=build
+    [ "$1" = release ] || folder=build-$1
+    [ "$1" != tsan ] || runner=("${still[@]}")
+    if [ "$2" = ctest ]; then exec "${runner[@]}" ctest --preset "$1" -j "$((($(nproc) + 1) / 2))"; fi
+    if is_recorded "$*" || [ "$2" = "$judge" ]; then export IMPACTD_RECORD=$work/said; fi
+    exec "${runner[@]}" "$python" "$2" --build "$folder"
+}
+
+used=0
+# Begins what has a place. Who finds none keeps those behind from it; who is not ready does not.
 begin() {
-    [ -z "${beside[$1 $2]-}" ] || return 0
-    said[$1 $2]=$(mktemp)
-    local target=$record
-    local -a runner=()
-    [ "$2" = release ] || target=
-    [ "$2" != tsan ] || runner=("${still[@]}")
-    IMPACTD_RECORD=$target "${runner[@]}" "$python" "$1" --build "$(folder "$2")" >"${said[$1 $2]}" 2>&1 &
-    beside[$1 $2]=$!
-}
-
-# FILE PRESET: runs one Python test of a build and adds its count.
-ask() {
-    echo "-- $1 ($2, at $SECONDS s)"
-    local code
-    local -a runner=()
-    if [ -n "${beside[$1 $2]-}" ]; then
-        wait "${beside[$1 $2]}"
-        code=$?
-        mv "${said[$1 $2]}" "$log"
-        cat "$log"
-    else
-        [ "$2" != tsan ] || runner=("${still[@]}")
-        "${runner[@]}" "$python" "$1" --build "$(folder "$2")" 2>&1 | tee "$log"
-        code=${PIPESTATUS[0]}
-    fi
-    # "tests/contract/test_includes.py: 3 passed, 0 failed"; a file that counts nothing is one test.
-    if read -r good bad < <(sed -n '$s/.*: \([0-9]*\) passed, \([0-9]*\) failed.*/\1 \2/p' "$log"); then
-        passed=$((passed + good))
-        failed=$((failed + bad))
-    elif [ "$code" -eq 0 ]; then
-        passed=$((passed + 1))
-    else
-        failed=$((failed + 1))
-        echo "FAIL  $1"
-    fi
-}
-
-# PRESET FILE...: each in turn while the next one runs beside it.
-ask_all() {
-    local preset=$1
-    shift
-    while [ $# -gt 0 ]; do
-        [ $# -lt 2 ] || begin "$2" "$preset"
-        IMPACTD_RECORD=$record ask "$1" "$preset"
-        shift
+    local at one count
+    for at in "${!queue[@]}"; do
+        one=${queue[at]}
+        is_ready "$one" || continue
+        count=$(places "$one")
+        [ "$used" -eq 0 ] || [ $((used + count)) -le 2 ] || return
+        unset "queue[at]"
+        used=$((used + count))
+        local said=$work/said.$at
+        # shellcheck disable=SC2086
+        run $one >"$said" 2>&1 &
+        running[$!]=$one log[$!]=$said began[$!]=$SECONDS
     done
 }
 
-# What they say to daemons is recorded; the judge of that begins when all was said.
-judge=tests/contract/test_traffic.py
-mapfile -t files < <(printf '%s\n' tests/contract/test_*.py | grep -vxF "$judge")
-record=$(mktemp)
-while read -r file; do
-    begin "$file" release
-    [[ " ${presets[*]} " != *" debug "* ]] || ! grep -q '^SANITIZED = True' "$file" || begin "$file" debug
-done < <(grep -l '^WAITS = True' tests/contract/test_*.py)
-ask_all release "${files[@]}"
-begin "$judge" release
-said_to_daemons=$record
-record=
-ask_all release tests/browser/test_*.py tests/truth/test_*.py
-ask "$judge" release
-rm -f "$said_to_daemons"
-# What faces hostile input is asked once more of the instrumented program.
-if [[ " ${presets[*]} " == *" debug "* ]]; then
-    mapfile -t files < <(grep -l '^SANITIZED = True' tests/contract/test_*.py)
-    ask_all debug "${files[@]}"
-fi
-# And what concerns threads of the one that watches them.
-if [[ " ${presets[*]} " == *" tsan "* ]]; then
-    mapfile -t files < <(grep -l '^THREADED = True' tests/contract/test_*.py)
-    ask_all tsan "${files[@]}"
-fi
+# PROCESS CODE: tells what it said and adds its count.
+test_ended() {
+    local one=${running[$1]} said=${log[$1]} good=0 bad=0 all
+    unset "running[$1]"
+    used=$((used - $(places "$one")))
+    ! is_recorded "$one" || unsaid=$((unsaid - 1))
+    echo "-- ${one#* } (${one% *}, from ${began[$1]} to $SECONDS s)"
+    if [[ $one == *" ctest" ]]; then
+        # "100% tests passed, 0 tests failed out of 27"
+        if read -r bad all < <(sed -n 's/.*tests passed, \([0-9]*\) tests\{0,1\} failed out of \([0-9]*\).*/\1 \2/p' "$said"); then
+            good=$((all - bad))
+            [ "$bad" -eq 0 ] || cat "$said"
+            echo "$good programs passed, $bad failed"
+        else
+            cat "$said"
+            echo "FAIL  ctest found no tests in ${one% *}"
+            bad=1
+        fi
+    else
+        cat "$said"
+        # "tests/contract/test_includes.py: 3 passed, 0 failed"; a file that counts nothing is one test.
+        if ! read -r good bad < <(sed -n '$s/.*: \([0-9]*\) passed, \([0-9]*\) failed.*/\1 \2/p' "$said"); then
+            if [ "$2" -eq 0 ]; then
+                good=1 bad=0
+            else
+                good=0 bad=1
+                echo "FAIL  ${one#* }"
+            fi
+        fi
+    fi
+    passed=$((passed + good))
+    failed=$((failed + bad))
+}
+
+making=0
+while true; do
+    if [ -z "$builder" ] && [ "$making" -lt ${#presets[@]} ]; then
+        make_build "${presets[making]}" $((making == 0 ? 0 : 19))
+        making=$((making + 1))
+    fi
+    begin
+    [ -n "$builder" ] || [ ${#running[@]} -gt 0 ] || break
+    wait -n -p ended $builder "${!running[@]}"
+    code=$?
+    if [ "$ended" = "$builder" ]; then build_ended "${presets[making - 1]}" "$code"; else test_ended "$ended" "$code"; fi
+done
 
 echo
 echo "took $SECONDS s"

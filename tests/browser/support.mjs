@@ -75,6 +75,25 @@ export const leads = (page, pattern) => until(`an address like ${pattern}`, () =
   return found;
 });
 
+// Keeps the page waiting for the answers of the first `most` requests whose address matches: asked(count) waits until so many are
+// asked for; letGo() lets them come, and what the page does about them.
+export async function hold(page, pattern, most = Infinity) {
+  const held = [];
+  let isHeld = true;
+  await page.route(pattern, (route) => (isHeld && held.length < most ? void held.push(route) : route.fallback()));
+  return {
+    asked: (count = 1) => until(`${count} of ${pattern} to be asked for`, () => held.length >= count),
+    async letGo() {
+      isHeld = false;
+      for (const route of held) {
+        await route.fallback().catch(() => {}); // the page may not wait for it any more
+        await (await route.request().response())?.finished();
+      }
+      await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    },
+  };
+}
+
 // Bytes that the network brought while `action` ran and until the page fell quiet: bodies as sent, with their heads.
 export async function transferred(page, action) {
   const session = await page.context().newCDPSession(page);

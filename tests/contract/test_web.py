@@ -164,6 +164,7 @@ def test_the_daemon_serves_every_file():
             reply = daemon.get(f"/web/{path}")
             assert reply.status == 200 and reply.body == content, (path, reply)
             assert reply.headers["content-type"] == TYPES[os.path.splitext(path)[1]], (path, reply.headers)
+            assert reply.headers["etag"] == f'"{hashlib.sha256(content).hexdigest()[:32]}"', (path, reply.headers)
             assert policy(reply) == DIRECTIVES and reply.headers["x-content-type-options"] == "nosniff", (path, reply.headers)
             same = daemon.get(f"/web/{path}", headers={"If-None-Match": reply.headers["etag"]})
             # What a 304 tells replaces what a cache has: another policy would disarm the page when it is loaded again.

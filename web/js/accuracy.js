@@ -37,7 +37,7 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
     fill(news, "Every solver runs this scene …");
     refresh();
     try {
-      const now = await follow((await job).id, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
+      const now = await follow(await job, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
       fill(news, now.status !== "successful" && (now.problem?.detail ?? "Cancelled: nothing was measured."));
       if (now.status === "successful") {
         stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`));

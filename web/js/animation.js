@@ -96,11 +96,11 @@ function show(host, context) {
     requestAnimationFrame((next) => frame(next, now));
   }
   async function follow(next) {
-    const isChosen = next.impact !== seen.impact && next.t === seen.t, wasPlaying = playing; // chosen by another section
+    const isHere = next.t === seen.t, isChosen = isHere && next.impact !== seen.impact, wasPlaying = playing; // by another section
     seen = next;
     ({ from, to } = context.window);
     Object.assign(scrub, { min: from, max: to, step: (to - from) / 1000 });
-    if (playing && !isChosen && within(next.t) === t) return; // as said from here
+    if (playing && !isChosen && (isHere || within(next.t) === t)) return;
     turn(false);
     const row = isChosen || !next.t ? await ledger.at(next.impact).catch(() => null) : null;
     if (seen.impact !== next.impact || signal.aborted) return;

@@ -63,16 +63,16 @@ export const submit = (scene) => post("v1/jobs", scene, { headers: { Prefer: "wa
 // What the scene would come to, without running it: faults come as a Refusal.
 export const check = (scene) => post("v1/jobs?dry_run=1", scene);
 
-// Follows a job to its end, which is returned: `onChange(job)` at once, at its end and each second between. While nobody
-// answers (a daemon that starts anew takes its jobs up again) the job has `isLost`.
-export async function follow(id, onChange, signal) {
-  for (let job = null; ; ) {
+// Follows a job to its end, which is returned: `onChange(job)` each second and at its end. While nobody answers (a daemon that
+// starts anew takes its jobs up again) the job has `isLost`.
+export async function follow(job, onChange, signal) {
+  for (;;) {
     try {
-      job = await get(`v1/jobs/${encodeURIComponent(id)}`, { wait: job && 1 }, signal);
+      job = await get(`v1/jobs/${job.id}`, { wait: 1 }, signal);
       onChange(job);
       if (job.finished) return job;
     } catch (error) {
-      if (job === null || !(error.status === 0 || error.status >= 500)) throw error;
+      if (!(error.status === 0 || error.status >= 500)) throw error;
       onChange({ ...job, isLost: true });
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }

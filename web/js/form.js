@@ -1,6 +1,6 @@
 // A JSON Schema as a form over a draft: objects, their kinds, lists. What need not be said waits under "More"; what the schema
 // does not know is kept. Single values are fields.js.
-import { button, fill, h, sentence } from "./dom.js";
+import { button, fill, h, hint, sentence } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice, frame, typed } from "./fields.js";
 import { title, words } from "./units.js";
@@ -62,7 +62,7 @@ function node(context) {
 // A place with its name and help; a plain one has them from what is around it.
 const group = ({ pointer, schema, label, isPlain }, ...content) =>
   h(isPlain ? "div" : "fieldset", { class: isPlain ? null : "wide", "data-pointer": pointer },
-    !isPlain && [h("legend", null, label), h("p", { class: "hint" }, schema.description)], content);
+    !isPlain && [h("legend", null, label), hint(schema.description)], content);
 
 function object(context) {
   const { pointer, schema, draft, options, only } = context, { properties, required = [] } = schema;
@@ -115,7 +115,7 @@ function list(context) {
   const { pointer, schema, draft, options, label, required } = context;
   const one = label.replace("Axes", "Axis").replace(/(?<!i)s$/, "");
   const add = button(`Add ${one.toLowerCase()}`, () => put(value().length, 0, options.start?.(`${pointer}/N`) ?? {}));
-  const holder = h("div"), note = h("p", { class: "hint" }), value = () => [draft.get(pointer) ?? []].flat();
+  const holder = h("div"), note = hint(), value = () => [draft.get(pointer) ?? []].flat();
   let nodes = [];
   function put(at, gone, ...items) {
     const next = value().toSpliced(at, gone, ...items);

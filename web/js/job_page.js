@@ -56,6 +56,6 @@ export const page = {
     }
 
     draw(job);
-    if (isOpen(job)) follow(id, draw, signal).catch(fail);
+    if (isOpen(job)) follow(job, draw, signal).catch(fail);
   },
 };

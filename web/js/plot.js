@@ -24,7 +24,7 @@ function padded(values, log, part) {
 export function plot(host, given) {
   const state = { markers: [], spans: [], lines: [], series: [], height: 220, ...given }, { title } = state;
   const id = fresh("plot"), stop = new AbortController();
-  let chart = null, xs = [], columns = [], settling, telling;
+  let chart = null, xs = [], columns = [], settling, telling, isDue;
 
   const legend = h("div", { class: "legend", "aria-hidden": "true" }), place = h("span", { class: "quiet" }), behind = h("div");
   const summary = h("p", { class: "hint", id: `${id}-summary` });
@@ -171,6 +171,7 @@ export function plot(host, given) {
   }
 
   function renew() {
+    if ((isDue = box.matches(":active"))) return; // a click or drag that has begun would be lost
     arrange();
     build();
     show();
@@ -195,6 +196,7 @@ export function plot(host, given) {
   renew();
   sizes.observe(box);
   addEventListener("themechange", fit, stop);
+  addEventListener("mouseup", () => isDue && setTimeout(renew), stop);
   paper.addEventListener("change", fit, stop);
   function set(changes) {
     Object.assign(state, changes, settling && { range: state.range }); // the reader's, about to be told

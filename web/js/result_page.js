@@ -42,7 +42,10 @@ class Context {
 
   follow(view) {
     this.view = view;
-    for (const part of this.parts) attempt(part, async () => part.controller?.follow?.(this.view));
+    for (const part of this.parts) this.lead(part);
+  }
+  lead(part) {
+    attempt(part, () => part.controller?.follow?.(this.view));
   }
 
   // The window of time in view, whole unless the URL says otherwise.
@@ -84,7 +87,7 @@ export const page = {
       const { view } = context;
       part.controller = await attempt(part, () => section.show(inner, context));
       context.parts.push(part);
-      if (context.view !== view) context.follow(context.view); // it changed meanwhile
+      if (context.view !== view) context.lead(part); // it changed meanwhile
     });
     await Promise.all(shown);
     return {

@@ -99,15 +99,16 @@ async function show(host, address, signal) {
     event.preventDefault();
     runScene();
   }, { signal });
-  steps.addEventListener("change", () => timer && settle()); // leaving a field keeps it before a link is followed
+  // Leaving a field keeps it at once: a link may be followed before the URL has it.
+  steps.addEventListener("change", () => timer && (history.replaceState(draft.scene, ""), settle()));
 
   async function load(query) {
     fill(told);
     turn++;
     isEdited = false;
-    const mine = loading = open(query).catch((error) => faults(told)(error) ?? sponge()), scene = await mine;
+    const mine = loading = open(query, history.state).catch((error) => faults(told)(error) ?? sponge()), scene = await mine;
     if (mine !== loading) return; // another one was asked for since
-    const wasEdited = isEdited; // the URL may hold what was there before
+    const wasEdited = isEdited || history.state; // the URL may hold what was there before
     draft.replace(scene);
     isEdited = wasEdited;
   }

@@ -11,10 +11,11 @@ export const sponge = () => ({
   duration: 10, sample_rate: 1000,
 });
 
-// The scene that the query asks for.
-export async function open({ s, example, result, job, buffer, record }) {
+// The scene that was `left` here, else the one that the query asks for.
+export async function open({ s, example, result, job, buffer, record }, left) {
   const { title, ...scene } = sponge();
   const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`);
+  if (left) return left;
   if (s) return unpack(s).catch(() => Promise.reject(new Error("The scene in this link cannot be read. Was it cut off?")));
   if (example) return ask("examples", example);
   if (result) return typical((await ask("results", result)).scene);
@@ -41,6 +42,6 @@ function typical(scene) {
 // Keeps a scene in the URL of its page while it is the last one; false where it is too long for one.
 export async function keep(scene, isLast) {
   const s = await pack(scene), fits = s.length <= 100000;
-  if (isLast() && /^(scene)?$/.test(read().path.join())) history.replaceState(null, "", link("scene", fits ? { s } : {}));
+  if (isLast() && /^(scene)?$/.test(read().path.join())) history.replaceState(fits ? null : scene, "", link("scene", fits ? { s } : {}));
   return fits;
 }
