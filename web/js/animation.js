@@ -1,5 +1,5 @@
-// A result in slow motion in the drawing of its scene, piece by piece. What it shows follows from the view alone: the instant
-// t, else the start of the impact, else that of the window.
+// A result in slow motion, piece by piece. What it shows follows from the view: the instant t, else the start of the impact,
+// else that of the window.
 import { get } from "./api.js";
 import { button, faults, figures, fill, h } from "./dom.js";
 import { drawing, limit } from "./drawing.js";
@@ -26,8 +26,8 @@ function show(host, context) {
   const scrub = h("input", { type: "range", "aria-label": "Instant", onchange: say,
     oninput: () => (run(false), seek(scrub.value)),
     onkeydown: (event) => event.key === " " && (event.preventDefault(), run(!playing)) });
-  fill(host, h("div", { role: "group", "aria-label": "Player", class: "player" }, stage, scrub,
-    h("div", { class: "row" }, play, h("label", null, "Speed ", speed)), readout));
+  fill(host, h("div", { role: "group", "aria-label": "Player" }, stage, scrub,
+    h("div.row", null, play, h("label", null, "Speed ", speed)), readout));
 
   // The piece with the instant, once here.
   function piece() {
@@ -113,4 +113,4 @@ function show(host, context) {
   return { follow };
 }
 
-export const section = { id: "animation", title: "In slow motion", show };
+export const section = { title: "In slow motion", show };

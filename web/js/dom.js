@@ -13,8 +13,12 @@ function put(node, attributes, children) {
   return node;
 }
 
-// h("p", {class: "quiet", onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
-export const h = (tag, attributes, ...children) => put(document.createElement(tag), attributes, children);
+// h("p.quiet", {onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
+export function h(name, attributes, ...children) {
+  const [tag, ...classes] = name.split("."), node = document.createElement(tag);
+  node.classList.add(...classes);
+  return put(node, attributes, children);
+}
 
 // The same for SVG.
 export const s = (tag, attributes, ...children) => put(document.createElementNS(SVG, tag), attributes, children);
@@ -33,7 +37,7 @@ export function once(act) {
 export const button = (text, onclick, more) => h("button", { type: "button", onclick, ...more }, text);
 
 // [name, value] of what is to be seen at a glance.
-export const figures = (pairs) => h("dl", { class: "figures" }, pairs.map(([name, value]) =>
+export const figures = (pairs) => h("dl.figures", null, pairs.map(([name, value]) =>
   h("div", null, h("dt", null, name), h("dd", null, value))));
 
 // Lines, and a button that puts them into the clipboard.
@@ -106,10 +110,10 @@ export function table(caption, columns, rows, { sort = false } = {}) {
     h("table", null, h("caption", null, caption), h("thead", null, h("tr", null, heads)), body));
 }
 
-export const panel = (name, ...children) => h("section", { class: "panel", "aria-label": name }, h("h2", null, name), children);
+export const panel = (name, ...children) => h("section.panel", { "aria-label": name }, h("h2", null, name), children);
 
 // A quiet line of help.
-export const hint = (...children) => h("p", { class: "hint" }, children);
+export const hint = (...children) => h("p.hint", null, children);
 
 // Something that opens: the content is made when it is first seen.
 export function folded(summary, make, open = false) {

@@ -1,5 +1,5 @@
-// A scene as a picture: structure, free masses, stops; displacements and clearances share one scale, which a bar states.
-// It can be posed without being built anew. What it cannot read it leaves out.
+// A scene as a picture that can be posed: displacements and clearances share one scale, which a bar states. What it cannot
+// read it leaves out.
 import { fill, h, hint, s } from "./dom.js";
 import { number, quantity, words } from "./units.js";
 
@@ -130,7 +130,7 @@ function build(scene, { plan, stroke }, width) {
 // show(scene, {plan, stroke}): `stroke` is the largest displacement, without it the start is dashed; returns which {storeys,
 // dampers} are drawn, from 0. pose(displacements of storeys, positions of free masses in theirs), in m.
 export function drawing(host) {
-  const box = host.appendChild(h("div", { class: "drawing" }));
+  const box = host.appendChild(h("div.drawing"));
   let asked = null, picture = null, posed = [[], []];
   function show(...scene) {
     asked = scene;

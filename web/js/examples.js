@@ -7,7 +7,7 @@ const groups = [["The paper", /Li and Darby/], ["Studies", /^(sweep|ensemble|sen
 
 export function examplesDialog() {
   const list = h("div", null, "Loading …"), close = () => dialog.close();
-  const dialog = h("dialog", { class: "wide", "aria-label": "Examples", onclose: () => dialog.remove() },
+  const dialog = h("dialog.wide", { "aria-label": "Examples", onclose: () => dialog.remove() },
     button("Close", close), list);
   document.querySelector("main").append(dialog); // gone with the page
   dialog.showModal();

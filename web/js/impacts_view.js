@@ -1,9 +1,9 @@
-// The impacts in the window of time as rows, and one at full detail: its force and the part of it that pulls. Which one is
-// view.impact, its number in the ledger from 1; unless that is said, the hardest of the rows.
+// The impacts in the window of time as rows, and one at full detail with the part that pulls: view.impact, its number from 1,
+// else the hardest of the rows.
 import { get } from "./api.js";
 import { button, figures, fill, h, table } from "./dom.js";
 import { plot } from "./plot.js";
-import { column } from "./study_bits.js";
+import { figure } from "./plan_view.js";
 import { share } from "./summary_view.js";
 import { number, quantity } from "./units.js";
 
@@ -12,7 +12,7 @@ const FIGURES = [["Approach", "approach_speed", "m/s"], ["Separation", "separati
   ["Contact time", "duration", "s"], ["Peak force", "peak_force", "N"], ["Impulse", "impulse", "N s"],
   ["Energy lost", "energy_lost", "J"]];
 
-export const section = { id: "impacts", title: "Impacts", show };
+export const section = { title: "Impacts", show };
 
 async function show(host, context) {
   const { ledger, path, result } = context, { count, resting } = await ledger.count(), total = count + resting;
@@ -26,7 +26,7 @@ async function show(host, context) {
       button(nth, () => (choose(nth), host.scrollIntoView()), { class: "quiet sort", "aria-label": `Show impact ${nth}` }) },
     { label: "Start", numeric: true, value: ({ start }) => start, cell: ({ start }) => quantity(start, "s", 7) },
     { label: "Damper, stop", value: ({ damper, side, kind }) => `${damper}, ${side}${kind === "resting" ? ", resting" : ""}` },
-    ...FIGURES.map(([label, key, unit]) => column(label, unit, (row) => row[key]))];
+    ...FIGURES.map(figure)];
 
   let wanted, listed, shown;
   async function follow({ impact: nth }) {
@@ -44,7 +44,7 @@ async function show(host, context) {
     if (impacts !== listed) fill(all, table(`${number(here)} in this window of time${isCut ? `, here the first ${MOST}` : ""}`,
       columns, impacts, { sort: !isCut }));
     if (impact.number !== shown?.number) {
-      const box = h("div", { class: "columns" }, !force && "An impulse takes no time and has no force.");
+      const box = h("div.columns", null, !force && "An impulse takes no time and has no force.");
       fill(one, figures(columns.slice(1).map(({ label, value, cell = value }) => [label, cell(impact)])), box);
       if (force) charts(box, impact, force);
     }
@@ -56,7 +56,7 @@ async function show(host, context) {
     context.change({ impact: nth, from: Math.max(0, start - around), to: (end ?? start) + around }, true);
   }
   await follow(context.view);
-  fill(host, h("div", { class: "row" }, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
+  fill(host, h("div.row", null, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
     button("Next →", step(1)), button("See it in the series", see)), one, all);
   return { follow };
 }

@@ -1,4 +1,4 @@
-// A result's ledger of impacts, in windows: it may hold hundreds of thousands. Each has its `number` from 1.
+// A result's ledger of impacts, in windows, for it may be long. Each has its `number` from 1.
 import { get } from "./api.js";
 
 export class Ledger {

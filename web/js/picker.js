@@ -1,4 +1,4 @@
-// What stands at a damper's stops: a material and its revision, or numbers of one's own, and what that comes to here.
+// What stands at a damper's stops: a material, or numbers of one's own, and what that comes to here.
 import { get } from "./api.js";
 import { faults, fill, folded, h } from "./dom.js";
 import { choice } from "./fields.js";
@@ -35,9 +35,9 @@ export function bufferWidget({ pointer, label, schema, draft }) {
   const revision = choice({ pointer, schema: { default: "newest" }, label: "Revision",
     draft: { ...draft, ...ofSlug, faultsAt: () => [] } },
     () => revisions.map((one) => [`@${one.revision}`, `@${one.revision}, ${one.status}`]));
-  const inner = h("div"), derived = h("div", { class: "derived" });
+  const inner = h("div"), derived = h("div.derived");
   const box = h("fieldset", null, h("legend", null, isBoth ? "Buffers" : label),
-    h("div", { class: "fields" }, material.element, revision.element), inner, derived);
+    material.element, revision.element, inner, derived);
   const same = h("input", { type: "checkbox", onchange() {
     const now = [pointer, ...sides].map(draft.get).find(Boolean), isOne = same.checked;
     for (const side of sides) draft.set(side, isOne ? undefined : structuredClone(now));
@@ -92,7 +92,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     fill(derived, h("p", null, `k_b ${value("stiffness", "N/m")}, c_b ${value("damping", "N s/m")}, ζ ${value("damping_ratio")}`,
       ` for an effective mass of ${quantity(one.effective_mass, "kg")}`, same?.stiffness.uncertainty && " (± one deviation)"),
     first && folded(`Measured from ${range(least_speed, most_speed, "m/s")}, ${warnings.length} warnings`,
-      () => h("ul", { class: "hint" }, warnings.map(({ detail }) => h("li", null, detail)))));
+      () => h("ul.hint", null, warnings.map(({ detail }) => h("li", null, detail)))));
   }
   return { refresh, element: h("div", null, box, isBoth && h("label", null, same, " The same on both sides")) };
 }

@@ -1,5 +1,4 @@
-// One chart over an axis: uPlot's lines with units, marks, values at the cursor, zoom, a summary and a table. Nothing else
-// knows uPlot.
+// One chart: uPlot's lines with units, marks, values at the cursor, zoom, a summary and a table. Nothing else knows uPlot.
 import uPlot from "../vendor/uplot/uPlot.esm.js";
 import { button, fill, folded, fresh, h, table, tell } from "./dom.js";
 import { number, pretty, quantity } from "./units.js";
@@ -26,19 +25,19 @@ export function plot(host, given) {
   const id = fresh("plot"), stop = new AbortController();
   let chart = null, xs = [], columns = [], settling, telling, isDue;
 
-  const legend = h("div", { class: "legend", "aria-hidden": "true" }), place = h("span", { class: "quiet" }), behind = h("div");
-  const summary = h("p", { class: "hint", id: `${id}-summary` });
-  const box = h("div", { class: "plot", tabindex: "0", role: "application", "aria-label": title,
+  const legend = h("div.legend", { "aria-hidden": "true" }), place = h("span.quiet"), behind = h("div");
+  const summary = h("p.hint", { id: `${id}-summary` });
+  const box = h("div.plot", { tabindex: "0", role: "application", "aria-label": title,
     "aria-describedby": `${id}-summary`, onkeydown: key });
   const tools = [["Whole", "Show the whole", () => choose()], ["+", "Zoom in", () => turn(0.5)],
     ["−", "Zoom out", () => turn(2)]].map(([text, what, act]) =>
     button(text, act, { class: "quiet", "aria-label": `${what}: ${title}`, title: what }));
-  const figure = h("figure", { class: "chart", "aria-label": title }, h("div", { class: "row" }, h("h3", null, title),
-    h("div", { class: "tools" }, tools)), summary, legend, box, behind);
+  const figure = h("figure.chart", { "aria-label": title }, h("div.row", null, h("h3", null, title),
+    h("div.tools", null, tools)), summary, legend, box, behind);
   host.append(figure);
 
-  // uPlot wants columns over one shared x: undefined is nothing, null a gap. A second value at one x stands right beside the
-  // first. A band is two columns.
+  // uPlot wants columns over one x: undefined is nothing, null a gap. A second value at an x stands right beside the first; a
+  // band is two columns.
   function arrange() {
     const rows = new Map(); // x -> [value, index in its series] of each column
     columns = state.series.flatMap((one, at) => (one.low
@@ -57,7 +56,7 @@ export function plot(host, given) {
   }
 
   const placed = (x) => quantity(x, state.x.unit, 6), said = (y) => quantity(y, state.y.unit);
-  const whole = () => state.whole ?? padded(xs, state.x.log, state.series.some((one) => one.points) ? 0.03 : 0);
+  const whole = () => state.whole ?? padded(xs, state.x.log, state.onPick || state.series.some((one) => one.points) ? 0.03 : 0);
   const inView = () => state.range ?? whole();
   const reach = (u, low, high) => // of what is in view
     padded([low, high, ...state.lines.map((line) => line.y)].filter((value) => isShown(value, state.y.log)), state.y.log, 0.07);

@@ -2,7 +2,7 @@
 import { accuracyWidget } from "./accuracy.js";
 import { go } from "./address.js";
 import { check, schema, submit } from "./api.js";
-import { button, failure, faults, fill, h, once } from "./dom.js";
+import { button, failure, faults, fill, h, once, panel } from "./dom.js";
 import { makeDraft } from "./draft.js";
 import { drawing } from "./drawing.js";
 import { examplesDialog } from "./examples.js";
@@ -17,8 +17,8 @@ const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/,
 
 // The scene as text to edit, in step with the form while it is not typed in.
 function jsonView(draft) {
-  const name = "The scene as JSON", fault = h("p", { class: "fault", role: "status" });
-  const area = h("textarea", { class: "code", rows: "28", spellcheck: "false", "aria-label": name, oninput() {
+  const name = "The scene as JSON", fault = h("p.fault", { role: "status" });
+  const area = h("textarea.code", { rows: "28", spellcheck: "false", "aria-label": name, oninput() {
     fault.textContent = "";
     try {
       draft.replace(Object.assign({}, JSON.parse(area.value)));
@@ -26,7 +26,7 @@ function jsonView(draft) {
       fault.textContent = `No scene yet: ${error.message}`; // browsers name the line
     }
   } });
-  const element = h("details", { class: "panel" }, h("summary", null, h("h2", null, name)), fault, area);
+  const element = h("details.panel", null, h("summary", null, h("h2", null, name)), fault, area);
   return { element, refresh() {
     if (document.activeElement === area) return;
     fault.textContent = "";
@@ -36,22 +36,21 @@ function jsonView(draft) {
 
 async function show(host, address, signal) {
   const draft = makeDraft(sponge(), signal), json = jsonView(draft);
-  const steps = h("div", null, "The form is on its way …"), drawn = h("div", { class: "panel drawn" });
-  const told = h("div"), state = h("p", { class: "hint", role: "status" }), comes = h("div");
-  const run = button("Run", () => runScene(), { class: "primary run", "aria-keyshortcuts": "Control+Enter" });
+  const steps = h("div", null, "The form is on its way …"), drawn = h("div.panel.drawn");
+  const told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
+  const run = button("Run", () => runScene(), { class: "primary run", title: "Ctrl + Enter", "aria-keyshortcuts": "Control+Enter" });
   fill(host, h("h1", null, "Scene"),
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
       button("Examples", examplesDialog)), told,
-    h("div", { class: "scene" }, h("div", null, steps), h("div", { class: "beside" }, drawn,
-      h("div", null, h("div", { class: "row" }, run, h("span", { class: "hint" }, "Ctrl + Enter")),
-        h("div", { class: "panel" }, h("h2", null, "What it comes to"), state, comes)))));
+    h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
+      h("div", null, h("p", null, run), panel("What it comes to", state, comes)))));
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
   let timer = null, turn = 0, isEdited = false, loading;
   const goTo = (pointer) => focusField(steps, pointer);
 
-  // Keeps the scene and asks the service, by check() or submit(); only the last question's answer counts.
+  // Keeps the scene and asks the service; only the last question's answer counts.
   async function ask(question, answered) {
     const mine = ++turn, isLast = () => mine === turn && !signal.aborted;
     clearTimeout(timer);

@@ -2,7 +2,7 @@
 import { link, pack, read, unpack } from "./address.js";
 import { get } from "./api.js";
 
-// The paper's structure and ball between two sponges: there before anything is fetched.
+// There before anything is fetched.
 export const sponge = () => ({
   title: "The paper's sponge, released from 15 mm",
   structure: { mass: 1.35, stiffness: 865, damping: 1.092 },
@@ -28,7 +28,7 @@ export async function open({ s, example, result, job, buffer, record }, left) {
 
 export const storeysOf = ({ structure } = {}) => [structure?.masses ?? structure?.mass].flat().length;
 
-// A scene that was run as one would type it: materials by name, the usual channels unsaid. It is the same scene.
+// The same scene as one would type it: materials by name, the usual channels unsaid.
 function typical(scene) {
   const { dampers = [], output, study = {} } = scene, { channels } = output;
   for (const damper of dampers) for (const name in damper) damper[name] = damper[name].material ?? damper[name];

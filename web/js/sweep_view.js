@@ -1,10 +1,10 @@
-// The points of a sweep that are there so far: over two axes a map, over one of numbers a line, else a table. Each opens.
+// The points of a sweep so far: over two axes a map, over one of numbers a line, else a table. Each opens.
 import { note, read } from "./address.js";
 import { get, post, submit } from "./api.js";
 import { button, figures, fill, folded, h, hint, notice, table } from "./dom.js";
 import { heat } from "./heat.js";
 import { plot } from "./plot.js";
-import { jobButton, told } from "./study_bits.js";
+import { jobButton, sceneLink, told } from "./study_bits.js";
 import { title, words } from "./units.js";
 
 export const show = (host, { path, result: { study } }) => (study.points <= 100000 ? sweepView(host, `${path}/table.json`)
@@ -77,7 +77,7 @@ export async function sweepView(host, path, job) {
   function open(index) {
     const point = points.get(Number(index)), scene = answer.links.scene.replace("{index}", index);
     fill(opening, point ? [h("h3", null, `Point ${index}`), figures(fields.map(({ label, cell }) => [label, cell(point)])),
-      jobButton("Run this point", async () => submit(await get(scene)))]
+      jobButton("Run this point", async () => submit(await get(scene))), " ", sceneLink("Change its scene", get(scene))]
       : hint("A click or Enter opens a point."));
   }
   follow();
