@@ -106,7 +106,7 @@ export function table(caption, columns, rows, { sort = false } = {}) {
       { scope: at === 0 && "row", class: kind(column) }, (column.cell ?? column.value)(row) ?? "–")))));
   }
   draw();
-  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
+  return h("div.scroll", { tabindex: "0", role: "region", "aria-label": caption },
     h("table", null, h("caption", null, caption), h("thead", null, h("tr", null, heads)), body));
 }
 

@@ -51,7 +51,7 @@ export function dropGrid({ pointer, schema, draft }) {
   }
   add();
   const heads = ["#", ...columns.map(([name, { "x-unit": unit }]) => title(name) + (unit ? `, ${unit}` : "")), "e"];
-  const element = h("div", null, h("div", { class: "scroll" }, h("table", { class: "drops", "aria-label": "Drops" },
+  const element = h("div", null, h("div.scroll", null, h("table.drops", { "aria-label": "Drops" },
     h("thead", null, h("tr", null, heads.map((head) => h("th", { scope: "col" }, head)))), body)),
   hint("Enter goes down, Tab right; columns can be pasted."));
   return { element, refresh() {

@@ -14,9 +14,9 @@ export const page = {
     let job = await get(path), rows = null, isLooking = false;
     const state = h("p"), told = h("div"), news = h("div"), table = h("div"), fail = faults(news);
     const bar = h("progress", { max: 100, "aria-label": "Progress" }), cancelButton = button("Cancel", cancel);
-    const change = h("a", { class: "button", href: link("scene", { job: id }) }, "Change the scene");
-    fill(host, h("h1", null, named(job)), h("section", { class: "panel" }, state, bar, told, news,
-      h("div", { class: "row" }, cancelButton, change)), table);
+    const change = h("a.button", { href: link("scene", { job: id }) }, "Change the scene");
+    fill(host, h("h1", null, named(job)), h("section.panel", null, state, bar, told, news,
+      h("div.row", null, cancelButton, change)), table);
 
     // After each news of it: how long it has run, how long it will at this pace, and which rows of a sweep are there.
     function draw(next) {

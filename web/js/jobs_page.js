@@ -17,10 +17,10 @@ export const page = {
   title: () => "Runs",
   show(host) {
     let last = "", isAgain = false;
-    const list = h("div", { class: "runs" }, "Loading …");
+    const list = h("div.runs", null, "Loading …");
     const choice = (name, values) => h("select", { name }, h("option", { value: "" }, "All"),
       values.map((value) => h("option", { value }, STATES[value] ?? title(value))));
-    const search = h("form", { class: "row", role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
+    const search = h("form.row", { role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
       h("label", null, "Title or label ", h("input", { name: "q", type: "search" })),
       h("label", null, "State ", choice("status", Object.keys(STATES))), h("label", null, "Study ", choice("kind", KINDS)));
     fill(host, h("h1", null, "Runs"), search, list);
@@ -61,7 +61,7 @@ export const page = {
     const target = (job) => (job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`);
     const columns = [
       { label: "Run", cell: (job) => [h("a", { id: job.id, href: link(target(job)) }, named(job)), " ",
-        job.labels && h("span", { class: "hint" }, job.labels.join(", "), " "),
+        job.labels && h("span.hint", null, job.labels.join(", "), " "),
         isOpen(job) && button("Cancel", ({ target }) => cancel(job, target),
           { id: `stop-${job.id}`, "aria-label": `Cancel ${named(job)}` })] },
       { label: "State", cell: badge },

@@ -35,7 +35,7 @@ async function open(address, path, signal, last) {
     if (!pages.includes(name)) throw new Error(`There is no page "${path}" here.`);
     const { page } = await import(`./${name}_page.js`);
     if (signal.aborted) return null;
-    const title = page.title(address), host = h("div", { class: "page" }, "Loading …");
+    const title = page.title(address), host = h("div.page", null, "Loading …");
     document.title = `${title} · impactd`;
     fill(main, host);
     if (last) {
@@ -74,7 +74,7 @@ const askToken = once(() => new Promise((resolve) => {
   const button = (text, value) => h("button", { value, formnovalidate: true }, text);
   const dialog = h("dialog", { onclose }, h("form", { method: "dialog" }, h("h2", null, "A token is asked for"),
     h("p", null, "Whoever runs this service makes one with ", h("code", null, "impactd token create"), "."),
-    h("label", null, "Token ", input), h("div", { class: "row" }, h("button", { class: "primary", value: "use" }, "Use it"),
+    h("label", null, "Token ", input), h("div.row", null, h("button.primary", { value: "use" }, "Use it"),
       button("Not now", ""), token() && button("Forget the one in use", "forget"))));
   function onclose() {
     const isUsed = dialog.returnValue === "use";

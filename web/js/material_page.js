@@ -6,7 +6,7 @@ import { writeForm } from "./material_form.js";
 import { badge, differences, FIGURES, path, readMaterial, shown, STATUS } from "./material_parts.js";
 import { moment, title } from "./units.js";
 
-const to = (text, page, query, kind) => h("a", { href: link(`materials/${page}`, query), class: kind }, text);
+const to = (text, page, query) => h("a", { href: link(`materials/${page}`, query) }, text);
 
 function facts(material, properties) {
   const others = Object.keys(properties).filter((name) => !/^(name|comment|measurem|table|restitution|contact_time)/.test(name));
@@ -51,12 +51,12 @@ export const page = {
     const [{ revisions }, { history: steps }, { total, results }, { properties }] = await Promise.all([list("/revisions"),
       list("/history"), list(`@${revision}/used-by`), schema("material_revision")]);
     fill(host, h("h1", null, name, " ", badge(status)),
-      h("p", { class: "quiet" }, h("code", null, buffer), ` of ${latest}. Scenes without a revision take the newest approved.`),
-      h("div", { class: "row" }, h("a", { href: link("scene", { buffer }), class: "button" }, "Simulate with it"),
-        to("Enter a drop test", `${slug}/measure`, {}, "button")),
+      h("p.quiet", null, h("code", null, buffer), ` of ${latest}. Scenes without a revision take the newest approved.`),
+      h("div.row", null, h("a.button", { href: link("scene", { buffer }) }, "Simulate with it"),
+        h("a.button", { href: link(`materials/${slug}/measure`) }, "Enter a drop test")),
       folded(`Results made with it: ${total}`, () => h("ul", null, results.map(({ id, created }) =>
         h("li", null, h("a", { href: link(`results/${id}`) }, moment(created)))))),
-      h("div", { class: "columns" }, facts(material, properties), changes(material, properties), trail(slug, steps)),
+      h("div.columns", null, facts(material, properties), changes(material, properties), trail(slug, steps)),
       await history(material, revisions));
   },
 };

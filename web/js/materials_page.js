@@ -14,7 +14,7 @@ const COLUMNS = [
   { label: "Measured at", value: (row) => row.most_speed, cell: (row) => range(row.least_speed, row.most_speed, "m/s") }, STATUS,
 ];
 
-const search = (query) => h("form", { class: "row level", role: "search", onsubmit(event) {
+const search = (query) => h("form.row.level", { role: "search", onsubmit(event) {
   event.preventDefault();
   go("materials", Object.fromEntries(new FormData(event.target)));
 } }, Object.entries(FILTERS).map(([name, [label, placeholder]]) =>
@@ -40,11 +40,11 @@ function importing() {
 export const page = {
   title: () => "Materials",
   show(host, { query }) {
-    const list = h("div"), count = h("div", { class: "quiet", role: "status" }, "Loading …");
+    const list = h("div"), count = h("div.quiet", { role: "status" }, "Loading …");
     const exporting = ["materials.csv", "materials.json"].map((name) => button(`Export ${name}`, () => save(`v1/${name}`, name)));
     fill(host, h("h1", null, "Materials"), h("p", null, "What a lab measured of its buffers."),
-      h("div", { class: "panel" }, search(query), count, list), h("div", { class: "panel" },
-        folded("Add a material", adding), folded("Import", importing), h("div", { class: "row" }, exporting)));
+      h("div.panel", null, search(query), count, list), h("div.panel", null,
+        folded("Add a material", adding), folded("Import", importing), h("div.row", null, exporting)));
     get("v1/materials", { ...query, limit: MOST }).then(({ materials }) => {
       fill(count, `${materials.length} found${materials.length === MOST ? ", perhaps more: narrow the search" : ""}`);
       fill(list, table("Materials", COLUMNS, materials, { sort: true }));

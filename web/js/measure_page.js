@@ -26,7 +26,7 @@ function results({ evaluation, warnings }) {
 async function entry(host, { slug }, signal) {
   const draft = makeDraft({}, signal), fields = h("div"), outcome = h("div");
   const out = h("div", { role: "status" }, "Heights or speeds give e, durations or force traces T_c.");
-  const button = h("button", { class: "primary", onclick: keep }, "Keep this test (Ctrl+Enter)");
+  const button = h("button.primary", { onclick: keep }, "Keep this test (Ctrl+Enter)");
   const refused = refusal(draft, fields, outcome);
   let turn = 0, timer;
 
@@ -55,7 +55,7 @@ async function entry(host, { slug }, signal) {
   form(fields, { schema: await schema("measurement"), draft, shows: (pointer) => /^.(drops|traces)/.test(pointer),
     widgets: [[/^.drops$/, dropGrid], [/^.traces.\d+.force$/, traceWidget],
       [/interval$/, () => ({ element: h("div", { hidden: true }), refresh() {} })]] }); // a trace's file tells it
-  fill(host, h("div", { class: "columns", onkeydown: (event) => event.key === "Enter" && event.ctrlKey && button.click() },
+  fill(host, h("div.columns", { onkeydown: (event) => event.key === "Enter" && event.ctrlKey && button.click() },
     panel("What was read", fields), panel("What it comes to", out, button, outcome)));
   draft.onChange(({ pointer }) => {
     if (pointer === undefined || button.disabled) return;
@@ -72,7 +72,7 @@ async function entry(host, { slug }, signal) {
 async function proposal(host, material, measurements) {
   const answer = await ask("GET", path(material.slug, "/proposal"), { query: { measurements } }), found = await answer.json();
   const seen = { ...material, etag: answer.headers.get("ETag") };
-  fill(host, h("div", { class: "columns" }, panel(`What comes of test ${measurements}`, found.revision === null
+  fill(host, h("div.columns", null, panel(`What comes of test ${measurements}`, found.revision === null
     ? notice("warn", "No revision", h("p", null, found.why))
     : await writeForm("material_revision", found.revision, `Make it revision ${seen.latest + 1}`, seen, "/revisions")),
   panel("What it comes to", results(found))));

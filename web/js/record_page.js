@@ -16,14 +16,14 @@ export const page = {
   async show(host, address) {
     const path = `v1/records/${encodeURIComponent(address.path[1])}`;
     const { links, used_by, name, created, ...facts } = await get(path);
-    const news = h("div"), picture = h("div", { class: "panel" });
+    const news = h("div"), picture = h("div.panel", null);
     const act = (label, does) => button(label, () => does().catch(faults(news)));
-    fill(host, h("h1", null, name), h("div", { class: "row" },
-      h("a", { class: "button", href: link("scene", { record: name }) }, "Use in a scene"),
+    fill(host, h("h1", null, name), h("div.row", null,
+      h("a.button", { href: link("scene", { record: name }) }, "Use in a scene"),
       ["csv", "npy", "mat", "json"].map((format) =>
         act(`.${format}`, () => save(`${path}/samples.${format}`, `${name}.${format}`))),
       act("Delete", async () => confirm(`Delete ${name} for good?`) && (await ask("DELETE", path), go("records")))),
-    news, picture, h("div", { class: "panel" }, figures(Object.entries({ ...facts, uploaded: moment(created), ...used_by })
+    news, picture, h("div.panel", null, figures(Object.entries({ ...facts, uploaded: moment(created), ...used_by })
       .filter(([, value]) => value !== null).map(([fact, value]) => [title(fact), told(fact, value)]))));
 
     const say = (fact) => told(fact, facts[fact]);
