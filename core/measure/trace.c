@@ -33,7 +33,7 @@ const Field trace_seen_fields[] = {
     FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
     FIELD_REAL(TraceSeen, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
     FIELD_REAL(TraceSeen, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
-    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, or no pulse fits"),
+    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, no pulse fits, or the trace begins or ends meanwhile"),
     FIELD_REAL(TraceSeen, end, "s", ANY, OPTIONAL, "when it ends"),
     FIELD_REALS(TraceSeen, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
     FIELD_REAL(TraceSeen, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
@@ -250,8 +250,8 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     TRY(trace_interval(window, fits, count, is_form_sure, &likely));
     TRY(draw(fit, &shape, found, run, &contact->seen.pulse));
     const TraceContact counted = *contact;
-    contact->seen.start = (origin + likely.start.mean) * interval;
-    contact->seen.end = (origin + likely.end.mean) * interval;
+    contact->seen.start = (origin + fit->at.part[0]) * interval;
+    contact->seen.end = (origin + fit->at.part[1]) * interval;
     contact->contact_time = likely.contact_time.mean * interval;
     contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
     contact->least_contact_time = likely.least * interval;

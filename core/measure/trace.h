@@ -36,7 +36,7 @@ typedef struct TraceSeen {
     double crossing_time, crossing_uncertainty; // [s]
     double crossing_shortfall;                  // [-]
     double impulse;                             // of the pulse that fits best, with its sign [N s]
-    double start, end;                          // of the fitted pulse [s]
+    double start, end;   // of the fitted pulse, also where others fit as well [s]
     Reals pulse;         // TRACE_PULSE forces of it as the trace has them, from start to end [N]
     double misfit;       // rms of what the fit leaves over the noise
     double misfit_share; // and over the peak

@@ -338,8 +338,6 @@ Status trace_interval(const TraceWindow *window, const TraceFit *fits, size_t co
         const double freedom = fmax((double)window->blocks + window->noise_freedom - 5, 1);
         const double widening = 1 + 1.2 / freedom;
         interval->contact_time = belief(pieces, found, CONTACT_TIME);
-        interval->start = belief(pieces, found, START);
-        interval->end = belief(pieces, found, END);
         interval->decay = belief(pieces, found, DECAY);
         interval->least = quantile(pieces, found, 0.025, widening);
         interval->most = quantile(pieces, found, 0.975, widening);

@@ -11,7 +11,7 @@ typedef struct TraceBelief {
     double mean, deviation;
 } TraceBelief;
 typedef struct TraceInterval {
-    TraceBelief contact_time, decay, start, end;
+    TraceBelief contact_time, decay;
     double least, most; // of contact_time
 } TraceInterval;
 

@@ -48,6 +48,6 @@ Handler materials_revisions, materials_history, materials_diff, materials_uses,
 Handler records_create, records_list, records_show, records_samples, records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
-Handler assets_show, assets_show_vendor, assets_show_icon;
+Handler assets_show, assets_show_icon;
 
 #endif

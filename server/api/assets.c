@@ -2,7 +2,6 @@
 // mostly answered by "not changed", so that it is never older than the program.
 #include "server/api/assets.h"
 
-#include <stdio.h>
 #include <string.h>
 
 #include "server/api/app.h"
@@ -16,7 +15,6 @@ static const struct {
     {".js", "text/javascript; charset=utf-8"},
     {".css", "text/css; charset=utf-8"},
     {".svg", "image/svg+xml"},
-    {".html", "text/html; charset=utf-8"},
 };
 
 Status assets_reply(const Request *request, Reply *reply, const EmbeddedFile *file,
@@ -26,35 +24,23 @@ Status assets_reply(const Request *request, Reply *reply, const EmbeddedFile *fi
     return STATUS_OK;
 }
 
+// NULL: not to be had by its own path, from where the page's links would lead nowhere.
 static const char *type_of(const char *path) {
     const char *extension = strrchr(path, '.');
     for (size_t i = 0; extension != NULL && i < COUNT(types); i++)
         if (strcmp(extension, types[i].extension) == 0)
             return types[i].content_type;
-    return "application/octet-stream";
-}
-
-// The route's parameters follow `folder`.
-static Status show(const char *folder, const Request *request, Reply *reply, Problem *problem) {
-    char path[256];
-    size_t used = (size_t)snprintf(path, sizeof path, "%s", folder);
-    for (size_t i = 0; i < REQUEST_PARAMETERS && request->parameters[i] != NULL; i++)
-        used += (size_t)snprintf(path + used, sizeof path - used, "/%.60s", request->parameters[i]);
-    const EmbeddedFile *file = embedded_find(embedded_web, path);
-    if (file == NULL)
-        return problem_set(problem, STATUS_NOT_FOUND, "the dashboard has no file \"%.120s\"", path);
-    reply->policy = shield_page_policy;
-    return assets_reply(request, reply, file, type_of(path));
+    return NULL;
 }
 
 Status assets_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;
-    return show("web", request, reply, problem);
-}
-
-Status assets_show_vendor(App *app, const Request *request, Reply *reply, Problem *problem) {
-    (void)app;
-    return show("web/vendor", request, reply, problem);
+    const char *path = request->path + 1, *type = type_of(path); // a file's path has no first slash
+    const EmbeddedFile *file = embedded_find(embedded_web, path);
+    if (file == NULL || type == NULL)
+        return problem_set(problem, STATUS_NOT_FOUND, "the dashboard has no file \"%.120s\"", path);
+    reply->policy = shield_page_policy;
+    return assets_reply(request, reply, file, type);
 }
 
 Status assets_show_icon(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -110,13 +110,8 @@ static Status reply_columns(App *app, Reply *reply, const Encoder *encoder, Docu
     return status;
 }
 
-// The window of a ledger that the query asks for; *is_asked is false where it is all.
-static Status impact_window(const Request *request, ImpactWindow *window, bool *is_asked,
-                            Problem *problem) {
-    static const char *const names[] = {"from", "to", "first", "limit"};
-    *is_asked = false;
-    for (size_t i = 0; i < COUNT(names); i++)
-        *is_asked = *is_asked || request_query(request, names[i]) != NULL;
+// The window of a ledger that the query asks for.
+static Status impact_window(const Request *request, ImpactWindow *window, Problem *problem) {
     TRY(request_number(request, "from", 0, 1e12, 0, &window->from, problem));
     TRY(request_number(request, "to", 0, 1e12, 1e12, &window->to, problem));
     TRY(request_count(request, "first", 1, 1000000000, 1, &window->first, problem));
@@ -132,10 +127,9 @@ static Status impact_window(const Request *request, ImpactWindow *window, bool *
 static Status choose_impacts(App *app, const Request *request, bool is_json, const char **text,
                              Bytes *bytes, Problem *problem) {
     ImpactWindow window;
-    bool is_asked;
-    TRY(impact_window(request, &window, &is_asked, problem));
-    if (!is_asked)
+    if (request->query_count == 0) // there is nothing else to ask for
         return STATUS_OK;
+    TRY(impact_window(request, &window, problem));
     bytes->most = app->reply_most;
     TRY(kept_impacts_window(*text, &window, is_json, bytes, problem));
     if (bytes->is_failed)

@@ -161,25 +161,14 @@ Status records_show(App *app, const Request *request, Reply *reply, Problem *pro
 // All samples, or those asked for by time, or extremes of buckets of them.
 static Status fill(const Request *request, const NamedRecord *named, Sheet *sheet,
                    Problem *problem) {
-    const Column all = {
-        .name = "acceleration", .unit = "m/s^2", .values = (double *)named->samples.at};
-    const size_t count = named->samples.count;
-    Table *table = &sheet->table;
-    *table = (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
-    TRY(sheet_make(sheet, 1, problem));
-    sheet->chosen[0] = &all;
-    table->column_count = 1;
-    TRY(tables_window(request, count, table, problem));
-    TRY(tables_buckets(request, sheet, problem));
-    if (table->bucket > 0)
-        return STATUS_OK;
-    const size_t rows = table->count;
-    TRY(columns_make(&sheet->own, 1, count, 0, problem));
-    columns_name(&sheet->own, 0, all.name, all.unit);
-    memcpy(sheet->own.at[0].values, named->samples.at, count * sizeof(double));
+    const Reals *samples = &named->samples;
+    TRY(columns_make(&sheet->own, 1, samples->count, 0, problem));
+    columns_name(&sheet->own, 0, "acceleration", "m/s^2");
+    memcpy(sheet->own.at[0].values, samples->at, samples->count * sizeof(double));
+    sheet->table = (Table){.axis_name = "time", .axis_unit = "s", .axis_rate = 1 / named->interval};
     TRY(sheet_own(sheet, problem));
-    table->count = rows;
-    return STATUS_OK;
+    TRY(tables_window(request, samples->count, &sheet->table, problem));
+    return tables_buckets(request, sheet, problem);
 }
 
 Status records_samples(App *app, const Request *request, Reply *reply, Problem *problem) {
@@ -190,10 +179,9 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
     TRY(tables_encoder(request, 1, reply, &encoder, problem));
     TRY(store_record_named(app->store, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, encoder->extension);
-    const bool is_known = reply_tagged(reply, request, tag);
-    const Status status = is_known ? STATUS_OK : fill(request, named, &sheet, problem);
+    const Status status = fill(request, named, &sheet, problem);
     shared_drop(&named->shared);
-    if (!is_known && status == STATUS_OK)
+    if (status == STATUS_OK && !reply_tagged(reply, request, tag))
         return tables_reply(app, reply, encoder, &sheet, problem);
     sheet_clear(&sheet);
     return status;

@@ -107,7 +107,7 @@ const Route routes[] = {
     {"GET",    "/health/ready",                         "open",   NULL,         "The daemon takes jobs; 503 otherwise", health_ready},
     {"GET",    "/metrics",                              "read",   NULL,         "Counters in the Prometheus text format", metrics_show},
     {"GET",    "/version",                              "open",   NULL,         "Program, engine and build", version_show},
-    {"GET",    "/web/vendor/{library}/{file}",          "open",   NULL,         "What the dashboard is made of", assets_show_vendor},
+    {"GET",    "/web/vendor/{library}/{file}",          "open",   NULL,         "What the dashboard is made of", assets_show},
     {"GET",    "/web/{folder}/{file}",                  "open",   NULL,         "What the dashboard is made of", assets_show},
     {"GET",    "/web/{file}",                           "open",   NULL,         "What the dashboard is made of", assets_show},
     {"GET",    "/favicon.ico",                          "open",   NULL,         "The dashboard's icon", assets_show_icon},

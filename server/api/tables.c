@@ -76,14 +76,17 @@ Status tables_window(const Request *request, size_t count, Table *table, Problem
 
 Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem) {
     Table *table = &sheet->table;
+    Columns buckets;
     size_t most;
     if (request_query(request, "points") == NULL)
         return STATUS_OK;
     TRY(request_count(request, "points", 1, 1000000000, 1, &most, problem));
     const size_t samples = table->count;
     const size_t bucket = (samples + most - 1) / most;
-    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket,
-                     &sheet->own, problem));
+    TRY(buckets_make(table->columns, table->column_count, table->first, samples, bucket, &buckets,
+                     problem));
+    columns_clear(&sheet->own);
+    sheet->own = buckets;
     TRY(sheet_own(sheet, problem));
     // Without channels too there is a time for each.
     table->count = (samples + bucket - 1) / bucket;

@@ -25,9 +25,11 @@ Status sheet_own(Sheet *sheet, Problem *problem);
 // The same with the first of them as the axis.
 Status sheet_own_axis(Sheet *sheet, Problem *problem);
 
-// "?from=&to=": which of `count` samples, at the table's rate, its rows are.
+// "?from=&to=" [s]: which of `count` samples, at least one and at the table's rate, its rows are.
+// STATUS_USAGE: not numbers, or no sample is there.
 Status tables_window(const Request *request, size_t count, Table *table, Problem *problem);
-// "?points=n": the rows in at most n buckets, all of one size but the last, the sheet's own.
+// "?points=n": least and largest value of the rows in at most n buckets, all of one size but the
+// last, are the sheet's own then. STATUS_USAGE: not a count.
 Status tables_buckets(const Request *request, Sheet *sheet, Problem *problem);
 
 // The table of spectra as they were saved. (ledgers.c)

@@ -94,9 +94,12 @@ Status kept_impacts(const char *text, Impacts *impacts, Problem *problem) {
 // A number of the impact that begins at `row`; what is null is not yet there.
 static double impact_time(const char *row, const char *name) {
     const char *at = strstr(row, name);
-    char *end = NULL;
-    const double value = at == NULL ? (double)INFINITY : strtod(at + strlen(name), &end);
-    return at == NULL || end == at + strlen(name) ? (double)INFINITY : value;
+    if (at == NULL)
+        return (double)INFINITY;
+    at += strlen(name);
+    char *end;
+    const double value = strtod(at, &end);
+    return end > at ? value : (double)INFINITY;
 }
 
 // Only the two times of a row are read, and none behind the window: 200,000 rows are 60 MB of text.
@@ -108,11 +111,10 @@ Status kept_impacts_window(const char *text, const ImpactWindow *window, bool is
     at += sizeof list - 1;
     bytes_put(bytes, text, (size_t)(at - text));
     size_t number = 0, matching = 0, written = 0;
-    while (*at == '{' || *at == ',') {
-        const char *row = strchr(at, '{'), *end = strchr(at, '}');
-        if (row == NULL || end == NULL)
+    for (const char *row = strchr(at, '{'), *end; row != NULL; row = strchr(end, '{')) {
+        end = strchr(row, '}');
+        if (end == NULL)
             return refuse("impacts", problem);
-        at = end + 1;
         number++;
         if (impact_time(row, "\"start\": ") > window->to)
             break; // they stand in the order of their starts

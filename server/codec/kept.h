@@ -23,7 +23,7 @@ typedef struct ImpactWindow {
 
 // Appends impacts.json with those impacts alone, to the letter as they were saved; the counts stay
 // those of the whole ledger. With `is_numbered` every impact begins with its number and "matching"
-// tells behind the list how many meet [from, to].
+// tells behind the list how many meet [from, to]. STATUS_INTERNAL: it is not what was written.
 Status kept_impacts_window(const char *text, const ImpactWindow *window, bool is_numbered,
                            Bytes *bytes, Problem *problem);
 

@@ -5,7 +5,7 @@
 
 #include "core/base/columns.h"
 
-// The least and the largest of `count` values, at least one.
+// The least and the largest of `count` values, at least one, all of them finite.
 void buckets_extremes(const double *values, size_t count, double *least, double *most);
 
 // Values first ... first + count - 1 of each column in buckets of `bucket`, the last one perhaps

@@ -93,7 +93,7 @@ static Status refuse(const Dispatcher *dispatcher, const Request *request, const
         return problem_set(problem, STATUS_METHOD, "%s is not for this path; it takes %s",
                            request->method, allow);
     }
-    if (route_nearest(dispatcher->table, request->path, near, sizeof near))
+    if (route_nearest(dispatcher->table, request->path, near))
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is nothing at this path; did you mean %s%s?", link_base(), near);
     return problem_set(problem, STATUS_NOT_FOUND,

@@ -73,14 +73,13 @@ bool reply_is_known(Reply *reply, const Request *request) {
     char etag[sizeof packed], cache_control[sizeof reply->cache_control];
     snprintf(etag, sizeof etag, "%s", has_packed ? packed : reply->etag);
     memcpy(cache_control, reply->cache_control, sizeof cache_control);
-    const bool varies_by_encoding = reply->varies_by_encoding || has_packed;
     const bool varies_by_accept = reply->varies_by_accept;
     const char *policy = reply->policy; // a cache has the page from now on under what is told here
     reply_clear(reply);
     reply->policy = policy;
     text_fit(reply->etag, sizeof reply->etag, etag);
     memcpy(reply->cache_control, cache_control, sizeof cache_control);
-    reply->varies_by_encoding = varies_by_encoding;
+    reply->varies_by_encoding = true; // whether it would be packed shows only when it is made
     reply->varies_by_accept = varies_by_accept;
     reply->code = 304;
     return true;

@@ -81,24 +81,18 @@ static void fill(const char *pattern, const char *path, char *target, size_t siz
     }
 }
 
-bool route_nearest(const Route *table, const char *path, char *target, size_t size) {
-    enum { MOST = 64 };
-    static const size_t room = ROUTE_SEGMENT_MOST;
-    if (strlen(path) >= room)
+bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MOST]) {
+    char filled[ROUTE_SEGMENT_MOST];
+    const char *const candidates[] = {target, filled, NULL}; // the nearest so far, and one more
+    target[0] = '\0';
+    if (strlen(path) >= sizeof filled)
         return false;
-    char filled[MOST][ROUTE_SEGMENT_MOST];
-    const char *candidates[MOST + 1] = {NULL};
-    size_t count = 0;
-    for (const Route *route = table; route->method != NULL && count < MOST; route++) {
-        if (strcmp(route->pattern, "/") == 0)
-            continue;
-        fill(route->pattern, path, filled[count], room);
-        candidates[count] = filled[count];
-        count++;
+    for (const Route *route = table; route->method != NULL; route++) {
+        if (strncmp(route->pattern, "/web/", 5) == 0)
+            continue; // a page asks for its own files, and their names may be anything
+        fill(route->pattern, path, filled, sizeof filled);
+        if (texts_nearest(candidates, path) == filled)
+            memcpy(target, filled, sizeof filled);
     }
-    const char *nearest = texts_nearest(candidates, path);
-    if (nearest == NULL)
-        return false;
-    text_fit(target, size, nearest);
-    return true;
+    return target[0] != '\0';
 }

@@ -45,6 +45,6 @@ const Route *route_find(const Route *table, const char *method, const char *path
                         RouteSpan spans[REQUEST_PARAMETERS], size_t *count, char allow[64]);
 
 // The nearest path to one that no route fits; false if none is near enough to be meant.
-bool route_nearest(const Route *table, const char *path, char *target, size_t size);
+bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MOST]);
 
 #endif

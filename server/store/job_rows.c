@@ -170,6 +170,7 @@ Status store_job_scene(Store *store, const char *id, char **scene, Problem *prob
     Asked asked = {.scene = NULL};
     bool is_found;
     *scene = NULL;
+    // A job may be in memory alone as yet, its result not.
     TRY(store_job_load(store, id, &row, problem));
     memcpy(asked.id, row.id, sizeof asked.id);
     memcpy(asked.result, row.result, sizeof asked.result);

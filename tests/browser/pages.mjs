@@ -1,4 +1,6 @@
 // Every page with something on it: addresses for test_pages.mjs and shots.mjs.
+import { pace } from "./support.mjs";
+
 // Makes what the pages show, in a daemon that has nothing yet: [{name, hash, wants}], `wants` being a text that the page says
 // when it is there.
 export async function pages(daemon) {
@@ -43,7 +45,7 @@ export async function settle(page, address, { wants }) {
   page.on("requestfinished", end);
   page.on("requestfailed", end);
   await (typeof address === "string" ? page.goto(address) : address());
-  const until = Date.now() + 30000;
+  const until = Date.now() + 30000 * pace.slow;
   for (let quiet = 0; quiet < 5; ) {
     const text = await page.locator("main").innerText().catch(() => "");
     const isCalm = open.size === 0 && wants.test(text) && !/Loading …|Wait …/.test(text) && (await page.locator("main h1").count()) > 0;

@@ -1,5 +1,6 @@
 // Runs the browser tests: Debian's chromium without a window, one for all; a daemon for each file; two files at a time.
 // Usage in support.mjs. The last line counts.
+import { createHash } from "node:crypto";
 import fs from "node:fs";
 import os from "node:os";
 import path from "node:path";
@@ -7,7 +8,7 @@ import { fileURLToPath } from "node:url";
 import { parseArgs } from "node:util";
 import { chromium } from "playwright-core";
 import { Daemon } from "./daemon.mjs";
-import { reading, tests } from "./support.mjs";
+import { pace, reading, tests } from "./support.mjs";
 
 const here = path.dirname(fileURLToPath(import.meta.url));
 const { values, positionals: words } = parseArgs({
@@ -16,11 +17,15 @@ const { values, positionals: words } = parseArgs({
     build: { type: "string", default: path.join(here, "..", "..", "build") },
     at: { type: "string" }, // a service that runs already, in place of daemons of our own
     serial: { type: "boolean", default: false },
+    slow: { type: "string", default: "1" }, // so many times as slow a computer before the reader, answers that wait
+    seed: { type: "string", default: "1" }, // of how long each does
   },
 });
 const build = path.resolve(values.build);
 const pictures = path.join(build, "browser");
-const TEST_MS = 120000;
+pace.slow = Number(values.slow);
+const TEST_MS = 120000 * pace.slow;
+const LATE_MS = 300; // an answer's wait, at most
 
 for (const name of fs.readdirSync(here).filter((one) => /^test_.*\.mjs$/.test(one)).sort()) {
   reading.file = name;
@@ -28,6 +33,22 @@ for (const name of fs.readdirSync(here).filter((one) => /^test_.*\.mjs$/.test(on
 }
 const chosen = tests.filter(({ file, sentence }) => words.length === 0 || words.some((word) => file.includes(word) || sentence.includes(word)));
 const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+
+// Slows a page down, and holds each of its requests back for a while of its own that follows from the seed: so answers come late
+// and overtake each other.
+async function slowDown(page) {
+  page.setDefaultTimeout(30000 * pace.slow);
+  const session = await page.context().newCDPSession(page); // open as long as the page is
+  await session.send("Emulation.setCPUThrottlingRate", { rate: pace.slow });
+  const asked = new Map();
+  await page.context().route("**/*", async (route) => {
+    const what = `${route.request().method()} ${new URL(route.request().url()).pathname}`, nth = (asked.get(what) ?? 0) + 1;
+    asked.set(what, nth);
+    const part = createHash("sha256").update(`${values.seed} ${what} ${nth}`).digest().readUInt32BE() / 2 ** 32;
+    await new Promise((resolve) => setTimeout(resolve, part * LATE_MS));
+    await route.continue().catch(() => {}); // whoever asked may have left
+  });
+}
 
 // A page in a profile of its own whose every wrong lands in `wrongs`.
 async function openPage(room, options = {}) {
@@ -49,7 +70,9 @@ async function openPage(room, options = {}) {
     if (room.announced.has(0) && /net::ERR_/.test(message.text())) return;
     wrong(`console: ${message.text()} (${message.location().url})`);
   });
-  return context.newPage();
+  const page = await context.newPage();
+  if (pace.slow > 1) await slowDown(page);
+  return page;
 }
 
 async function run({ file, sentence, body }, daemon) {

@@ -10,8 +10,9 @@
 //   });
 //
 //   (cd tests/browser && npm ci)       once
-//   node tests/browser/run.mjs [--build DIR | --at URL] [--serial] [WORD...]
-//       only tests whose file or sentence holds a WORD; at a service that runs already in place of daemons of their own
+//   node tests/browser/run.mjs [--build DIR | --at URL] [--serial] [--slow N [--seed N]] [WORD...]
+//       only tests whose file or sentence holds a WORD; at a service that runs already in place of daemons of their own;
+//       with pages N times slower, each of whose requests waits up to 300 ms, by the seed: what passes only when quick fails
 //
 // A test does what a person does: it finds things by role, label and text, never by class; it waits for what it wants to
 // see (playwright's clicks wait by themselves; until(), says() below), never for a time. Each file has a daemon of its own,
@@ -37,11 +38,12 @@ export function test(sentence, body) {
   tests.push({ file: reading.file, sentence, body });
 }
 
+export const pace = { slow: 1 }; // how many times slower pages are than they would be: run.mjs sets it
 const WAIT_MS = 20000;
 
 // Asks again and again until `probe` answers something true and does not throw; returns that.
 export async function until(what, probe, wait = WAIT_MS) {
-  const end = Date.now() + wait;
+  const end = Date.now() + wait * pace.slow;
   for (;;) {
     let seen, error;
     try {
@@ -50,7 +52,7 @@ export async function until(what, probe, wait = WAIT_MS) {
     } catch (problem) {
       error = problem;
     }
-    if (Date.now() > end) throw new Error(`waited ${wait / 1000} s for ${what}; ${error ? error.message : `at last: ${JSON.stringify(seen)}`}`);
+    if (Date.now() > end) throw new Error(`waited ${(wait * pace.slow) / 1000} s for ${what}; ${error ? error.message : `at last: ${JSON.stringify(seen)}`}`);
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }
@@ -72,6 +74,25 @@ export const leads = (page, pattern) => until(`an address like ${pattern}`, () =
   if (!found) throw new Error(`it is ${page.url()}`);
   return found;
 });
+
+// Keeps the page waiting for the answers of the first `most` requests whose address matches: asked(count) waits until so many are
+// asked for; letGo() lets them come, and what the page does about them.
+export async function hold(page, pattern, most = Infinity) {
+  const held = [];
+  let isHeld = true;
+  await page.route(pattern, (route) => (isHeld && held.length < most ? void held.push(route) : route.fallback()));
+  return {
+    asked: (count = 1) => until(`${count} of ${pattern} to be asked for`, () => held.length >= count),
+    async letGo() {
+      isHeld = false;
+      for (const route of held) {
+        await route.fallback().catch(() => {}); // the page may not wait for it any more
+        await (await route.request().response())?.finished();
+      }
+      await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    },
+  };
+}
 
 // Bytes that the network brought while `action` ran and until the page fell quiet: bodies as sent, with their heads.
 export async function transferred(page, action) {

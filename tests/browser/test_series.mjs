@@ -42,7 +42,7 @@ test("The cursor of one chart tells the values of all; Page Down and Enter choos
 test("What cannot be trusted is shaded and said; channels are chosen by name and kept in the address", async ({ page, daemon, url }) => {
   const { result } = await daemon.run("paper_random_sponge");
   await page.goto(url(`#/results/${result}`));
-  await says(page.getByRole("region", { name: "Motion over time" }), /trusted up to 9\.217 s/);
+  await says(page.getByRole("region", { name: "Summary" }), /To 9\.217 s, the trust horizon/);
   await page.getByLabel("velocity", { exact: true }).check();
   await says(figure(page, "Velocity"), /between −/);
   await page.getByLabel("acceleration", { exact: true }).uncheck();

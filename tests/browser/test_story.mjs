@@ -65,7 +65,7 @@ test("By keyboard alone: run, look at another impact, zoom and back, play, downl
   await press(section(page, "Spectrum").getByRole("application").first(), "+");
   await until("a part of the spectrum", () => /psd_from=/.test(page.url()));
   const saved = page.waitForEvent("download");
-  await press(page.getByRole("button", { name: /csv/i }).first());
+  await press(page.getByRole("link", { name: /csv/i }).first());
   assert.match((await saved).suggestedFilename(), /csv$/);
   await page.keyboard.press("Control+Home");
   await page.evaluate(() => document.activeElement.blur());

@@ -159,6 +159,14 @@ def test_series_by_channel_window_and_format():
         problem(daemon.get(f"{base}/series.xlsx"), 404)
 
 
+def test_a_path_with_a_slip_is_told_what_was_meant():
+    """Whichever row of the table it is; the dashboard's files, whose names may be anything, are not meant."""
+    with program.daemon() as daemon:
+        for path, meant in (("/v1/jbos", "/v1/jobs"), ("/v2/records/x", "/v1/records/x"), ("/metrisc", "/metrics"), ("/vresion", "/version")):
+            assert f"did you mean {meant}?" in problem(daemon.get(path), 404)["detail"], path
+        assert "did you mean" not in problem(daemon.get("/job/123456789"), 404)["detail"]
+
+
 def test_formats_are_negotiated():
     """Without an extension Accept chooses the format, with Vary; what fits none is 406."""
     with program.daemon() as daemon:

@@ -163,6 +163,27 @@ def test_too_few_samples_give_an_interval_and_no_figure():
         assert any("no trace gives a figure" in warning["detail"] for warning in shown.json()["warnings"]), shown.json()["warnings"]
 
 
+def test_a_contact_has_a_start_an_end_and_a_pulse_or_none_of_them():
+    """Where a pulse fits, the contact can be drawn; where none does, or too little is seen of it, what it would be drawn by is null."""
+    def trace(samples, before=60):
+        return {"interval": 1e-4, "force": [0.0] * before + samples + [0.0] * 300}
+    pulse = [80 * math.exp(-0.02 * i) * math.sin(math.pi * i / 40) for i in range(41)]
+    cases = (("", trace(pulse)), ("begins during the contact", trace(pulse[12:], before=0)),
+             ("only 3 samples are in contact", trace([50.0, 90.0, 40.0])), ("no pulse of the model's", trace(([1.0] * 4 + [0.2] * 4) * 5)))
+    with program.daemon() as daemon:
+        shown = daemon.request("POST", f"{SPONGE}/measurements?dry_run=1", json={"traces": [sent for _, sent in cases]}, timeout=120)
+        rows = {row["trace"]: row for row in shown.json()["evaluation"]["rows"]}
+        for number, (why, _) in enumerate(cases, 1):
+            row, seen = rows[number], rows[number]["contact"]
+            assert why in (row["note"] or ""), row
+            assert (row["contact_time"] is None) == (why != ""), row
+            assert seen["first"] <= seen["last"] and seen["peak"] > 0, seen
+            if why:
+                assert seen["start"] is None and seen["end"] is None and seen["pulse"] == [], seen
+            else:
+                assert 0.0055 < seen["start"] < 0.0065 < seen["end"] < 0.011 and len(seen["pulse"]) == 33, seen
+
+
 def test_faults_are_told_all_at_once_and_nothing_is_kept():
     """Bad bodies: 4xx with a pointer for each fault; afterwards there is still no measurement."""
     cases = [

@@ -160,7 +160,8 @@ def test_a_window_and_extremes_of_samples():
         assert table.shape == (10, 3) and table[:, 1].min() == given.min() and table[:, 2].max() == given.max()
         assert len(get("from=7.98")["channels"]["acceleration"]["values"]) == 1
         for query in ("from=8", "from=2&to=1", "points=0", "points=x", "channels=acceleration"):
-            problem(daemon.get(f"/v1/records/r/samples.json?{query}"), 400)
+            for headers in ({}, {"If-None-Match": "*"}):
+                problem(daemon.get(f"/v1/records/r/samples.json?{query}", headers=headers), 400)
 
 
 def test_a_named_record_is_the_same_as_its_samples():

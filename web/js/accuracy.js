@@ -1,7 +1,7 @@
-// How exact a run is to be and what that costs: fields, and a slider over what a study measured on this very scene.
+// How exact a run is to be and what that costs: fields, and a slider over what a study measured on this scene.
 import { link } from "./address.js";
 import { follow, get, remove, submit } from "./api.js";
-import { button, failure, fill, fresh, h } from "./dom.js";
+import { button, failure, fill, h } from "./dom.js";
 import { form } from "./form.js";
 import { number, quantity } from "./units.js";
 
@@ -18,14 +18,14 @@ const stopsOf = ({ points }) => points.filter((point) => point.status === "measu
   .sort((a, b) => b.error - a.error || b.cost - a.cost);
 
 export function accuracyWidget({ pointer, schema, draft, options }) {
-  const byHand = h("div"), fields = form(byHand, { ...options, widgets: [], schema, draft, pointer });
+  const byHand = h("div"), fields = form(byHand, { ...options, widgets: [], schema, draft, pointer, label: "" });
   fields.leave(); // refreshed with this widget
-  const slider = h("input", { id: fresh("trade"), type: "range", min: 0,
+  const slider = h("input", { type: "range", min: 0,
     oninput: () => draft.set(pointer, stops[slider.value].setting) });
   const lead = h("p"), said = h("p"), whole = h("a", null, "The whole measurement");
-  const trade = h("div", null, lead, h("label", { for: slider.id }, "From the crudest to the most exact"), slider, said, whole);
+  const trade = h("div", null, lead, h("label", null, "From the crudest to the most exact", slider), said, whole);
   const act = button("", () => (job ? cancel() : measure()));
-  const bar = h("progress", { max: 100, "aria-label": "Measuring" }), news = h("div", { class: "hint", role: "status" });
+  const bar = h("progress", { max: 100, "aria-label": "Measuring" }), news = h("div.hint", { role: "status" });
   let stops = [], measured = null, job = null;
 
   // The scene without what the slider changes.
@@ -33,14 +33,14 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
 
   async function measure() {
     const asked = JSON.stringify(study());
-    job = submit(study(), draft.signal);
+    job = submit(study());
     fill(news, "Every solver runs this scene …");
     refresh();
     try {
-      const now = await follow((await job).id, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
+      const now = await follow(await job, ({ progress }) => (bar.value = progress ?? 0), draft.signal);
       fill(news, now.status !== "successful" && (now.problem?.detail ?? "Cancelled: nothing was measured."));
       if (now.status === "successful") {
-        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`, null, draft.signal));
+        stops = stopsOf(await get(`v1/results/${now.result}/tradeoff.json`));
         measured = asked;
         whole.href = link(`results/${now.result}`);
       }
@@ -66,8 +66,8 @@ export function accuracyWidget({ pointer, schema, draft, options }) {
     slider.ariaValueText = said.textContent;
     const best = stops.filter(({ isBest }) => isBest).map(({ name }) => name).join("; ");
     lead.textContent = measured !== JSON.stringify(study()) ? "Measured on another scene."
-      : `Worth having: ${best}. The other ways err more and cost more.`;
+      : `Worth having: ${best}. All others err and cost more.`;
   }
   refresh();
-  return { element: h("div", { class: "accuracy" }, byHand, trade, h("div", { class: "row" }, act, bar), news), refresh };
+  return { element: h("div", null, byHand, trade, h("div.row", null, act, bar), news), refresh };
 }

@@ -1,5 +1,5 @@
-// A result in slow motion in the drawing of its scene, piece by piece. What it shows follows from the view alone: the instant
-// t, else the start of the impact, else that of the window.
+// A result in slow motion, piece by piece. What it shows follows from the view: the instant t, else the start of the impact,
+// else that of the window.
 import { get } from "./api.js";
 import { button, faults, figures, fill, h } from "./dom.js";
 import { drawing, limit } from "./drawing.js";
@@ -26,8 +26,8 @@ function show(host, context) {
   const scrub = h("input", { type: "range", "aria-label": "Instant", onchange: say,
     oninput: () => (run(false), seek(scrub.value)),
     onkeydown: (event) => event.key === " " && (event.preventDefault(), run(!playing)) });
-  fill(host, h("div", { role: "group", "aria-label": "Player", class: "player" }, stage, scrub,
-    h("div", { class: "row" }, play, h("label", null, "Speed ", speed)), readout));
+  fill(host, h("div", { role: "group", "aria-label": "Player" }, stage, scrub,
+    h("div.row", null, play, h("label", null, "Speed ", speed)), readout));
 
   // The piece with the instant, once here.
   function piece() {
@@ -78,10 +78,13 @@ function show(host, context) {
     draw();
     if (performance.now() - noted > 500) say();
   }
-  function run(on) {
-    if (playing === on) return;
+  function turn(on) {
     playing = on;
     play.textContent = on ? "Pause" : "Play";
+  }
+  function run(on) {
+    if (playing === on) return;
+    turn(on);
     if (!on) return void say();
     if (t >= within(to)) t = from;
     requestAnimationFrame(frame);
@@ -93,21 +96,21 @@ function show(host, context) {
     requestAnimationFrame((next) => frame(next, now));
   }
   async function follow(next) {
-    const isChosen = next.impact !== seen.impact && next.t === seen.t; // by another section
+    const isHere = next.t === seen.t, isChosen = isHere && next.impact !== seen.impact, wasPlaying = playing; // by another section
     seen = next;
     ({ from, to } = context.window);
     Object.assign(scrub, { min: from, max: to, step: (to - from) / 1000 });
+    if (playing && !isChosen && (isHere || within(next.t) === t)) return;
+    turn(false);
     const row = isChosen || !next.t ? await ledger.at(next.impact).catch(() => null) : null;
-    const wanted = within(row?.start ?? next.t ?? from);
-    if (seen !== next || (playing && wanted === t)) return;
-    t = wanted;
-    run(false);
+    if (seen.impact !== next.impact || signal.aborted) return;
+    t = within(row?.start ?? next.t ?? from);
     draw();
-    if (row && next.t) say();
+    if (wasPlaying || (row && seen.t)) say();
   }
   speed.value = PACES.find((pace) => pace >= 2.5 * (plan.modes?.[0]?.frequency ?? 1)) ?? 1000;
   follow(context.view);
   return { follow };
 }
 
-export const section = { id: "animation", title: "In slow motion", show };
+export const section = { title: "In slow motion", show };

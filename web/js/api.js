@@ -41,11 +41,16 @@ async function refusal(response) {
   return new Refusal(response.status, problem);
 }
 
+let shown = null; // until this is aborted somebody reads the page that asks
+export const readUntil = (signal) => (shown = signal);
+
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
-// (null leaves one out), signal.
-export async function ask(method, path, options = {}) {
+// (null leaves one out), signal: once it is aborted there is no answer, but what writes is sent whole.
+export async function ask(method, path, { signal = shown, ...more } = {}) {
+  const options = { ...more, signal: method === "GET" ? signal : null };
   let response = await send(method, path, options);
   if (response.status === 401 && signIn !== null && (await signIn())) response = await send(method, path, options);
+  signal?.throwIfAborted();
   if (!response.ok) throw await refusal(response);
   return response;
 }
@@ -59,7 +64,7 @@ export const remove = async (path) => (await ask("DELETE", path)).json();
 export async function save(path, name) {
   const anchor = document.createElement("a");
   anchor.download = name;
-  if (token()) anchor.href = URL.createObjectURL(await (await ask("GET", path)).blob());
+  if (token()) anchor.href = URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob());
   else anchor.href = address(path);
   document.body.append(anchor);
   anchor.click();
@@ -68,23 +73,23 @@ export async function save(path, name) {
 }
 
 // Submits a scene; the job as it is at once, done or not.
-export const submit = (scene, signal) => post("v1/jobs", scene, { headers: { Prefer: "wait=1" }, signal });
+export const submit = (scene) => post("v1/jobs", scene, { headers: { Prefer: "wait=1" } });
 
 // What the scene would come to, without running it: faults come as a Refusal.
-export const check = (scene, signal) => post("v1/jobs?dry_run=1", scene, { signal });
+export const check = (scene) => post("v1/jobs?dry_run=1", scene);
 
 // Follows a job to its end, which is returned: `onChange(job)` after each news of it. Where the connection breaks the state is
 // asked for instead; while nobody answers (a daemon that starts anew takes its jobs up again) the job has `isLost`.
-export async function follow(id, onChange, signal) {
-  const path = `v1/jobs/${encodeURIComponent(id)}`;
-  for (let job = null; ; ) {
+export async function follow(job, onChange, signal) {
+  const path = `v1/jobs/${job.id}`;
+  for (;;) {
     try {
       job = await get(path, undefined, signal);
       onChange(job);
       if (job.finished) return job;
       await events(`${path}/events`, (news) => onChange({ ...job, ...news }), signal);
     } catch (error) {
-      if (job === null || error.name === "AbortError" || (error.status >= 400 && error.status < 500)) throw error;
+      if (error.name === "AbortError" || (error.status >= 400 && error.status < 500)) throw error;
       if (error.status === 0) onChange({ ...job, isLost: true });
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
@@ -109,7 +114,7 @@ async function events(path, onChange, signal) {
 // A JSON Schema by name, asked for once.
 const schemas = new Map();
 export function schema(name) {
-  if (!schemas.has(name)) schemas.set(name, get(`schemas/${name}`));
+  if (!schemas.has(name)) schemas.set(name, get(`schemas/${name}`, null, null));
   schemas.get(name).catch(() => schemas.delete(name));
   return schemas.get(name);
 }

@@ -13,8 +13,12 @@ function put(node, attributes, children) {
   return node;
 }
 
-// h("p", {class: "quiet", onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
-export const h = (tag, attributes, ...children) => put(document.createElement(tag), attributes, children);
+// h("p.quiet", {onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
+export function h(name, attributes, ...children) {
+  const [tag, ...classes] = name.split("."), node = document.createElement(tag);
+  node.classList.add(...classes);
+  return put(node, attributes, children);
+}
 
 // The same for SVG.
 export const s = (tag, attributes, ...children) => put(document.createElementNS(SVG, tag), attributes, children);
@@ -24,11 +28,33 @@ export function fill(node, ...children) {
   return put(node, null, children);
 }
 
+// What it does is not begun again while it goes on: some click twice.
+export function once(act) {
+  let going = null;
+  return () => (going ??= act().finally(() => (going = null)));
+}
+
 export const button = (text, onclick, more) => h("button", { type: "button", onclick, ...more }, text);
 
 // [name, value] of what is to be seen at a glance.
-export const figures = (pairs) => h("dl", { class: "figures" }, pairs.map(([name, value]) =>
+export const figures = (pairs) => h("dl.figures", null, pairs.map(([name, value]) =>
   h("div", null, h("dt", null, name), h("dd", null, value))));
+
+// Lines, and a button that puts them into the clipboard.
+export function copied(lines) {
+  const pressed = button("Copy", copy, { class: "quiet" });
+  async function copy() {
+    try {
+      await navigator.clipboard.writeText(lines);
+      pressed.textContent = "Copied";
+    } catch {
+      pressed.textContent = "Select and copy it by hand"; // a page without TLS may not
+    }
+    tell(pressed.textContent);
+    setTimeout(() => (pressed.textContent = "Copy"), 2000);
+  }
+  return [pressed, h("pre", { tabindex: "0" }, lines)];
+}
 
 let count = 0;
 export const fresh = (word) => `${word}-${++count}`; // an id that no other element has
@@ -83,6 +109,11 @@ export function table(caption, columns, rows, { sort = false } = {}) {
   return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
     h("table", null, h("caption", null, caption), h("thead", null, h("tr", null, heads)), body));
 }
+
+export const panel = (name, ...children) => h("section.panel", { "aria-label": name }, h("h2", null, name), children);
+
+// A quiet line of help.
+export const hint = (...children) => h("p.hint", null, children);
 
 // Something that opens: the content is made when it is first seen.
 export function folded(summary, make, open = false) {

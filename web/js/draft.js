@@ -1,4 +1,4 @@
-// A document while it is edited: values by JSON Pointer, what the service said of it, and who wants to know. No controls.
+// A document while it is edited: values by JSON Pointer, what the service said of it, and who wants to know.
 export const parts = (pointer) => pointer.split("/").slice(1).map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
 const isHolder = (value) => value !== null && typeof value === "object";
 

@@ -1,6 +1,6 @@
-// A scene as a picture: structure, free masses, stops; displacements and clearances share one scale, which a bar states.
-// It can be posed without being built anew. What it cannot read it leaves out.
-import { fill, h, s } from "./dom.js";
+// A scene as a picture that can be posed: displacements and clearances share one scale, which a bar states. What it cannot
+// read it leaves out.
+import { fill, h, hint, s } from "./dom.js";
 import { number, quantity, words } from "./units.js";
 
 const MOST = 12; // storeys, from the top, and dampers
@@ -120,7 +120,7 @@ function build(scene, { plan, stroke }, width) {
   return {
     drawn: { storeys: storeys.map(({ k }) => k), dampers: dampers.map(({ index }) => index) },
     nodes: [s("svg", { viewBox: `0 0 ${width} ${y + 44}`, width, role: "img", "aria-label": told }, parts),
-      h("p", { class: "hint" }, "To scale; twice the free mass, twice its area; a longer contact, a thicker pad.",
+      hint("To scale; twice the free mass, twice its area; a longer contact, a thicker pad.",
         all.length + every.length > storeys.length + dampers.length && ` At most ${MOST} storeys and dampers are drawn.`)],
     pose: (displacements, positions) =>
       moved.forEach((place) => place((k) => middle + (displacements[k] ?? 0) * scale, positions)),
@@ -130,7 +130,7 @@ function build(scene, { plan, stroke }, width) {
 // show(scene, {plan, stroke}): `stroke` is the largest displacement, without it the start is dashed; returns which {storeys,
 // dampers} are drawn, from 0. pose(displacements of storeys, positions of free masses in theirs), in m.
 export function drawing(host) {
-  const box = host.appendChild(h("div", { class: "drawing" }));
+  const box = host.appendChild(h("div.drawing"));
   let asked = null, picture = null, posed = [[], []];
   function show(...scene) {
     asked = scene;

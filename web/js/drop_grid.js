@@ -1,6 +1,6 @@
 // The grid that drops are typed or pasted into, a row each: a widget of a measurement's form. An empty height or approach speed
 // is as above it; a row without a reading is not sent.
-import { fresh, h } from "./dom.js";
+import { fresh, h, hint } from "./dom.js";
 import { number, title } from "./units.js";
 
 const MOST = 1000, GIVEN = [0, 2], READ = [1, 3, 4]; // drops, and columns
@@ -53,7 +53,7 @@ export function dropGrid({ pointer, schema, draft }) {
   const heads = ["#", ...columns.map(([name, { "x-unit": unit }]) => title(name) + (unit ? `, ${unit}` : "")), "e"];
   const element = h("div", null, h("div", { class: "scroll" }, h("table", { class: "drops", "aria-label": "Drops" },
     h("thead", null, h("tr", null, heads.map((head) => h("th", { scope: "col" }, head)))), body)),
-  h("p", { class: "hint" }, "Enter goes down, Tab right; columns can be pasted."));
+  hint("Enter goes down, Tab right; columns can be pasted."));
   return { element, refresh() {
     for (const line of lines) {
       const { cells, outcome } = line, at = sent.indexOf(line), faults = draft.faultsAt(`${pointer}/${at}`);

@@ -9,9 +9,11 @@ export function show(host, { result: { scene, study } }) {
   host.append(lesson(target ? `${target.is_kept ? "" : "Not kept: "}${words(target.why)}.` : `${made} runs were made.`,
     `${trust.whole} of ${made} paths are right to their ends, ${trust.beyond} outlast what rounding lets be known.`,
     failed > 0 && `${failed} runs failed and count in nothing: ${failures[0].detail}`));
-  for (const { channel, unit, mean, low, high } of study.spectra) {
-    const most = mean.indexOf(Math.max(...mean)), band = { label: sure, color: 2, low, high };
-    plot(host, { ...spectrum(channel, unit), at: study.frequency, series: [...(low ? [band] : []), { label: "mean", y: mean }],
+  for (const { channel, unit, mean, low, high, standard_deviation: deviation } of study.spectra) {
+    const most = mean.indexOf(Math.max(...mean)), times = (power) => mean.map((m, k) => m * (1 + deviation[k] / m) ** power);
+    const bands = () => [{ label: "one run, by a standard deviation", color: 8, low: times(-1), high: times(1) },
+      { label: sure, color: 2, low, high }];
+    plot(host, { ...spectrum(channel, unit), at: study.frequency, series: [...(low ? bands() : []), { label: "mean", y: mean }],
       summary: `The mean is largest at ${quantity(study.frequency[most], "Hz", 3)}: ${quantity(mean[most], unit, 3)}.` });
   }
   const seeded = (seed) => sceneLink(`seed ${seed}`, { ...plain(scene), excitation: { ...scene.excitation, seed } });

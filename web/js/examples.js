@@ -7,9 +7,9 @@ const groups = [["The paper", /Li and Darby/], ["Studies", /^(sweep|ensemble|sen
 
 export function examplesDialog() {
   const list = h("div", null, "Loading …"), close = () => dialog.close();
-  const dialog = h("dialog", { class: "wide", "aria-label": "Examples", onclose: () => dialog.remove() },
+  const dialog = h("dialog.wide", { "aria-label": "Examples", onclose: () => dialog.remove() },
     button("Close", close), list);
-  document.body.append(dialog);
+  document.querySelector("main").append(dialog); // gone with the page
   dialog.showModal();
   get("v1/examples").then((answer) => {
     const examples = answer.examples.sort((a, b) => a.title.localeCompare(b.title, "en", { numeric: true }));

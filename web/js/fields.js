@@ -1,4 +1,4 @@
-// One value, one control, by its schema: what is typed, and choices. Each is {element, refresh()}. Objects are form.js's.
+// One value, one control, {element, refresh()}, by its schema: what is typed, and choices.
 import { fill, fresh, h, sentence } from "./dom.js";
 import { pretty, quantity, scale, words } from "./units.js";
 
@@ -39,15 +39,15 @@ function bounds({ minimum, exclusiveMinimum, maximum }) {
 }
 
 export function frame({ pointer, schema, label }, control, ...help) {
-  const id = fresh("field"), unit = schema["x-unit"], fault = h("p", { class: "fault", id: `${id}-fault` });
-  const hint = h("p", { class: "hint", id: `${id}-hint` }, help.filter(Boolean).join("; "));
+  const id = fresh("field"), unit = schema["x-unit"], fault = h("p.fault", { id: `${id}-fault` });
+  const hint = h("p.hint", { id: `${id}-hint` }, help.filter(Boolean).join("; "));
   control.id = id;
   control.setAttribute("aria-describedby", `${hint.id} ${fault.id}`);
   return {
     hint,
-    element: h("div", { class: "field", "data-pointer": pointer },
-      h("label", { for: id }, label, unit && h("span", { class: "unit" }, ` [${pretty(unit)}]`)),
-      h("div", { class: "typed" }, control), hint, fault),
+    element: h("div.field", { "data-pointer": pointer },
+      h("label", { for: id }, label, unit && h("span.unit", null, ` [${pretty(unit)}]`)),
+      h("div.typed", null, control), hint, fault),
     tell(faults) {
       fault.textContent = faults.slice(0, 3).map(sentence).join("; ");
       control.setAttribute("aria-invalid", faults.length > 0);
@@ -68,7 +68,7 @@ export function typed(context) {
       last = input.value.trim() === "" ? undefined : read(input.value, schema);
       draft.set(pointer, last);
     } });
-  const aside = h("span", { class: "hint" });
+  const aside = h("span.hint");
   const { element, tell } = frame(context, input, schema.description, bounds(schema), items?.enum?.join(", "),
     isJson(schema) && "as JSON");
   input.after(aside);

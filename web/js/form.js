@@ -1,16 +1,16 @@
-// A JSON Schema as a form over a draft: objects, their kinds, lists. What need not be said waits under "More"; what the schema
-// does not know is kept. Single values are fields.js.
-import { button, fill, h, sentence } from "./dom.js";
+// A JSON Schema as a form over a draft: objects, their kinds, lists; single values are fields.js. What need not be said
+// waits under "More"; what the schema does not know is kept.
+import { button, fill, h, hint, sentence } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice, frame, typed } from "./fields.js";
 import { title, words } from "./units.js";
 
 // Options: only (these members), widgets ([[/of pointers/, (context) -> {element, refresh()}]]), shows(pointer) (never under
 // "More"), start(pointer, kind) (what a new item or kind begins with).
-export function form(host, { schema, draft, pointer = "", only, required = true, ...options }) {
+export function form(host, { schema, draft, pointer = "", label = title(parts(pointer).at(-1) ?? ""), only, required = true, ...options }) {
   let root;
   function build() {
-    root = node({ pointer, schema, draft, label: title(parts(pointer).at(-1) ?? ""), required, options, only, isPlain: true });
+    root = node({ pointer, schema, draft, label, required, options, only, isPlain: true });
     fill(host, root.element);
     refresh();
   }
@@ -26,7 +26,7 @@ function uncover(element) {
   for (let box = element.closest("details"); box; box = box.parentElement.closest("details")) box.open = true;
 }
 
-// Moves to the control of a place, or to the nearest around it.
+// To the control of a place, or to the nearest around it.
 export function focusField(root, pointer) {
   const place = [...root.querySelectorAll("[data-pointer]:not([hidden])")]
     .filter((element) => `${pointer}/`.startsWith(`${element.dataset.pointer}/`))
@@ -62,7 +62,7 @@ function node(context) {
 // A place with its name and help; a plain one has them from what is around it.
 const group = ({ pointer, schema, label, isPlain }, ...content) =>
   h(isPlain ? "div" : "fieldset", { class: isPlain ? null : "wide", "data-pointer": pointer },
-    !isPlain && [h("legend", null, label), h("p", { class: "hint" }, schema.description)], content);
+    !isPlain && [h("legend", null, label), hint(schema.description)], content);
 
 function object(context) {
   const { pointer, schema, draft, options, only } = context, { properties, required = [] } = schema;
@@ -72,7 +72,7 @@ function object(context) {
       const made = node({ draft, options, pointer: place, schema: properties[name], label: title(name), required: needed });
       return { ...made, name, waits: !needed && draft.get(place) === undefined && !options.shows?.(place) };
     });
-  const fields = (waits) => h("div", { class: "fields" }, members.map((one) => one.waits === waits && one.element));
+  const fields = (waits) => h("div.fields", null, members.map((one) => one.waits === waits && one.element));
   const summary = h("summary"), more = h("details", null, summary, fields(true));
   return { element: group(context, fields(false), more), refresh() {
     for (const one of members) one.refresh();
@@ -94,7 +94,7 @@ function kinds(context) {
     left[shown] = draft.get(pointer);
     draft.set(pointer, kind === "none" ? undefined : left[kind] ?? { [mark]: kind, ...options.start?.(pointer, kind) });
   } }, all.map((kind) => h("option", { value: kind }, words(kind))));
-  const { element, hint, tell } = frame({ ...context, label: `${label} ${mark}` }, select), place = h("div");
+  const { element, hint, tell } = frame({ ...context, label: title(`${label} ${mark}`.trim()) }, select), place = h("div");
   function refresh() {
     const kind = draft.get(pointer)?.[mark] ?? all[0], chosen = variants.get(kind);
     if (shown !== kind) {
@@ -115,7 +115,7 @@ function list(context) {
   const { pointer, schema, draft, options, label, required } = context;
   const one = label.replace("Axes", "Axis").replace(/(?<!i)s$/, "");
   const add = button(`Add ${one.toLowerCase()}`, () => put(value().length, 0, options.start?.(`${pointer}/N`) ?? {}));
-  const holder = h("div"), note = h("p", { class: "hint" }), value = () => [draft.get(pointer) ?? []].flat();
+  const holder = h("div"), note = hint(), value = () => [draft.get(pointer) ?? []].flat();
   let nodes = [];
   function put(at, gone, ...items) {
     const next = value().toSpliced(at, gone, ...items);

@@ -1,9 +1,9 @@
-// The impacts in the window of time as rows, and one at full detail: its force and the part of it that pulls. Which one is
-// view.impact, its number in the ledger from 1; unless that is said, the hardest of the rows.
+// The impacts in the window of time as rows, and one at full detail with the part that pulls: view.impact, its number from 1,
+// else the hardest of the rows.
 import { get } from "./api.js";
 import { button, figures, fill, h, table } from "./dom.js";
 import { plot } from "./plot.js";
-import { column } from "./study_bits.js";
+import { figure } from "./plan_view.js";
 import { share } from "./summary_view.js";
 import { number, quantity } from "./units.js";
 
@@ -12,48 +12,52 @@ const FIGURES = [["Approach", "approach_speed", "m/s"], ["Separation", "separati
   ["Contact time", "duration", "s"], ["Peak force", "peak_force", "N"], ["Impulse", "impulse", "N s"],
   ["Energy lost", "energy_lost", "J"]];
 
-export const section = { id: "impacts", title: "Impacts", show };
+export const section = { title: "Impacts", show };
 
 async function show(host, context) {
-  const { ledger, path, signal, result } = context, { count, resting } = await ledger.count(), total = count + resting;
+  const { ledger, path, result } = context, { count, resting } = await ledger.count(), total = count + resting;
   if (!ledger.isListed || total === 0) return host.append(`No impact is listed; there were ${number(count)}.`);
   const choose = (nth) => context.change({ impact: Math.min(total, Math.max(1, nth)) }, true);
   const field = h("input", { type: "number", min: 1, max: total, onchange: () => choose(field.value) });
-  const step = (by) => () => choose((Number(context.view.impact) || shown?.number || 1) + by), one = h("div"), all = h("div");
-  fill(host, h("div", { class: "row" }, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
-    button("Next →", step(1)), button("See it in the series", see)), one, all);
+  const current = () => Number(context.view.impact) || shown.number, step = (by) => () => choose(current() + by);
+  const one = h("div"), all = h("div");
   const columns = [
     { label: "Impact", numeric: true, value: (row) => row.number, cell: ({ number: nth }) =>
       button(nth, () => (choose(nth), host.scrollIntoView()), { class: "quiet sort", "aria-label": `Show impact ${nth}` }) },
     { label: "Start", numeric: true, value: ({ start }) => start, cell: ({ start }) => quantity(start, "s", 7) },
     { label: "Damper, stop", value: ({ damper, side, kind }) => `${damper}, ${side}${kind === "resting" ? ", resting" : ""}` },
-    ...FIGURES.map(([label, key, unit]) => column(label, unit, (row) => row[key]))];
+    ...FIGURES.map(figure)];
 
   let wanted, listed, shown;
   async function follow({ impact: nth }) {
     const { from, to } = context.window, key = [from, to, nth].join();
     if (key === wanted) return;
     wanted = key;
+    const isAsked = nth >= 1 && nth <= total;
+    field.value = isAsked ? Math.round(nth) : ""; // at once: what is typed from now on stays
     const { impacts, count: here } = await ledger.window(from, to, MOST), isCut = here > MOST;
     const [hardest] = impacts.toSorted((a, b) => (b.peak_force ?? b.impulse) - (a.peak_force ?? a.impulse));
-    const impact = nth >= 1 && nth <= total ? await ledger.at(Math.round(nth)) : hardest ?? await ledger.at(1);
+    const impact = isAsked ? await ledger.at(nth) : hardest ?? await ledger.at(1);
     const isBlow = impact.kind === "impact" && result.plan.contact_model === "impulse";
-    const force = isBlow ? null : await get(`${path}/impacts/${impact.number}/force.json`, undefined, signal);
+    const force = isBlow ? null : await get(`${path}/impacts/${impact.number}/force.json`);
     if (key !== wanted) return;
     if (impacts !== listed) fill(all, table(`${number(here)} in this window of time${isCut ? `, here the first ${MOST}` : ""}`,
       columns, impacts, { sort: !isCut }));
     if (impact.number !== shown?.number) {
-      const box = h("div", { class: "columns" }, !force && "An impulse takes no time and has no force.");
+      const box = h("div.columns", null, !force && "An impulse takes no time and has no force.");
       fill(one, figures(columns.slice(1).map(({ label, value, cell = value }) => [label, cell(impact)])), box);
       if (force) charts(box, impact, force);
     }
-    [listed, shown, field.value] = [impacts, impact, impact.number];
+    [listed, shown] = [impacts, impact];
+    field.value ||= impact.number;
   }
-  function see() {
-    const { start, end, duration, number: nth } = shown, around = 4 * duration || 40 / result.sample_rate;
+  async function see() {
+    const { start, end, duration, number: nth } = await ledger.at(current()) ?? shown, around = 4 * duration || 40 / result.sample_rate;
     context.change({ impact: nth, from: Math.max(0, start - around), to: (end ?? start) + around }, true);
   }
   await follow(context.view);
+  fill(host, h("div.row", null, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
+    button("Next →", step(1)), button("See it in the series", see)), one, all);
   return { follow };
 }
 

@@ -1,7 +1,7 @@
 // One run while it goes on: how far it is, how to stop it, why it failed. What came out is the result's page.
 import { link, swap } from "./address.js";
 import { follow, get, remove } from "./api.js";
-import { button, failure, fill, h, notice, tell } from "./dom.js";
+import { button, failure, faults, fill, h, notice, tell } from "./dom.js";
 import { badge, isOpen, named } from "./jobs_page.js";
 import { moment, number } from "./units.js";
 
@@ -9,8 +9,8 @@ const span = (seconds) => (seconds < 120 ? `${number(seconds, 2)} s` : `${Math.r
 
 export const page = {
   title: () => "Run",
-  async show(host, address) {
-    const id = address.path[1], path = `v1/jobs/${encodeURIComponent(id)}`, stop = new AbortController();
+  async show(host, address, signal) {
+    const id = address.path[1], path = `v1/jobs/${encodeURIComponent(id)}`;
     fill(host, h("h1", null, "Run"), "Loading …");
     let job = await get(path), heard = 0, rows = null, isLooking = false;
     const state = h("p"), time = h("p", { class: "quiet" }), told = h("div"), table = h("div");
@@ -20,7 +20,7 @@ export const page = {
     fill(host, h("h1", null, named(job)),
       h("section", { class: "panel" }, state, bar, time, told, h("div", { class: "row" }, cancelButton, change)), table);
 
-    const fail = (error) => error.name !== "AbortError" && told.append(failure(error));
+    const fail = faults(told);
 
     function draw(news) {
       job = news;
@@ -49,7 +49,7 @@ export const page = {
     async function look() {
       isLooking = true;
       const { sweepView } = await import("./sweep_view.js");
-      rows ??= await sweepView(table, `${path}/table.json`, { signal: stop.signal, job: id });
+      rows ??= await sweepView(table, `${path}/table.json`, id);
       await rows.refresh();
       isLooking = !isOpen(job);
     }
@@ -68,13 +68,7 @@ export const page = {
 
     const timer = setInterval(tick, 1000);
     draw(job);
-    if (isOpen(job)) follow(id, draw, stop.signal).catch(fail);
-    return {
-      leave() {
-        stop.abort();
-        clearInterval(timer);
-        rows?.leave?.();
-      },
-    };
+    if (isOpen(job)) follow(job, draw, signal).catch(fail);
+    return { leave: () => clearInterval(timer) };
   },
 };

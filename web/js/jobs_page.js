@@ -1,4 +1,4 @@
-// The runs, newest first: what became of each, and a way to stop those that go on. Not one run (job_page.js).
+// The runs, newest first: what became of each, and a way to stop those that go on.
 import { link, note, read } from "./address.js";
 import { ask, remove } from "./api.js";
 import { button, failure, fill, h, table, tell } from "./dom.js";
@@ -54,11 +54,10 @@ export const page = {
       if (focused) (document.getElementById(focused) ?? list.querySelector("a"))?.focus({ preventScroll: true });
     }
 
-    async function cancel(job, pressed) {
+    function cancel(job, pressed) {
       document.getElementById(job.id).focus();
       pressed.disabled = true;
-      await remove(`v1/jobs/${job.id}`).then(() => tell(`Cancelled: ${named(job)}`), (error) => pressed.after(failure(error)));
-      load();
+      remove(`v1/jobs/${job.id}`).then(() => (tell(`Cancelled: ${named(job)}`), load()), (error) => pressed.after(failure(error)));
     }
     const target = (job) => (job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`);
     const columns = [

@@ -1,4 +1,4 @@
-// A result's ledger of impacts, in windows: it may hold hundreds of thousands. Each has its `number` from 1.
+// A result's ledger of impacts, in windows, for it may be long. Each has its `number` from 1.
 import { get } from "./api.js";
 
 export class Ledger {
@@ -12,10 +12,10 @@ export class Ledger {
   }
 
   async ask(query) {
-    const { kept, context: { path, result, signal } } = this, key = JSON.stringify(query);
+    const { kept, context: { path, result } } = this, key = JSON.stringify(query);
     if (!this.isListed) return { count: result.summary?.impacts ?? 0, resting: 0, impacts: [], matching: 0 };
     if (kept.size > 60) kept.clear();
-    if (!kept.has(key)) kept.set(key, get(`${path}/impacts.json`, query, signal));
+    if (!kept.has(key)) kept.set(key, get(`${path}/impacts.json`, query));
     kept.get(key).catch(() => kept.delete(key));
     return kept.get(key);
   }

@@ -1,50 +1,52 @@
 // Which page is shown, and what stands around it: navigation, theme, token.
 import { read } from "./address.js";
-import { get, onUnauthorised, setToken, token } from "./api.js";
+import { get, onUnauthorised, readUntil, setToken, token } from "./api.js";
 import { failure, fill, h, tell } from "./dom.js";
 
-// A module's `page` is {title(address), show(host, address)}; show may return, or promise, {change(address)?, leave()?}: for
-// a new query on the same path, and for the end.
-const pages = [
-  [/^(scene)?$/, "scene"], [/^jobs$/, "jobs"], [/^jobs\/[^/]+$/, "job", "jobs"], [/^results\/[^/]+$/, "result", "jobs"],
-  [/^compare$/, "compare"], [/^materials$/, "materials"], [/^materials\/[^/]+$/, "material", "materials"],
-  [/^materials\/[^/]+\/measure$/, "measure", "materials"], [/^records$/, "records"],
-  [/^records\/[^/]+$/, "record", "records"], [/^shell$/, "shell"],
-]; // a pattern of the path, the module's name before "_page.js", the link in the navigation where it is another
+// A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, leave()?}:
+// for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
+const pages = new Map(Object.entries({ // by its path, the module's name before "_page.js"
+  "": "scene", scene: "scene", jobs: "jobs", "jobs/*": "job", "results/*": "result", compare: "compare", materials: "materials",
+  "materials/*": "material", "materials/*/measure": "measure", records: "records", "records/*": "record", shell: "shell",
+}));
 
 const main = document.getElementById("main");
-let shown = null, turn = 0; // {path, controller: promise}
+let shown = null; // {path, controller: promise, stop}
 
 async function show() {
-  const address = read(), path = address.path.join("/");
-  if (shown !== null && shown.path === path) {
-    const controller = await shown.controller.catch(() => null);
-    if (controller?.change) return void controller.change(address);
+  const last = shown;
+  if (last?.path === read().path.join("/")) {
+    const controller = await last.controller;
+    if (last !== shown) return; // another page has come meanwhile, or this one anew
+    if (controller?.change && controller.change(read()) !== false) return;
   }
-  const mine = ++turn;
-  shown?.controller.then((controller) => controller?.leave?.(), () => {});
-  const [, name, within = name] = pages.find(([pattern]) => pattern.test(path)) ?? [];
+  last?.stop.abort();
+  last?.controller.then((controller) => controller?.leave?.());
+  const address = read(), path = address.path.join("/"), stop = new AbortController(), { signal } = stop;
+  readUntil(signal);
+  if (last) fill(main, "Loading …"); // what is left takes no clicks
+  const name = pages.get(path.replace(/\/[^/]+/, "/*")), [within = "scene"] = address.path;
   for (const anchor of document.querySelectorAll("#pages a"))
-    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within}` ? "page" : null;
-  const isFirst = shown === null, { promise: controller, resolve: settle } = Promise.withResolvers();
-  shown = { path, controller };
+    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within === "results" ? "jobs" : within}` ? "page" : null;
+  const { promise: controller, resolve: settle } = Promise.withResolvers();
+  shown = { path, controller, stop };
   try {
     if (!name) throw new Error(`There is no page "${path}" here.`);
     const { page } = await import(`./${name}_page.js`);
-    if (mine !== turn) return settle(null);
+    if (signal.aborted) return settle(null);
     const title = page.title(address);
     document.title = `${title} · impactd`;
     const host = h("div", { class: "page" });
     fill(main, host);
-    if (!isFirst) {
+    if (last) {
       scrollTo(0, 0);
       main.focus({ preventScroll: true });
       tell(title);
     }
-    settle(await page.show(host, address));
+    settle(await page.show(host, address, signal));
   } catch (error) {
     settle(null);
-    if (mine === turn && error.name !== "AbortError") {
+    if (!signal.aborted) {
       if (main.querySelector(".page h1") === null) fill(main, h("h1", null, "This page could not be shown"));
       main.append(failure(error));
     }
@@ -57,6 +59,7 @@ const root = document.documentElement, system = matchMedia("(prefers-color-schem
 const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
 function setTheme(theme) {
   if (theme) root.dataset.theme = theme;
+  themeButton.hidden = false;
   themeButton.textContent = isDark() ? "Light" : "Dark";
   themeButton.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
   dispatchEvent(new Event("themechange")); // plots draw themselves anew
@@ -100,7 +103,7 @@ document.getElementById("skip").addEventListener("click", (event) => {
   event.preventDefault();
   main.focus();
 });
-addEventListener("hashchange", show);
-show();
 get("version").then(({ version, engine }) =>
   (document.getElementById("version").textContent = `impactd ${version}, engine ${engine}`), () => {});
+addEventListener("hashchange", show);
+show();

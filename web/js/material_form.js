@@ -1,8 +1,8 @@
-// Forms that write what is said of materials, by the service's schemas. The controls themselves are form.js's.
+// Forms that write what is said of materials, by the service's schemas.
 import { swap } from "./address.js";
 import { post, schema } from "./api.js";
 import { makeDraft } from "./draft.js";
-import { failure, fill, h, notice } from "./dom.js";
+import { failure, fill, h, notice, once } from "./dom.js";
 import { form } from "./form.js";
 import { differences, path, readMaterial } from "./material_parts.js";
 
@@ -10,13 +10,13 @@ import { differences, path, readMaterial } from "./material_parts.js";
 export async function schemaForm(name, value, label, send) {
   const draft = makeDraft(value), fields = h("div"), outcome = h("div", { role: "status" });
   form(fields, { schema: await schema(name), draft, shows: (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer) });
-  const refused = (error) => {
+  const submit = once(() => send(draft.scene, outcome).catch((error) => {
     draft.say(null, error.errors ?? []);
     fill(outcome, failure(error));
-  };
+  }));
   return h("form", { novalidate: true, onsubmit(event) {
     event.preventDefault();
-    send(draft.scene, outcome).catch(refused);
+    submit();
   } }, fields, h("button", null, label), outcome);
 }
 

@@ -1,10 +1,9 @@
-// One material: what is known of it and how surely, its drop tests, and how it came to be said. Drop tests are entered on
-// measure_page.js.
+// One material: what is known of it and how surely, its drop tests, and how it came to be said.
 import { link } from "./address.js";
 import { get, schema } from "./api.js";
-import { figures, fill, folded, h, table } from "./dom.js";
+import { figures, fill, folded, h, hint, panel, table } from "./dom.js";
 import { writeForm } from "./material_form.js";
-import { badge, differences, FIGURES, panel, path, readMaterial, shown, STATUS } from "./material_parts.js";
+import { badge, differences, FIGURES, path, readMaterial, shown, STATUS } from "./material_parts.js";
 import { moment, title } from "./units.js";
 
 const to = (text, page, query, kind) => h("a", { href: link(`materials/${page}`, query), class: kind }, text);
@@ -15,7 +14,7 @@ function facts(material, properties) {
   const pairs = [...FIGURES.map(({ label, cell }) => [label, cell(material)]),
     ...others.map((name) => [title(name), shown(material[name], properties[name]["x-unit"])])];
   return panel("What is known", figures(pairs.filter(([, value]) => value !== "–")),
-    h("p", { class: "hint" }, "± is one standard deviation; a drop test gives it."),
+    hint("± is one standard deviation; a drop test gives it."),
     material.table?.length > 0 && table("Over approach speed",
       [{ label: "Speed", value: (row) => shown(row.approach_speed, "m/s") }, ...FIGURES], material.table));
 }

@@ -6,7 +6,6 @@ import { number, pretty, quantity, scale, title } from "./units.js";
 export const path = (slug, rest = "") => `v1/materials/${encodeURIComponent(slug)}${rest}`;
 const KINDS = { approved: "ok", draft: "warn", deprecated: "bad" };
 export const badge = (status) => h("span", { class: `badge ${KINDS[status]}` }, status);
-export const panel = (name, ...children) => h("section", { class: "panel", "aria-label": name }, h("h2", null, name), children);
 
 export function labelled(label, control) {
   control.id ||= fresh("field");

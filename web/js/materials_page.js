@@ -1,8 +1,7 @@
-// All materials: found by words and ranges, added, brought in and out as files. Not one of them (material_page.js) nor its
-// drop tests (measure_page.js).
+// All materials: found by words and ranges, added, brought in and out as files.
 import { go, link, swap } from "./address.js";
 import { get, post, save } from "./api.js";
-import { button, failure, fill, folded, h, table } from "./dom.js";
+import { button, failure, fill, folded, h, hint, table } from "./dom.js";
 import { schemaForm } from "./material_form.js";
 import { FIGURES, labelled, range, STATUS } from "./material_parts.js";
 
@@ -22,7 +21,7 @@ const search = (query) => h("form", { class: "row level", role: "search", onsubm
   labelled(label, h("input", { name, placeholder, size: 12, value: query[name] ?? "" }))), h("button", null, "Search"));
 
 const adding = async () => [
-  h("p", { class: "hint" }, "e may be a guess, if its source says so."),
+  hint("e may be a guess, if its source says so."),
   await schemaForm("new_material", {}, "Add it", async (value) => go(`materials/${(await post("v1/materials", value)).slug}`)),
 ];
 

@@ -3,11 +3,11 @@
 import { go, link } from "./address.js";
 import { ask, post, schema } from "./api.js";
 import { makeDraft } from "./draft.js";
-import { failure, figures, fill, h, notice } from "./dom.js";
+import { failure, figures, fill, h, hint, notice, panel } from "./dom.js";
 import { dropGrid } from "./drop_grid.js";
 import { form } from "./form.js";
 import { writeForm } from "./material_form.js";
-import { panel, path, QUANTITIES, range, readMaterial } from "./material_parts.js";
+import { path, QUANTITIES, range, readMaterial } from "./material_parts.js";
 import { traceWidget } from "./trace_view.js";
 import { quantity } from "./units.js";
 
@@ -15,34 +15,35 @@ import { quantity } from "./units.js";
 function results({ evaluation, warnings }) {
   const known = QUANTITIES.filter(([name]) => evaluation?.[name].count > 0).map(([name, label, unit]) => {
     const { mean, low, high, why, count, outliers } = evaluation[name];
-    return [label, [quantity(mean, unit), h("p", { class: "hint" },
-      low === null ? why : `95 %: ${range(low, high, unit)}`, `; ${count} readings, ${outliers} far off`)]];
+    return [label, [quantity(mean, unit),
+      hint(low === null ? why : `95 %: ${range(low, high, unit)}`, `; ${count} readings, ${outliers} far off`)]];
   });
   return [known.length > 0 ? figures(known) : "Nothing counts yet.",
-    warnings.map(({ detail }) => h("p", { class: "hint" }, detail))];
+    warnings.map(({ detail }) => hint(detail))];
 }
 
 // The first step: the readings, and what they come to.
-async function entry(host, { slug }) {
-  const stop = new AbortController(), draft = makeDraft({}, stop.signal);
+async function entry(host, { slug }, signal) {
+  const draft = makeDraft({}, signal);
   const fields = h("div"), out = h("div"), outcome = h("div");
   const button = h("button", { class: "primary", onclick: keep }, "Keep this test (Ctrl+Enter)");
-  const send = (query) => post(path(slug, "/measurements"), draft.scene, { query, signal: stop.signal });
+  const send = (query) => post(path(slug, "/measurements"), draft.scene, { query });
   let turn = 0, timer;
   function refused(error) {
-    if (error.name === "AbortError") return;
     draft.say(null, error.errors ?? []);
     fill(outcome, failure(error));
   }
   async function evaluate() {
-    const mine = ++turn, answer = await send({ dry_run: 1 });
-    if (mine !== turn) return;
+    const mine = ++turn, answer = await send({ dry_run: 1 }).catch((error) => mine === turn && refused(error));
+    if (!answer || mine !== turn) return;
     fill(out, results(answer));
     draft.say(answer, []);
     fill(outcome);
   }
   async function keep() {
     button.disabled = true; // a test that is kept stays for good
+    clearTimeout(timer);
+    turn++;
     try {
       go(`materials/${slug}/measure`, { measurement: (await send()).measurement });
     } catch (error) {
@@ -58,10 +59,10 @@ async function entry(host, { slug }) {
   draft.onChange(({ pointer }) => {
     if (pointer === undefined || draft.scene.traces?.some(({ force }) => !force)) return; // its file is yet to be chosen
     clearTimeout(timer);
-    timer = setTimeout(() => evaluate().catch(refused), 400);
+    timer = setTimeout(evaluate, 400);
   });
   fields.querySelector("tbody input").focus();
-  return { leave: () => stop.abort() };
+  return { leave: () => clearTimeout(timer) };
 }
 
 // The second step: the revision that a test proposes, one click from being made.
@@ -77,9 +78,9 @@ async function proposal(host, material, measurements) {
 
 export const page = {
   title: ({ path: [, slug] }) => `Drop test of ${slug}`,
-  async show(host, { path: [, slug], query: { measurement } }) {
+  async show(host, { path: [, slug], query: { measurement } }, signal) {
     const inner = h("div"), material = await readMaterial(slug);
     fill(host, h("h1", null, "Drop test of ", h("a", { href: link(`materials/${slug}`) }, material.name)), inner);
-    return measurement ? proposal(inner, material, measurement) : entry(inner, material);
+    return measurement ? proposal(inner, material, measurement) : entry(inner, material, signal);
   },
 };

@@ -1,4 +1,4 @@
-// What a scene comes to before it is run: its modes, cost and warnings, from a dry run. And faults by their places.
+// What a scene comes to, from a dry run: modes, cost, warnings. And faults by their places.
 import { link } from "./address.js";
 import { button, figures, fill, h, sentence } from "./dom.js";
 import { place } from "./scene_form.js";

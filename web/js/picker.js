@@ -1,4 +1,4 @@
-// What stands at a damper's stops: a material and its revision, or numbers of one's own, and what that comes to here.
+// What stands at a damper's stops: a material, or numbers of one's own, and what that comes to here.
 import { get } from "./api.js";
 import { faults, fill, folded, h } from "./dom.js";
 import { choice } from "./fields.js";
@@ -35,9 +35,9 @@ export function bufferWidget({ pointer, label, schema, draft }) {
   const revision = choice({ pointer, schema: { default: "newest" }, label: "Revision",
     draft: { ...draft, ...ofSlug, faultsAt: () => [] } },
     () => revisions.map((one) => [`@${one.revision}`, `@${one.revision}, ${one.status}`]));
-  const inner = h("div"), derived = h("div", { class: "derived" });
+  const inner = h("div"), derived = h("div.derived");
   const box = h("fieldset", null, h("legend", null, isBoth ? "Buffers" : label),
-    h("div", { class: "fields" }, material.element, revision.element), inner, derived);
+    material.element, revision.element, inner, derived);
   const same = h("input", { type: "checkbox", onchange() {
     const now = [pointer, ...sides].map(draft.get).find(Boolean), isOne = same.checked;
     for (const side of sides) draft.set(side, isOne ? undefined : structuredClone(now));
@@ -50,6 +50,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     box.hidden = draft.get(pointer) === undefined && !(isBoth && same.checked);
     if (box.hidden) return;
     if (text !== shown) {
+      if (shown?.split("@")[0] !== slug()) revisions = [];
       shown = text;
       revision.element.hidden = way || !text;
       fill(inner);
@@ -62,8 +63,8 @@ export function bufferWidget({ pointer, label, schema, draft }) {
   }
 
   async function list(text) {
-    materials ??= (await get("v1/materials", { limit: 200 }, draft.signal)).materials;
-    const answer = revision.element.hidden ? {} : await get(path(slug(), "/revisions"), { limit: 100 }, draft.signal);
+    materials ??= (await get("v1/materials", { limit: 200 })).materials;
+    const answer = revision.element.hidden ? {} : await get(path(slug(), "/revisions"), { limit: 100 });
     if (shown !== text) return;
     revisions = answer.revisions ?? [];
     material.refresh();
@@ -82,7 +83,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     known = key;
     if (plan.contact_model !== "spring_damper") return void fill(derived);
     const { contacts = [], warnings, least_speed, most_speed } = one.material === null ? {}
-      : await get(`v1/materials/${one.material}/derived`, query, draft.signal).catch(() => ({})); // the values stand without ±
+      : await get(`v1/materials/${one.material}/derived`, query).catch(() => ({})); // the values stand without ±
     if (key !== known) return;
     const [first] = contacts, last = contacts.at(-1); // several where they depend on the speed
     const same = Math.abs(first?.stiffness.value / one.stiffness - 1) < 1e-6 ? first : null;
@@ -91,7 +92,7 @@ export function bufferWidget({ pointer, label, schema, draft }) {
     fill(derived, h("p", null, `k_b ${value("stiffness", "N/m")}, c_b ${value("damping", "N s/m")}, ζ ${value("damping_ratio")}`,
       ` for an effective mass of ${quantity(one.effective_mass, "kg")}`, same?.stiffness.uncertainty && " (± one deviation)"),
     first && folded(`Measured from ${range(least_speed, most_speed, "m/s")}, ${warnings.length} warnings`,
-      () => h("ul", { class: "hint" }, warnings.map(({ detail }) => h("li", null, detail)))));
+      () => h("ul.hint", null, warnings.map(({ detail }) => h("li", null, detail)))));
   }
   return { refresh, element: h("div", null, box, isBoth && h("label", null, same, " The same on both sides")) };
 }

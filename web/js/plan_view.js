@@ -5,9 +5,9 @@ import { column } from "./study_bits.js";
 import { share } from "./summary_view.js";
 import { quantity, title, words } from "./units.js";
 
-export const section = { id: "plan", title: "How it was computed", show };
+export const section = { title: "How it was computed", show };
 
-const figure = ([label, key, unit]) => column(label, unit, (row) => row[key]);
+export const figure = ([label, key, unit]) => column(label, unit, (row) => row[key]);
 const FIGURES = [["e", "restitution"], ["T_c", "contact_time", "s"], ["k_b", "stiffness", "N/m"], ["c_b", "damping", "N s/m"],
   ["ζ", "damping_ratio"], ["n (k_b in N/mⁿ)", "exponent"], ["e reached", "reached_restitution"],
   ["T_c reached", "reached_contact_time", "s"]];
@@ -17,7 +17,7 @@ function show(host, { result: { plan: { decisions, derived, modes }, engine } })
     h("b", null, words(chose)), `: ${why}`, value !== null && ` (${quantity(value, unit)})`,
     saving && `; saves ${share(saving, 2)}`)];
   const known = FIGURES.filter(([, key]) => derived.some((row) => row[key] !== null));
-  host.append(h("dl", { class: "decisions" }, decisions.map(decision)),
+  host.append(h("dl.decisions", null, decisions.map(decision)),
   derived.length === 0 ? "No damper." : table("Each stop, for its pair of masses", [
     { label: "Damper, stop", value: ({ damper, side }) => `${damper}, ${side}` },
     { label: "Material", cell: ({ material }) =>

@@ -1,5 +1,4 @@
-// One chart over an axis: uPlot's lines with units, marks, values at the cursor, zoom, a summary and a table. Nothing else
-// knows uPlot.
+// One chart: uPlot's lines with units, marks, values at the cursor, zoom, a summary and a table. Nothing else knows uPlot.
 import uPlot from "../vendor/uplot/uPlot.esm.js";
 import { button, fill, folded, fresh, h, table, tell } from "./dom.js";
 import { number, pretty, quantity } from "./units.js";
@@ -24,21 +23,21 @@ function padded(values, log, part) {
 export function plot(host, given) {
   const state = { markers: [], spans: [], lines: [], series: [], height: 220, ...given }, { title } = state;
   const id = fresh("plot"), stop = new AbortController();
-  let chart = null, xs = [], columns = [], settling, telling;
+  let chart = null, xs = [], columns = [], settling, telling, isDue;
 
-  const legend = h("div", { class: "legend", "aria-hidden": "true" }), place = h("span", { class: "quiet" }), behind = h("div");
-  const summary = h("p", { class: "hint", id: `${id}-summary` });
-  const box = h("div", { class: "plot", tabindex: "0", role: "application", "aria-label": title,
+  const legend = h("div.legend", { "aria-hidden": "true" }), place = h("span.quiet"), behind = h("div");
+  const summary = h("p.hint", { id: `${id}-summary` });
+  const box = h("div.plot", { tabindex: "0", role: "application", "aria-label": title,
     "aria-describedby": `${id}-summary`, onkeydown: key });
   const tools = [["Whole", "Show the whole", () => choose()], ["+", "Zoom in", () => turn(0.5)],
     ["−", "Zoom out", () => turn(2)]].map(([text, what, act]) =>
     button(text, act, { class: "quiet", "aria-label": `${what}: ${title}`, title: what }));
-  const figure = h("figure", { class: "chart", "aria-label": title }, h("div", { class: "row" }, h("h3", null, title),
-    h("div", { class: "tools" }, tools)), summary, legend, box, behind);
+  const figure = h("figure.chart", { "aria-label": title }, h("div.row", null, h("h3", null, title),
+    h("div.tools", null, tools)), summary, legend, box, behind);
   host.append(figure);
 
-  // uPlot wants columns over one shared x: undefined is nothing, null a gap. A second value at one x stands right beside the
-  // first. A band is two columns.
+  // uPlot wants columns over one x: undefined is nothing, null a gap. A second value at an x stands right beside the first; a
+  // band is two columns.
   function arrange() {
     const rows = new Map(); // x -> [value, index in its series] of each column
     columns = state.series.flatMap((one, at) => (one.low
@@ -57,7 +56,7 @@ export function plot(host, given) {
   }
 
   const placed = (x) => quantity(x, state.x.unit, 6), said = (y) => quantity(y, state.y.unit);
-  const whole = () => state.whole ?? padded(xs, state.x.log, state.series.some((one) => one.points) ? 0.03 : 0);
+  const whole = () => state.whole ?? padded(xs, state.x.log, state.onPick || state.series.some((one) => one.points) ? 0.03 : 0);
   const inView = () => state.range ?? whole();
   const reach = (u, low, high) => // of what is in view
     padded([low, high, ...state.lines.map((line) => line.y)].filter((value) => isShown(value, state.y.log)), state.y.log, 0.07);
@@ -107,7 +106,10 @@ export function plot(host, given) {
     state.range = places?.map((left) => Number(valueAt(left).toPrecision(8)));
     show();
     clearTimeout(settling);
-    settling = setTimeout(() => state.onZoom?.(...(state.range ?? [null, null])), 200);
+    settling = setTimeout(() => {
+      settling = 0;
+      if (box.isConnected) state.onZoom?.(...(state.range ?? [null, null]));
+    }, 200);
   }
   function select() {
     const { left, width } = chart.select;
@@ -168,6 +170,7 @@ export function plot(host, given) {
   }
 
   function renew() {
+    if ((isDue = box.matches(":active"))) return; // a click or drag that has begun would be lost
     arrange();
     build();
     show();
@@ -192,9 +195,10 @@ export function plot(host, given) {
   renew();
   sizes.observe(box);
   addEventListener("themechange", fit, stop);
+  addEventListener("mouseup", () => isDue && setTimeout(renew), stop);
   paper.addEventListener("change", fit, stop);
   function set(changes) {
-    Object.assign(state, changes);
+    Object.assign(state, changes, settling && { range: state.range }); // the reader's, about to be told
     if (changes.series || changes.y) renew();
     else show();
   }

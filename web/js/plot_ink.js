@@ -1,4 +1,4 @@
-// What a chart is drawn with: colours of the theme, axes with prefixes, marks, shades and rules. Only for plot.js.
+// What plot.js draws with: colours of the theme, axes with prefixes, marks, shades and rules.
 import { h } from "./dom.js";
 import { number, pretty, scale } from "./units.js";
 

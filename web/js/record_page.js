@@ -14,8 +14,8 @@ export const told = (name, value) => (UNITS[name] ? quantity(value, UNITS[name])
 export const page = {
   title: (address) => `Record ${address.path[1]}`,
   async show(host, address) {
-    const path = `v1/records/${encodeURIComponent(address.path[1])}`, end = new AbortController();
-    const { links, used_by, name, created, ...facts } = await get(path, null, end.signal);
+    const path = `v1/records/${encodeURIComponent(address.path[1])}`;
+    const { links, used_by, name, created, ...facts } = await get(path);
     const news = h("div"), picture = h("div", { class: "panel" });
     const act = (label, does) => button(label, () => does().catch(faults(news)));
     fill(host, h("h1", null, name), h("div", { class: "row" },
@@ -36,13 +36,13 @@ export const page = {
       const asked = location.hash, { query } = read();
       const from = Math.max(0, query.from || 0), to = Math.min(facts.duration, query.to || facts.duration);
       const { bucket, sample_rate: rate, start, channels: { acceleration: { min, max } } }
-        = await get(`${path}/samples.json`, { from, to, points: POINTS }, end.signal);
+        = await get(`${path}/samples.json`, { from, to, points: POINTS });
       if (asked !== location.hash) return; // zoomed on
       const x = min.map((_, at) => start + (at * bucket) / rate), values = bucket > 1 ? { low: min, high: max } : { y: min };
       chart.set({ range: [from, to], series: [{ label: "acceleration", color: 1, x, ...values }] });
     }
     const draw = () => load().catch(faults(news));
     draw();
-    return { change: draw, leave: () => (end.abort(), chart.destroy()) };
+    return { change: draw, leave: chart.destroy };
   },
 };

@@ -14,7 +14,7 @@ export function recordWidget(context) {
   element.addEventListener("change", () => ["samples", "interval", "digest"]
     .forEach((member) => draft.set(pointer.replace(/[^/]*$/, member), undefined)));
   element.append(more);
-  get("v1/records", { limit: 500 }, draft.signal).then(({ records }) => {
+  get("v1/records", { limit: 500 }).then(({ records }) => {
     listed = records;
     refresh();
   }).catch((error) => more.append(failure(error)));

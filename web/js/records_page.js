@@ -1,7 +1,7 @@
 // The ground motions that the daemon keeps: listed, searched, and new ones uploaded.
 import { go, link } from "./address.js";
 import { ask, get } from "./api.js";
-import { faults, fill, h, table } from "./dom.js";
+import { faults, fill, h, hint, once, panel, table } from "./dom.js";
 import { makeDraft } from "./draft.js";
 import { form } from "./form.js";
 import { told } from "./record_page.js";
@@ -25,14 +25,13 @@ function uploadForm() {
   } });
   form(fields, { schema: { properties: QUERY, required: ["name"] }, draft, shows: () => true });
 
-  function upload(event) {
-    event.preventDefault();
+  const upload = once(() => {
     fill(news, h("label", null, "Sending … ", h("progress")));
-    ask("POST", "v1/records", { query: draft.scene, body: chooser.files[0], type: "text/plain" })
+    return ask("POST", "v1/records", { query: draft.scene, body: chooser.files[0], type: "text/plain" })
       .then((answer) => answer.json()).then(({ name }) => go(`records/${name}`)).catch(faults(news));
-  }
-  return h("form", { onsubmit: upload }, h("label", null, "File ", chooser),
-    h("p", { class: "hint" }, "PEER's AT2, times beside accelerations, or one column"), fields, news,
+  });
+  return h("form", { onsubmit: (event) => (event.preventDefault(), upload()) }, h("label", null, "File ", chooser),
+    hint("PEER's AT2, times beside accelerations, or one column"), fields, news,
     h("button", { class: "primary" }, "Upload"));
 }
 
@@ -41,10 +40,10 @@ export const page = {
   show(host) {
     const list = h("div");
     fill(host, h("h1", null, "Ground motions"), h("p", null, "Records that shake the base of a scene; one never changes."),
-      list, h("section", { class: "panel" }, h("h2", null, "Upload one"), uploadForm()));
+      list, panel("Upload one", uploadForm()));
     get("v1/records", { limit: MOST }).then(({ records }) => fill(list,
       records.length > 0 ? table("Records", COLUMNS, records, { sort: true }) : h("p", null, "There are none yet."),
-      records.length === MOST && h("p", { class: "hint" }, `The first ${MOST} by name.`)))
+      records.length === MOST && hint(`The first ${MOST} by name.`)))
       .catch(faults(list));
   },
 };

@@ -1,10 +1,9 @@
-// A result by its URL: what was asked, what came out, and views of it that share one window of time.
-// A study's result shows its own views (study_views.js); sections of a simulation's are listed here, in their order.
+// A result by its URL: views of it that share one window of time; of a study the view of its kind, with the scene's run below.
 import { note, read } from "./address.js";
 import { get } from "./api.js";
-import { failure, fill, h, notice } from "./dom.js";
+import { failure, fill, folded, h, notice, panel } from "./dom.js";
 import { Ledger } from "./ledger.js";
-import { studyViews } from "./study_views.js";
+import { sceneLink } from "./study_bits.js";
 import { section as animation } from "./animation.js";
 import { section as impacts } from "./impacts_view.js";
 import { section as plan } from "./plan_view.js";
@@ -13,16 +12,26 @@ import { section as spectrum } from "./spectrum_view.js";
 import { energy, section as summary } from "./summary_view.js";
 import { section as take } from "./take_view.js";
 
-// A section is {id, title, show(host, context) -> controller}; the controller may have follow(view) and leave().
-const sections = [summary, series, animation, impacts, spectrum, energy, plan, take];
+// A section is {title, show(host, context) -> controller}; the controller may have follow(view) and leave().
+const sections = [summary, series, animation, impacts, spectrum, energy, plan];
 
-// What sections share: the result's document and path, the view (the URL's query), its latest jobs (a promise), its impacts.
+const STUDIES = { compare: "Contact models side by side", sensitivity: "What errors of the buffers do",
+  tradeoff: "Error against cost", sweep: "Many points", ensemble: "Many seeds" };
+
+async function showStudy(host, context) {
+  const { scene, study: { kind } } = context.result, view = await import(`./${kind}_view.js`);
+  const controller = await view.show(host, context);
+  host.append(h("p", null, sceneLink("Change the study", scene)));
+  return controller;
+}
+
+// What sections share: the result and its path, the view (the URL's query), its latest jobs (a promise), its impacts.
 class Context {
   parts = []; // {controller, faults}: what each section returned, and where it says what went wrong
   constructor(result, view, signal) {
     Object.assign(this, { result, view, signal, path: `v1/results/${result.id}` });
     this.ledger = new Ledger(this);
-    this.jobs = get("v1/jobs", { result: result.id, limit: 20 }, signal).then(({ jobs }) => jobs);
+    this.jobs = get("v1/jobs", { result: result.id, limit: 20 }).then(({ jobs }) => jobs);
   }
 
   // change({from: 1, to: 2}, true): the URL and every section follow; null takes one out; with `push` "back" undoes it.
@@ -33,7 +42,10 @@ class Context {
 
   follow(view) {
     this.view = view;
-    for (const part of this.parts) attempt(part, async () => part.controller?.follow?.(this.view));
+    for (const part of this.parts) this.lead(part);
+  }
+  lead(part) {
+    attempt(part, () => part.controller?.follow?.(this.view));
   }
 
   // The window of time in view, whole unless the URL says otherwise.
@@ -56,35 +68,33 @@ async function attempt({ faults }, act) {
 }
 
 export const page = {
-  title: (address) => `Result ${address.path[1].slice(0, 10)}`,
-  async show(host, address) {
-    const stop = new AbortController();
+  title: ({ path }) => `Result ${path[1].slice(0, 10)}`,
+  async show(host, address, signal) {
     fill(host, h("h1", null, "Result"), "Loading …");
-    const result = await get(`v1/results/${encodeURIComponent(address.path[1])}`, undefined, stop.signal);
-    const context = new Context(result, address.query, stop.signal), heading = h("h1", null, "Result");
+    const result = await get(`v1/results/${encodeURIComponent(address.path[1])}`);
+    const context = new Context(result, address.query, signal), heading = h("h1", null, "Result");
     fill(host, heading);
     // A title is a job's; the result is that of all equal scenes.
     context.jobs.then((jobs) => (heading.textContent = jobs.find((job) => job.title)?.title ?? "Result"), () => {});
     if (result.warnings.length > 0)
-      host.append(notice("warn", result.warnings.length === 1 ? "A warning" : `${result.warnings.length} warnings`,
-        h("ul", null, result.warnings.map((warning) => h("li", null, warning.detail)))));
-    const chosen = result.study ? studyViews(result) : sections;
-    const shown = chosen.map(async (section) => {
-      const inner = h("div"), part = { faults: h("div") };
-      host.append(h("section", { class: "panel", id: section.id, "aria-labelledby": `${section.id}-title` },
-        h("h2", { id: `${section.id}-title` }, section.title), part.faults, inner));
+      host.append(notice("warn", "Warnings", h("ul", null, result.warnings.map((warning) => h("li", null, warning.detail)))));
+    const open = (inner, chosen) => Promise.all(chosen.map(async (section) => {
+      const box = h("div"), part = { faults: h("div") };
+      inner.append(panel(section.title, part.faults, box));
       const { view } = context;
-      part.controller = await attempt(part, () => section.show(inner, context));
+      part.controller = await attempt(part, () => section.show(box, context));
       context.parts.push(part);
-      if (context.view !== view) context.follow(context.view); // it changed meanwhile
-    });
-    await Promise.all(shown);
+      if (context.view !== view) context.lead(part); // it changed meanwhile
+    }));
+    await open(host, [...(result.study ? [{ title: STUDIES[result.study.kind], show: showStudy }] : sections), take]);
+    if (result.study) host.append(folded("The run of the scene as it stands, without the study", () => {
+      const inner = h("div");
+      open(inner, sections);
+      return inner;
+    }));
     return {
       change: (next) => context.follow(next.query),
-      leave() {
-        stop.abort();
-        for (const { controller } of context.parts) controller?.leave?.();
-      },
+      leave: () => context.parts.forEach(({ controller }) => controller?.leave?.()),
     };
   },
 };

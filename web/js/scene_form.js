@@ -1,4 +1,4 @@
-// The scene's form in the steps that one thinks in. Any schema's is form.js.
+// The scene's form in the steps that one thinks in.
 import { h } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice } from "./fields.js";
@@ -16,12 +16,16 @@ const shown = /\/(damping|\w*buffer|displacement|name|accuracy|title|labels)$|^\
 export const place = (pointer) => parts(pointer).map(words).join(", ").replace("axes", "axis")
   .replace(/(?<!i)s?, (\d+)/g, (_, at) => ` ${Number(at) + 1}`);
 
+// The unit of such a place, by its name in the schema's text.
+export const unitOf = (pointer, text) =>
+  RegExp(`"${/([a-z_]+)[/\d]*$/.exec(pointer)[1]}":{[^{}]*"x-unit":"([^"]*)`).exec(text)?.[1];
+
 // What a sweep may vary: the scene's own numbers, its buffers, the seed.
-function variables(scene) {
-  const found = [];
+function variables(scene, text) {
+  const found = [], name = (pointer, unit = unitOf(pointer, text)) => place(pointer) + (unit ? ` [${unit}]` : "");
   (function walk(value, pointer) {
     if (found.length > 200 || /^\/(study|output|excitation\/samples)/.test(pointer)) return;
-    if (typeof value === "number" || pointer.endsWith("buffer")) found.push([pointer, place(pointer)]);
+    if (typeof value === "number" || pointer.endsWith("buffer")) found.push([pointer, name(pointer)]);
     if (typeof value === "object") for (const name in value) walk(value[name], `${pointer}/${name}`);
   })(scene, "");
   return found;
@@ -36,11 +40,11 @@ function axis(draft, pointer) {
 }
 
 // What varies, by its name; with values to begin with.
-function axisChoice(context) {
+const axisChoice = (text) => (context) => {
   const { draft, pointer } = context;
   const set = (_, chosen = "") => draft.set(pointer.replace(/\/pointer$/, ""), axis(draft, chosen));
-  return choice({ ...context, label: "What varies", draft: { ...draft, set } }, () => variables(draft.scene));
-}
+  return choice({ ...context, schema: {}, label: "What varies", draft: { ...draft, set } }, () => variables(draft.scene, text));
+};
 
 // What a kind or an item begins with when it is chosen.
 function starts(draft) {
@@ -66,11 +70,11 @@ export function sceneForm(host, { schema, draft, widgets }) {
   const options = {
     draft, start: (pointer, kind) => starts(draft)[kind ? `${pointer} ${kind}` : pointer],
     shows: (pointer) => shown.test(pointer) || (pointer.endsWith("/storey") && storeysOf(draft.scene) > 1),
-    widgets: [...widgets, [/^\/study\/axes\/\d+\/pointer$/, axisChoice]],
+    widgets: [...widgets, [/^\/study\/axes\/\d+\/pointer$/, axisChoice(JSON.stringify(schema))]],
   };
   for (const members of steps) {
     const inner = h("div"), [name] = members, heading = h("h2", null, title(members.join(", ")));
-    host.append(h("details", { class: "panel", open: name !== "output" }, h("summary", null, heading), inner));
+    host.append(h("details.panel", { open: name !== "output" }, h("summary", null, heading), inner));
     form(inner, { ...options, ...members.length > 1 ? { schema, only: members }
       : { pointer: `/${name}`, schema: schema.properties[name], required: schema.required.includes(name) } });
   }

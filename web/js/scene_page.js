@@ -1,8 +1,8 @@
-// A scene: described at the left, drawn at the right, run from here. The first thing that people see.
+// A scene: described at the left, drawn at the right, run from here.
 import { accuracyWidget } from "./accuracy.js";
 import { go } from "./address.js";
 import { check, schema, submit } from "./api.js";
-import { button, failure, faults, fill, h } from "./dom.js";
+import { button, failure, faults, fill, h, once, panel } from "./dom.js";
 import { makeDraft } from "./draft.js";
 import { drawing } from "./drawing.js";
 import { examplesDialog } from "./examples.js";
@@ -17,8 +17,8 @@ const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/,
 
 // The scene as text to edit, in step with the form while it is not typed in.
 function jsonView(draft) {
-  const name = "The scene as JSON", fault = h("p", { class: "fault", role: "status" });
-  const area = h("textarea", { class: "code", rows: "28", spellcheck: "false", "aria-label": name, oninput() {
+  const name = "The scene as JSON", fault = h("p.fault", { role: "status" });
+  const area = h("textarea.code", { rows: "28", spellcheck: "false", "aria-label": name, oninput() {
     fault.textContent = "";
     try {
       draft.replace(Object.assign({}, JSON.parse(area.value)));
@@ -26,7 +26,7 @@ function jsonView(draft) {
       fault.textContent = `No scene yet: ${error.message}`; // browsers name the line
     }
   } });
-  const element = h("details", { class: "panel" }, h("summary", null, h("h2", null, name)), fault, area);
+  const element = h("details.panel", null, h("summary", null, h("h2", null, name)), fault, area);
   return { element, refresh() {
     if (document.activeElement === area) return;
     fault.textContent = "";
@@ -34,34 +34,34 @@ function jsonView(draft) {
   } };
 }
 
-async function show(host, address) {
-  const stop = new AbortController(), { signal } = stop, draft = makeDraft(sponge(), signal), json = jsonView(draft);
-  const steps = h("div", null, "The form is on its way …"), drawn = h("div", { class: "panel drawn" });
-  const told = h("div"), state = h("p", { class: "hint", role: "status" }), comes = h("div");
-  const run = button("Run", runScene, { class: "primary run", "aria-keyshortcuts": "Control+Enter" });
+async function show(host, address, signal) {
+  const draft = makeDraft(sponge(), signal), json = jsonView(draft);
+  const steps = h("div", null, "The form is on its way …"), drawn = h("div.panel.drawn");
+  const told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
+  const run = button("Run", () => runScene(), { class: "primary run", title: "Ctrl + Enter", "aria-keyshortcuts": "Control+Enter" });
   fill(host, h("h1", null, "Scene"),
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
       button("Examples", examplesDialog)), told,
-    h("div", { class: "scene" }, h("div", null, steps, json.element), h("div", { class: "beside" }, drawn,
-      h("div", null, h("div", { class: "row" }, run, h("span", { class: "hint" }, "Ctrl + Enter")),
-        h("div", { class: "panel" }, h("h2", null, "What it comes to"), state, comes)))));
+    h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
+      h("div", null, h("p", null, run), panel("What it comes to", state, comes)))));
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
-  let timer = null, turn = 0, isEdited = false;
+  let timer = null, turn = 0, isEdited = false, loading;
   const goTo = (pointer) => focusField(steps, pointer);
 
-  // Keeps the scene and asks the service, by check() or submit(); only the last question's answer counts.
+  // Keeps the scene and asks the service; only the last question's answer counts.
   async function ask(question, answered) {
-    const mine = ++turn;
+    const mine = ++turn, isLast = () => mine === turn && !signal.aborted;
     clearTimeout(timer);
     timer = null;
     try {
-      const fits = !isEdited || await keep(draft.scene, signal), answer = await question(draft.scene, signal);
-      if (mine === turn) answered(answer);
+      const fits = !isEdited || await keep(draft.scene, isLast), answer = await question(draft.scene);
+      if (!isLast()) return;
       state.textContent = fits ? "" : "Too long for a link: copy the JSON to keep it.";
+      answered(answer);
     } catch (error) {
-      if (mine !== turn) return;
+      if (!isLast()) return;
       const { errors = [] } = error;
       draft.say(null, errors);
       state.textContent = "";
@@ -85,36 +85,40 @@ async function show(host, address) {
     timer = setTimeout(settle, 250); // ms without a change
   });
 
-  async function runScene() {
-    if (run.ariaBusy === "true") return;
+  const runScene = once(async () => {
     run.ariaBusy = "true"; // not disabled: it keeps the focus
     state.textContent = "Running …";
+    await loading;
     await ask(submit, ({ id, status, result }) => go(status === "successful" ? `results/${result}` : `jobs/${id}`));
     run.ariaBusy = "false";
     comes.querySelector(".bad")?.focus();
-  }
+  });
   addEventListener("keydown", (event) => {
     if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;
     event.preventDefault();
     runScene();
   }, { signal });
-  steps.addEventListener("change", () => timer && settle()); // leaving a field keeps it before a link is followed
+  // Leaving a field keeps it at once: a link may be followed before the URL has it.
+  steps.addEventListener("change", () => timer && (history.replaceState(draft.scene, ""), settle()));
 
   async function load(query) {
     fill(told);
-    draft.replace(await open(query, signal).catch((error) => faults(told)(error) ?? sponge()));
+    turn++;
     isEdited = false;
+    const mine = loading = open(query, history.state).catch((error) => faults(told)(error) ?? sponge()), scene = await mine;
+    if (mine !== loading) return; // another one was asked for since
+    const wasEdited = isEdited || history.state; // the URL may hold what was there before
+    draft.replace(scene);
+    isEdited = wasEdited;
   }
   Promise.all([schema("scene"), load(address.query)]).then(([scene]) => {
     fill(steps);
     sceneForm(steps, { schema: scene, draft, widgets });
+    steps.after(json.element);
   }).catch(faults(steps));
   return {
     change: ({ query }) => load(query),
-    leave() {
-      clearTimeout(timer);
-      stop.abort();
-    },
+    leave: () => clearTimeout(timer),
   };
 }
 

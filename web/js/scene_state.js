@@ -2,7 +2,7 @@
 import { link, pack, read, unpack } from "./address.js";
 import { get } from "./api.js";
 
-// The paper's structure and ball between two sponges: there before anything is fetched.
+// There before anything is fetched.
 export const sponge = () => ({
   title: "The paper's sponge, released from 15 mm",
   structure: { mass: 1.35, stiffness: 865, damping: 1.092 },
@@ -11,10 +11,11 @@ export const sponge = () => ({
   duration: 10, sample_rate: 1000,
 });
 
-// The scene that the query asks for.
-export async function open({ s, example, result, job, buffer, record }, signal) {
+// The scene that was `left` here, else the one that the query asks for.
+export async function open({ s, example, result, job, buffer, record }, left) {
   const { title, ...scene } = sponge();
-  const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`, undefined, signal);
+  const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`);
+  if (left) return left;
   if (s) return unpack(s).catch(() => Promise.reject(new Error("The scene in this link cannot be read. Was it cut off?")));
   if (example) return ask("examples", example);
   if (result) return typical((await ask("results", result)).scene);
@@ -27,7 +28,7 @@ export async function open({ s, example, result, job, buffer, record }, signal) 
 
 export const storeysOf = ({ structure } = {}) => [structure?.masses ?? structure?.mass].flat().length;
 
-// A scene that was run as one would type it: materials by name, the usual channels unsaid. It is the same scene.
+// The same scene as one would type it: materials by name, the usual channels unsaid.
 function typical(scene) {
   const { dampers = [], output, study = {} } = scene, { channels } = output;
   for (const damper of dampers) for (const name in damper) damper[name] = damper[name].material ?? damper[name];
@@ -38,9 +39,9 @@ function typical(scene) {
   return scene;
 }
 
-// Keeps a scene in the URL of its page; false where it is too long for one.
-export async function keep(scene, signal) {
+// Keeps a scene in the URL of its page while it is the last one; false where it is too long for one.
+export async function keep(scene, isLast) {
   const s = await pack(scene), fits = s.length <= 100000;
-  if (!signal.aborted && /^(scene)?$/.test(read().path.join())) history.replaceState(null, "", link("scene", fits ? { s } : {}));
+  if (isLast() && /^(scene)?$/.test(read().path.join())) history.replaceState(fits ? null : scene, "", link("scene", fits ? { s } : {}));
   return fits;
 }

@@ -1,4 +1,4 @@
-// A study of kind "sensitivity": what errors of e, T_c and masses do to the buffers' k_b and c_b, and to the response.
+// A study of kind "sensitivity": what errors of e and T_c do to k_b and c_b, and to the response.
 import { table } from "./dom.js";
 import { plot } from "./plot.js";
 import { between, lesson, spectrum, spread } from "./study_bits.js";

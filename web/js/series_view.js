@@ -1,10 +1,10 @@
-// A result's motion: a chart for each quantity over one axis of time, impacts as marks, the trust horizon shaded. Takes a
-// bucket for each pixel, finer ones with each zoom; never the whole series.
+// A result's motion: a chart for each quantity, impacts as marks, beyond the trust horizon shaded. It asks for a bucket for
+// each pixel, finer ones with each zoom; never the whole series.
 import { go } from "./address.js";
 import { get, post } from "./api.js";
-import { button, failure, faults, fill, h, notice } from "./dom.js";
+import { button, failure, faults, fill, h, hint, notice, once } from "./dom.js";
 import { plot } from "./plot.js";
-import { quantity, title, words } from "./units.js";
+import { number, quantity, title, words } from "./units.js";
 
 const MOST_NUMBERS = 12000; // in one answer: some 110 kB packed
 const MOST_LINES = 8; // in a chart: as there are colours
@@ -13,22 +13,19 @@ const USUAL = ["displacement", "contact_force", "acceleration"]; // what people 
 
 const kind = (channel) => channel.replace(/_\d+$/, "");
 const hue = (nth) => ((nth - 1) % 8) + 1;
-const thousands = (count) => count.toLocaleString("en-GB");
 
-export const section = { id: "motion", title: "Motion over time", show };
+export const section = { title: "Motion over time", show };
 
 function show(host, context) {
   const { result, ledger, path } = context, { sample_rate: rate, channels = [], units = {}, summary } = result;
-  const horizon = summary.trust_horizon ?? null;
+  const horizon = summary.trust_horizon;
   if (channels.length === 0) return void fill(host, h("p", null, "The scene asked for no channels."));
-  const state = h("p", { class: "hint" }), marksNote = h("p", { class: "hint" }), box = h("div");
+  const state = hint(), marksNote = hint(), box = h("div");
   let chosen = null, charts = [], shown, fetching, waiting; // a chart is {drawn, chart}
   const choose = () => context.change(
     { channels: boxes.filter((one) => one.checked).map((one) => one.value).join() || "none" }, true);
   const boxes = channels.map((value) => h("input", { type: "checkbox", value, onchange: choose }));
-  fill(host, horizon !== null && h("p", { class: "hint" },
-    `Each value can be trusted up to ${quantity(horizon, "s")}; beyond, shaded, only statistics hold.`),
-  h("div", { class: "row", role: "group", "aria-label": "Channels" },
+  fill(host, h("div.row", { role: "group", "aria-label": "Channels" },
     boxes.map((one) => h("label", null, one, ` ${words(one.value)}`))), state, marksNote, box);
 
   function build() {
@@ -62,7 +59,7 @@ function show(host, context) {
         return { label: words(channel), color: hue(nth), y, low, high };
       }) });
       state.textContent = (bucket === 1 ? "Every sample is drawn."
-        : `A column is the least and the largest of ${thousands(bucket)} samples: no peak is lost.`)
+        : `A column is the least and the largest of ${number(bucket)} samples: no peak is lost.`)
         + (drawn.length < chosen.length ? ` The first ${MOST_LINES} of a kind are drawn.` : "");
     } catch (error) {
       if (!signal.aborted) fill(state, error.status === 410
@@ -70,7 +67,7 @@ function show(host, context) {
         : [failure(error), button("Try again", load)]);
     }
   }
-  const again = () => post(`${path}/again`).then(({ id }) => go(`jobs/${id}`), faults(state));
+  const again = once(() => post(`${path}/again`).then(({ id }) => go(`jobs/${id}`), faults(state)));
 
   // Marks of the impacts in view, rules at the one chosen and at the animation's instant.
   async function mark() {
@@ -83,7 +80,7 @@ function show(host, context) {
       x: one.start, color: hue(one.damper + 1), pick: () => context.change({ impact: one.number }, true),
       label: `${one.kind} ${one.number}, damper ${one.damper}, ${one.side} stop, ${quantity(one.peak_force, "N")}` }));
     for (const { chart } of charts) chart.set({ lines, markers });
-    if (ledger.isListed) marksNote.textContent = `${thousands(count)} contacts in this window${
+    if (ledger.isListed) marksNote.textContent = `${number(count)} contacts in this window${
       isCut ? `: zoom to ${MOST_MARKS} to see them marked` : ", marked at the top; choose one to see its force"}.`;
   }
 

@@ -1,7 +1,6 @@
 // How to begin from a shell: the lines that curl gets at the service's root.
 import { ask } from "./api.js";
-import { fill, h } from "./dom.js";
-import { copyButton } from "./copy.js";
+import { copied, fill, h } from "./dom.js";
 
 export const page = {
   title: () => "For the shell",
@@ -10,6 +9,6 @@ export const page = {
     fill(host, h("h1", null, "For the shell"),
       h("p", null, "Everything here is also there for scripts. These lines run as they stand; ",
         h("a", { href: "openapi.json" }, "openapi.json"), " has the whole contract."),
-      copyButton(text), h("pre", { tabindex: "0" }, text));
+      copied(text));
   },
 };

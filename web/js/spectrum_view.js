@@ -1,29 +1,25 @@
-// The power spectra of a result on log axes, others laid over them, the largest peak named. In the URL: psd (channel),
-// psd_from, psd_to (Hz), overlay (ids of results).
+// The power spectra of a result, others laid over them. In the URL: psd (channel), psd_from, psd_to (Hz), overlay (ids).
 import { get } from "./api.js";
-import { fill, h } from "./dom.js";
+import { fill, folded, h, hint } from "./dom.js";
 import { plot } from "./plot.js";
-import { spectrum } from "./study_bits.js";
-import { brief, number, pretty, words } from "./units.js";
+import { latest, spectrum } from "./study_bits.js";
+import { number, pretty, words } from "./units.js";
 
-export const section = { id: "spectrum", title: "Spectrum", show };
+export const section = { title: "Spectrum", show };
 
 async function show(host, context) {
-  const { result: { id, links, plan }, signal } = context;
+  const { result: { id, links, plan }, view: { overlay = "" } } = context;
   if (!links.psd) return host.append("The scene asked for no spectrum.");
-  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`, undefined, signal);
-  const recent = get("v1/jobs", { status: "successful", kind: "none", limit: 50 }, signal);
-  const [psd, { jobs }] = await Promise.all([load(id), recent]), frequency = psd.frequency.values;
-  const names = new Map(jobs.map(({ result, title }) => [result, title ?? brief(result)]));
-
-  // A list whose choice is a part of the view.
-  const list = (key, values, name, more) => h("select", { ...more, onchange: ({ target }) =>
-    context.change({ [key]: Array.from(target.selectedOptions, ({ value }) => value).join() }, true) },
-  values.map((value) => h("option", { value }, name(value))));
-  const one = list("psd", Object.keys(psd.channels), words), box = h("div");
-  const others = list("overlay", [...names.keys()], (result) => names.get(result), { multiple: true, size: 4 });
-  fill(host, h("label", null, "Channel ", one), h("div", null, h("label", null, "Lay over it (Ctrl for several) ", others)), box,
-    h("p", { class: "hint" }, `Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
+  const load = (result) => get(`v1/results/${encodeURIComponent(result)}/psd.json`);
+  const [psd, names] = await Promise.all([load(id), latest(20)]), frequency = psd.frequency.values;
+  names.delete(id);
+  const one = h("select", { onchange: () => context.change({ psd: one.value }, true) },
+    Object.keys(psd.channels).map((value) => h("option", { value }, words(value)))), box = h("div");
+  const boxes = Array.from(names.keys(), (value) => h("input", { type: "checkbox", value, onchange: () =>
+    context.change({ overlay: boxes.filter(({ checked }) => checked).map((other) => other.value).join() }, true) }));
+  fill(host, h("label", null, "Channel ", one), folded("Lay other results over it", () =>
+    boxes.map((other) => h("div", null, h("label", null, other, " ", names.get(other.value)))), overlay !== ""), box,
+    hint(`Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`));
 
   let chart = null, wanted = "";
   async function follow(view) {
@@ -38,7 +34,7 @@ async function show(host, context) {
     if (key === wanted) return chart?.set({ range, summary });
     wanted = key;
     one.value = channel;
-    for (const option of others.options) option.selected = ids.includes(option.value);
+    for (const other of boxes) other.checked = ids.includes(other.value);
     const overlays = await Promise.all(ids.map((result) => load(result).catch(() => null)));
     if (key !== wanted) return;
     fill(box);
@@ -49,6 +45,7 @@ async function show(host, context) {
       lines: plan.modes.slice(0, 12).map((mode, at) => ({ x: mode.frequency, label: `mode ${at + 1}` })),
       onZoom: (left, right) => context.change({ psd_from: left, psd_to: right }, true),
     });
+    return follow(context.view); // its range may have changed meanwhile
   }
   await follow(context.view);
   return { follow };

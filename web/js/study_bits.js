@@ -1,27 +1,33 @@
-// What the views of studies and comparisons share: ways to scenes and runs, pieces of text and tables.
+// What views of studies and comparisons share: ways to scenes and runs, pieces of text and tables.
 import { go, link, pack } from "./address.js";
-import { failure, h } from "./dom.js";
-import { quantity, title, words } from "./units.js";
+import { get } from "./api.js";
+import { failure, h, once } from "./dom.js";
+import { brief, moment, quantity, title, words } from "./units.js";
 
 // The scene alone, without its study.
 export const plain = ({ study, ...scene }) => scene;
 
-// A link to the form with this scene, which is in the URL.
+// A link to the form with this scene, or what a promise of one brings, which is in the URL.
 export function sceneLink(label, scene) {
-  const anchor = h("a", { href: "#/scene" }, label);
-  pack(scene).then((packed) => (anchor.href = link("scene", { s: packed })));
+  const anchor = h("a", null, label);
+  Promise.resolve(scene).then(pack).then((s) => (anchor.href = link("scene", { s })), (error) => anchor.append(failure(error)));
   return anchor;
 }
 
+// The names of the latest results, by their ids.
+export const latest = async (limit) => new Map((await get("v1/jobs", { status: "successful", kind: "none", limit })).jobs
+  .filter(({ result }) => result).map(({ result, title: name, finished }) =>
+    [result, `${name ?? brief(result)}, ${moment(finished)}`]));
+
 // A button that makes a job and goes to its result, or to the job while it runs.
 export function jobButton(label, make) {
-  const act = () => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
-    (error) => button.after(failure(error)));
+  const act = once(() => make().then((job) => go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`),
+    (error) => button.after(failure(error))));
   const button = h("button", { type: "button", onclick: act }, label);
   return button;
 }
 
-export const lesson = (...texts) => h("div", { class: "notice" }, texts.filter(Boolean).map((text) => h("p", null, text)));
+export const lesson = (...texts) => h("div.notice", null, texts.filter(Boolean).map((text) => h("p", null, text)));
 export const column = (label, unit, value) => ({ label, numeric: true, value, cell: (row) => quantity(value(row), unit) });
 export const between = (low, high, unit) => `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
 export const told = (value, unit) => (typeof value === "number" ? quantity(value, unit)
@@ -31,13 +37,6 @@ export const told = (value, unit) => (typeof value === "number" ? quantity(value
 export const spread = (label, name) => [{ label: "Number", value: ({ metric }) => title(metric) },
   { label, numeric: true, cell: (row) => quantity(row[name], row.unit) },
   { label: "5 to 95 %", numeric: true, cell: ({ q05, q95, unit }) => between(q05, q95, unit) }];
-
-// A bar from one number to another within a range, beside numbers in a table.
-export function strip([low, high], [[from, to]]) {
-  const part = (size) => `${high > low ? (100 * size) / (high - low) : 0}%`;
-  return h("div", { class: "strip", "aria-hidden": "true" },
-    h("span", { style: { left: part(Math.min(from, to) - low), width: part(Math.abs(to - from)) } }));
-}
 
 // [smallest, largest] of the numbers among values.
 export function extent(values) {

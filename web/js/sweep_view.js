@@ -1,20 +1,20 @@
-// The points of a sweep that are there so far: over two axes a map, over one of numbers a line, else a table. Each opens.
+// The points of a sweep so far: over two axes a map, over one of numbers a line, else a table. Each opens.
 import { note, read } from "./address.js";
 import { get, post, submit } from "./api.js";
-import { button, figures, fill, folded, h, notice, table } from "./dom.js";
+import { button, figures, fill, folded, h, hint, notice, table } from "./dom.js";
 import { heat } from "./heat.js";
 import { plot } from "./plot.js";
-import { jobButton, told } from "./study_bits.js";
+import { jobButton, sceneLink, told } from "./study_bits.js";
 import { title, words } from "./units.js";
 
-export const show = (host, { path, result: { study }, signal }) => (study.points <= 100000
-  ? sweepView(host, `${path}/table.json`, { signal }) : void host.append("Too many points to draw: save them as CSV or NPZ."));
+export const show = (host, { path, result: { study } }) => (study.points <= 100000 ? sweepView(host, `${path}/table.json`)
+  : void host.append("Too many points to draw: save them as CSV or NPZ."));
 
 // Shows the table at `path`, a result's or that of the job `job`, by the URL's metric and point -> {refresh(), follow()}.
-export async function sweepView(host, path, { signal, job } = {}) {
+export async function sweepView(host, path, job) {
   let answer, points, drawn = "", opened = null; // points by their indices: {index, status, a value for each axis and metric}
   async function load() {
-    answer = await get(path, undefined, signal);
+    answer = await get(path);
     const columns = Object.entries(answer.columns);
     points = new Map(answer.columns.index.values.map((index, row) =>
       [index, Object.fromEntries(columns.map(([key, { values }]) => [key, values[row]]))]));
@@ -46,15 +46,15 @@ export async function sweepView(host, path, { signal, job } = {}) {
     const { query } = read(), metric = metrics.find(({ key }) => key === query.metric) ?? metrics[0];
     const wanted = [metric.key, answer.done, y && query.point].join();
     const failed = answer.failures.map((one) => h("p", null, `${one.count} from point ${one.first_point} on: ${one.detail}`));
-    fill(state, h("p", null, `${answer.done} of ${answer.points} points.`), answer.failed > 0
+    if (wanted !== drawn) fill(state, h("p", null, `${answer.done} of ${answer.points} points.`), answer.failed > 0
       && notice("warn", `${answer.failed} failed`, failed, jobButton("Make the failed ones again", retry)));
     select.value = metric.key;
     if (isDrawn && wanted !== drawn) draw(metric, query.point);
     drawn = wanted;
     if (query.point !== opened) open(opened = query.point);
   }
-  const maker = async () => job ?? (await get("v1/jobs", { result: answer.result, kind: "sweep" })).jobs[0].id;
-  const retry = async () => post(`v1/jobs/${await maker()}/retry`);
+  const retry = async () => // of the job that made it
+    post(`v1/jobs/${job ?? (await get("v1/jobs", { result: answer.result, kind: "sweep" })).jobs[0].id}/retry`);
   function draw({ label, name, si, value, cell }, chosen) {
     const made = [...points.values()].filter((point) => value(point) !== null).sort((a, b) => value(a) - value(b));
     const ends = [made[0], made.at(-1)].filter(Boolean), [low, high] = ends.map(value), isLog = low > 0 && high > 50 * low;
@@ -66,7 +66,7 @@ export async function sweepView(host, path, { signal, job } = {}) {
     const show = (i, j, point = pointAt(i, j)) => ({ value: value(point), isChosen: `${point?.index}` === chosen,
       pick: () => pick(point),
       text: point ? `${place(point)}: ${value(point) === null ? point.status : cell(point)}` : "Not there yet" });
-    box.append(h("p", { class: "hint" }, summary), heat({ title: `${label}: ${y.name} up, ${x.name} across`,
+    box.append(hint(summary), heat({ title: `${label}: ${y.name} up, ${x.name} across`,
       x: x.texts, y: y.texts, ends: ends.map(cell), isLog, cell: show }));
   }
   function all() {
@@ -77,8 +77,8 @@ export async function sweepView(host, path, { signal, job } = {}) {
   function open(index) {
     const point = points.get(Number(index)), scene = answer.links.scene.replace("{index}", index);
     fill(opening, point ? [h("h3", null, `Point ${index}`), figures(fields.map(({ label, cell }) => [label, cell(point)])),
-      jobButton("Run this point", async () => submit(await get(scene)))]
-      : h("p", { class: "hint" }, "A click or Enter opens a point."));
+      jobButton("Run this point", async () => submit(await get(scene))), " ", sceneLink("Change its scene", get(scene))]
+      : hint("A click or Enter opens a point."));
   }
   follow();
   return { follow, refresh: () => load().then(() => box.contains(document.activeElement) || follow()) };

@@ -1,20 +1,21 @@
-// What a reader takes along: files in every format there is, and lines that run this very scene elsewhere.
+// What a reader takes along: files in every format, and lines that run this scene elsewhere.
 import { address, save } from "./api.js";
-import { copyButton } from "./copy.js";
-import { button, failure, folded, h } from "./dom.js";
+import { copied, failure, figures, folded, h } from "./dom.js";
+import { title } from "./units.js";
 
-export const section = { id: "take", title: "Take it along", show };
+export const section = { title: "Take it along", show };
 
 function show(host, { result: { id, links, scene } }) {
-  const files = Object.values(links).filter((path) => /^[^{]+\.\w+$/.test(path)).map((path) => {
-    const name = path.split("/").pop();
-    return button(name, ({ target }) => save(path, `${id.slice(0, 10)}_${name}`)
-      .catch((error) => target.after(failure(error))));
-  });
+  const files = Map.groupBy(Object.values(links).map((path) => /^[^{]+\/((\w+)\.(\w+))$/.exec(path)).filter(Boolean),
+    ([, , what]) => what);
+  const file = ([path, name, , format]) => [h("a", { href: address(path), "aria-label": name, onclick(event) {
+    event.preventDefault();
+    save(path, `${id.slice(0, 10)}_${name}`).catch((error) => event.target.after(failure(error)));
+  } }, format), " "];
   // Apostrophes, which only stand in texts, are escaped: so any language can quote it.
   const text = JSON.stringify(scene, null, 2).replaceAll("'", "\\u0027"), url = address("").replace(/\/$/, "");
-  host.append(h("div", { class: "row" }, files), ...Object.entries(languages(url, text)).map(([name, lines]) =>
-    folded(`Run this scene from ${name}`, () => [copyButton(lines), h("pre", { tabindex: "0" }, lines)])));
+  host.append(figures([...files].map(([what, all]) => [title(what), all.map(file)])), ...Object.entries(languages(url, text)).map(([name, lines]) =>
+    folded(`Run this scene from ${name}`, () => copied(lines))));
 }
 
 const languages = (url, scene) => ({

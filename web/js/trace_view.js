@@ -24,7 +24,8 @@ export function traceWidget({ pointer, draft }) {
   let chart, shown;
   const file = h("input", { type: "file", accept: ".csv,.txt,.dat", onclick: () => (file.value = ""), async onchange() {
     try {
-      draft.set(place, { ...draft.get(place), ...readTrace(await file.files[0].text()) });
+      const trace = readTrace(await file.files[0].text());
+      draft.set(place, { ...draft.get(place), ...trace });
     } catch (error) {
       draft.say(null, [{ pointer, detail: error.message }]);
     }

@@ -12,14 +12,14 @@ export function show(host, { result: { scene, study: { metric, points, recommend
   host.append(lesson(`${taken ? `Take ${taken.name}. ` : ""}${title(why)}.`,
     taken && sceneLink("Use it in the scene", applied(scene, taken))));
 
-  // Ways whose names differ in a number alone are joined, the cheapest first; dashed where all are beaten in both.
+  // Ways that differ in a number alone are joined, the cheapest first; dashed where all are beaten in both.
   const measured = points.filter((point) => time(point) > 0 && error(point) !== null).sort((a, b) => time(a) - time(b));
-  const series = [...Map.groupBy(measured, ({ name }) => name.replace(/ [\d.e-]+( \w+)?$/, ""))].map(([name, ways], at) =>
+  const series = [...Map.groupBy(measured, ({ name }) => name.replace(/ [\d.e-]+( \w+)?$/, " …"))].map(([name, ways], at) =>
     ({ label: name, color: (at % 8) + 1, ways, x: ways.map(time), y: ways.map(error), dash: !ways.some((way) => way.is_best) }));
   plot(host, { title: "Error against cost", height: 360, x: { label: "CPU time of a run", unit: "s", log: true },
     y: { label, unit, log: true }, series, onPick: (at, index) => links.get(series[at].ways[index]).focus(),
     lines: [{ y: wanted, label: "wanted" }, ...(taken ? [{ x: time(taken), label: "recommended" }] : [])],
-    summary: `Down and to the left is better: ${why}. A point leads to its row below.` });
+    summary: "Down and to the left is better. A point leads to its row below." });
   host.append(table("Ways to run this scene, each a link to use it", [
     { label: "Way", value: ({ name }) => name, cell: (point) => links.get(point) },
     column("CPU time", "s", time), column(label, unit, error),

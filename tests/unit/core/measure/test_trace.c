@@ -183,7 +183,11 @@ static void what_is_no_pulse_gets_no_figure(void **state) {
     TraceReading reading = look(&record, &usual);
     assert_true(reading.contacts.count >= 1);
     for (size_t i = 0; i < reading.contacts.count; i++) {
-        assert_non_null(reading.contacts.at[i].why);
+        const TraceContact *contact = &reading.contacts.at[i];
+        assert_non_null(contact->why);
+        assert_true(isnan(contact->contact_time) && isnan(contact->restitution));
+        assert_true(isnan(contact->seen.start) && isnan(contact->seen.end));
+        assert_int_equal(contact->seen.pulse.count, 0);
     }
     trace_reading_clear(&reading);
 }

@@ -49,6 +49,37 @@ static void impacts_read_back_one_by_one(void **state) {
     free(impacts.at);
 }
 
+#define HEAD "{\"count\": 2, \"resting\": 1, \"impacts\": ["
+#define FIRST "\"kind\": \"impact\", \"start\": 1, \"end\": 1.5}"
+#define RESTS "\"kind\": \"resting\", \"start\": 2, \"end\": null}"
+#define LAST "\"kind\": \"impact\", \"start\": 3, \"end\": 3, \"peak_force\": null}"
+
+static void a_window_of_impacts_stands_as_it_was_saved(void **state) {
+    (void)state;
+    static const char saved[] = HEAD "{" FIRST ", {" RESTS ", {" LAST "]}";
+    static const struct {
+        ImpactWindow window;
+        bool is_numbered;
+        const char *expected;
+    } cases[] = {
+        {{0, 9, 1, 9}, false, saved},
+        {{1.5, 2, 1, 9}, false, HEAD "{" FIRST ", {" RESTS "]}"},
+        // What rests until the end is met by every later window.
+        {{2.5, 2.9, 1, 9}, true, HEAD "{\"number\": 2, " RESTS "], \"matching\": 1}"},
+        {{0, 9, 2, 1}, true, HEAD "{\"number\": 2, " RESTS "], \"matching\": 3}"},
+        {{3, 3, 3, 9}, true, HEAD "{\"number\": 3, " LAST "], \"matching\": 2}"},
+        {{0, 0.5, 1, 9}, true, HEAD "], \"matching\": 0}"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Bytes bytes = {.most = 1000};
+        assert_int_equal(
+            kept_impacts_window(saved, &cases[i].window, cases[i].is_numbered, &bytes, NULL),
+            STATUS_OK);
+        assert_string_equal(bytes.at, cases[i].expected);
+        bytes_clear(&bytes);
+    }
+}
+
 static void what_was_not_written_so_is_refused(void **state) {
     (void)state;
     static const char *const spectra[] = {
@@ -81,12 +112,20 @@ static void what_was_not_written_so_is_refused(void **state) {
         assert_int_equal(kept_impacts(impacts[i], &read, NULL), STATUS_INTERNAL);
         assert_null(read.at);
     }
+    for (size_t i = 0; i < 3; i++) {
+        Bytes bytes = {.most = 1000};
+        assert_int_equal(
+            kept_impacts_window(impacts[i], &(ImpactWindow){0, 9, 1, 9}, true, &bytes, NULL),
+            STATUS_INTERNAL);
+        bytes_clear(&bytes);
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spectra_read_back_with_the_frequency_first),
         cmocka_unit_test(impacts_read_back_one_by_one),
+        cmocka_unit_test(a_window_of_impacts_stands_as_it_was_saved),
         cmocka_unit_test(what_was_not_written_so_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

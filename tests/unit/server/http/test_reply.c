@@ -65,7 +65,7 @@ static void the_tag_of_either_form_is_known(void **state) {
         assert_int_equal(reply.code, 304);
         assert_int_equal(reply.body_size, 0);
         assert_string_equal(reply.etag, told[i]);
-        assert_true(reply.varies_by_encoding == (i == 1));
+        assert_true(reply.varies_by_encoding);
         reply_clear(&reply);
     }
     Reply reply = text_of(5000);
