@@ -123,7 +123,7 @@ test("One zoom after another goes on from the last one, not from where its data 
   const { result: a } = await daemon.run("paper_free_sponge"), { result: b } = await daemon.run("paper_free_aluminium");
   await page.goto(url(`#/compare?a=${a}&b=${b}`));
   const chart = page.getByRole("application", { name: "Over time" });
-  await says(main(page), /Samples from 0 s to 10 s/);
+  await says(main(page), /From 0 s to 10 s/);
   await chart.focus();
   const series = await hold(page, /series\.json/, 2);
   await page.keyboard.press("+");
@@ -133,14 +133,14 @@ test("One zoom after another goes on from the last one, not from where its data 
   const come = series.letGo().then(() => (isHere = true));
   while (!isHere) for (const arrow of ["Right", "Left"]) await page.keyboard.press(`Shift+Arrow${arrow}`); // to and fro, at rest never
   await come;
-  await says(main(page), /Samples from 3\.75 s to 6\.25 s/);
+  await says(main(page), /From 3\.75 s to 6\.25 s/);
 });
 
 test("A drag goes on while finer data come", async ({ page, daemon, url }) => {
   const { result: a } = await daemon.run("paper_free_sponge"), { result: b } = await daemon.run("paper_free_aluminium");
   await page.goto(url(`#/compare?a=${a}&b=${b}`));
   const chart = page.getByRole("application", { name: "Over time" });
-  await says(main(page), /Samples from 0 s to 10 s/);
+  await says(main(page), /From 0 s to 10 s/);
   await chart.focus();
   const series = await hold(page, /series\.json/, 2);
   await page.keyboard.press("+");
@@ -156,7 +156,7 @@ test("A drag goes on while finer data come", async ({ page, daemon, url }) => {
   await page.mouse.up();
   const [, from, to] = await leads(page, /from=(?!2\.5&)([\d.]+)&to=([\d.]+)/);
   assert.ok(from > 3 && to < 7, `${from} to ${to}`);
-  await says(main(page), new RegExp(`Samples from ${Number(from).toPrecision(3)} s`));
+  await says(main(page), new RegExp(`From ${Number(from).toPrecision(3)} s`));
 });
 
 test("What was typed last is there again, though a link was followed at once", async ({ page, url }) => {

@@ -7,7 +7,7 @@ import { leads, says, tabTo, test, until } from "./support.mjs";
 const main = (page) => page.getByRole("main");
 
 test("A drop test of a new material is entered by keyboard alone, and simulated with", async ({ page, url, daemon, refused }) => {
-  refused(422); // what is typed slowly is judged half way
+  refused(422); // of what is half typed, where keys come slowly
   let presses = 0;
   const press = async (...keys) => {
     for (const key of keys) await page.keyboard.press(key);

@@ -96,7 +96,8 @@ function show(host, context) {
     requestAnimationFrame((next) => frame(next, now));
   }
   async function follow(next) {
-    const isHere = next.t === seen.t, isChosen = isHere && next.impact !== seen.impact, wasPlaying = playing; // by another section
+    const isHere = next.t === seen.t, wasPlaying = playing;
+    const isChosen = isHere && next.impact !== seen.impact; // by another section
     seen = next;
     ({ from, to } = context.window);
     Object.assign(scrub, { min: from, max: to, step: (to - from) / 1000 });

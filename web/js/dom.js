@@ -15,9 +15,8 @@ function put(node, attributes, children) {
 
 // h("p.quiet", {onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
 export function h(name, attributes, ...children) {
-  const [tag, ...classes] = name.split("."), node = document.createElement(tag);
-  node.classList.add(...classes);
-  return put(node, attributes, children);
+  const [tag, ...classes] = name.split(".");
+  return put(document.createElement(tag), { class: classes.join(" ") || null, ...attributes }, children);
 }
 
 // The same for SVG.
@@ -28,7 +27,7 @@ export function fill(node, ...children) {
   return put(node, null, children);
 }
 
-// What it does is not begun again while it goes on: some click twice.
+// Not begun again while it goes on: some click twice.
 export function once(act) {
   let going = null;
   return () => (going ??= act().finally(() => (going = null)));

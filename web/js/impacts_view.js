@@ -51,10 +51,10 @@ async function show(host, context) {
     [listed, shown] = [impacts, impact];
     field.value ||= impact.number;
   }
-  async function see() {
-    const { start, end, duration, number: nth } = await ledger.at(current()) ?? shown, around = 4 * duration || 40 / result.sample_rate;
+  const see = () => ledger.at(current()).then((row) => {
+    const { start, end, duration, number: nth } = row ?? shown, around = 4 * duration || 40 / result.sample_rate;
     context.change({ impact: nth, from: Math.max(0, start - around), to: (end ?? start) + around }, true);
-  }
+  }, () => {}); // follow() tells it
   await follow(context.view);
   fill(host, h("div.row", null, button("← Previous", step(-1)), h("label", null, "Impact ", field), `of ${number(total)}`,
     button("Next →", step(1)), button("See it in the series", see)), one, all);

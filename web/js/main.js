@@ -16,7 +16,7 @@ async function show() {
   const last = shown;
   if (last?.path === read().path.join("/")) {
     const controller = await last.controller;
-    if (last !== shown) return; // another page has come meanwhile, or this one anew
+    if (last !== shown) return; // another one has come meanwhile
     if (controller?.change && controller.change(read()) !== false) return;
   }
   last?.stop.abort();

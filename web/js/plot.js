@@ -170,7 +170,7 @@ export function plot(host, given) {
   }
 
   function renew() {
-    if ((isDue = box.matches(":active"))) return; // a click or drag that has begun would be lost
+    if ((isDue = box.matches(":active"))) return; // a drag that has begun would be lost
     arrange();
     build();
     show();

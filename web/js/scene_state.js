@@ -39,7 +39,7 @@ function typical(scene) {
   return scene;
 }
 
-// Keeps a scene in the URL of its page while it is the last one; false where it is too long for one.
+// Keeps a scene in the URL while it is the last one; false where it is too long.
 export async function keep(scene, isLast) {
   const s = await pack(scene), fits = s.length <= 100000;
   if (isLast() && /^(scene)?$/.test(read().path.join())) history.replaceState(fits ? null : scene, "", link("scene", fits ? { s } : {}));
