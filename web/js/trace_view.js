@@ -5,8 +5,6 @@ import { plot } from "./plot.js";
 import { extent } from "./study_bits.js";
 import { number, quantity, words } from "./units.js";
 
-const DRAWN = 20000;
-
 // {interval, force} of lines of a time in s and a force in N; what stands before them is a heading. Beside a semicolon or a
 // tab a comma is a decimal one.
 function readTrace(text) {
@@ -28,7 +26,7 @@ const told = ({ contact, contact_time, restitution, note }) => [
 // What plot() draws of a trace and its rows of the evaluation, undefined while it is awaited. Very many samples are
 // drawn as extremes of buckets: no peak is lost.
 function picture({ interval, force }, evaluation, rows) {
-  const x = [], low = [], high = [], size = Math.ceil(force.length / DRAWN);
+  const x = [], low = [], high = [], size = Math.ceil(force.length / 20000);
   for (let at = 0; at < force.length; at += size) {
     const [least, most] = extent(force.slice(at, at + size));
     x.push(at * interval);
