@@ -156,7 +156,7 @@ test("A drag goes on while finer data come", async ({ page, daemon, url }) => {
   await page.mouse.up();
   const [, from, to] = await leads(page, /from=(?!2\.5&)([\d.]+)&to=([\d.]+)/);
   assert.ok(from > 3 && to < 7, `${from} to ${to}`);
-  await says(main(page), new RegExp(`From ${Number(from).toPrecision(3)} s`));
+  await says(main(page), new RegExp(`From ${Number(Number(from).toPrecision(6))} s`));
 });
 
 test("What was typed last is there again, though a link was followed at once", async ({ page, url }) => {
