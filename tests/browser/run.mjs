@@ -24,7 +24,7 @@ const { values, positionals: words } = parseArgs({
 const build = path.resolve(values.build);
 const pictures = path.join(build, "browser");
 pace.slow = Number(values.slow);
-const TEST_MS = 120000 * pace.slow;
+const TEST_MS = 300000 * pace.slow;
 const LATE_MS = 300; // an answer's wait, at most
 
 for (const name of fs.readdirSync(here).filter((one) => /^test_.*\.mjs$/.test(one)).sort()) {

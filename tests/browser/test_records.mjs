@@ -2,14 +2,14 @@
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import path from "node:path";
-import { axe, leads, overflow, says, test, transferred } from "./support.mjs";
+import { axe, leads, overflow, says, test, transferred, until } from "./support.mjs";
 
 const course = (count) => Array.from({ length: count }, (_, k) => `${(Math.sin(0.3 * k) * Math.sin((Math.PI * k) / count)).toFixed(6)}\n`).join("");
 
 test("A file is uploaded, a fault told, shakes a scene, and goes again", async ({ page, daemon, url, folder, refused }) => {
   const file = path.join(folder, "Valley 7.txt");
   fs.writeFileSync(file, course(2000));
-  refused(400);
+  refused(400, 422);
   await page.goto(url("#/records"));
   await says(page.locator("main"), /There are none yet/);
   await page.getByLabel("File").setInputFiles(file);
@@ -17,7 +17,13 @@ test("A file is uploaded, a fault told, shakes a scene, and goes again", async (
   await page.getByLabel("Unit").selectOption("m/s^2");
   await page.getByRole("button", { name: "Upload", exact: true }).click();
   await says(page.getByRole("alert"), /must tell the interval/);
+  await page.getByLabel("Name").fill("Valley 7");
   await page.getByLabel("Interval").fill("0,01");
+  await page.getByRole("button", { name: "Upload", exact: true }).click();
+  await until("the focus to be at what is wrong", () => page.getByLabel("Name").evaluate((node) => node === document.activeElement));
+  await says(page.locator("main"), /must be 1 to 64 letters/);
+  await page.getByLabel("Name").fill("Valley_7");
+  await page.getByText("More: source").click();
   await page.getByLabel("Source").fill("made up");
   await page.getByRole("button", { name: "Upload", exact: true }).click();
   await says(page.locator("main"), /2000 samples over 19\.99 s/);

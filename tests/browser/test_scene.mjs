@@ -160,7 +160,7 @@ test("A sweep by the names of what varies, and other pages on the way lose nothi
   await page.goto(url("#/scene"));
   await clearance(page).fill("0.016");
   await page.getByLabel("Study kind").selectOption("sweep");
-  await page.getByLabel("What varies").selectOption({ label: "damper 1, mass" });
+  await page.getByLabel("What varies").selectOption({ label: "damper 1, mass [kg]" });
   const before = await scene(page);
   assert.equal(before.study.kind, "sweep");
   assert.ok(before.study.axes[0].count >= 2);

@@ -24,7 +24,7 @@ test("A service with tokens asks for one, refuses a wrong one, works with a righ
   await dialog.getByRole("button", { name: "Use it" }).click();
   await says(page.getByRole("heading", { level: 1 }), /sponge/);
   const saving = page.waitForEvent("download");
-  await page.getByRole("button", { name: "impacts.csv" }).click();
+  await page.getByRole("link", { name: "impacts.csv" }).click();
   assert.match(fs.readFileSync(await (await saving).path(), "utf8"), /approach/);
 
   await page.getByRole("button", { name: "Token" }).click();

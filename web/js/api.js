@@ -3,45 +3,35 @@
 
 // What a problem document says (RFC 9457), or that nobody answered (status 0).
 class Refusal extends Error {
-  constructor(status, problem) {
-    super(problem.detail ?? problem.title ?? `the service answered ${status}`);
-    this.status = status;
-    this.title = problem.title ?? null;
-    this.errors = problem.errors ?? []; // [{pointer, value, detail, unit, did_you_mean}]
+  constructor(status, { title, detail = title, errors = [] }) {
+    super(detail ?? `the service answered ${status}`);
+    Object.assign(this, { status, title, errors }); // errors: [{pointer, value, detail, unit, did_you_mean}]
   }
 }
 
 const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
 export const token = () => sessionStorage.getItem(KEY);
-export function setToken(text) {
-  if (text) sessionStorage.setItem(KEY, text);
-  else sessionStorage.removeItem(KEY);
-}
+export const setToken = (text) => sessionStorage.setItem(KEY, text);
 export const onUnauthorised = (asks) => (signIn = asks);
 
 const home = new URL(".", document.baseURI);
 export const address = (path) => new URL(path, home).href;
 
-async function send(method, path, { json, body, type, headers = {}, query, signal }) {
+async function send(method, path, { json, body, type, headers, query, signal }) {
   const url = new URL(path, home);
   for (const [name, value] of Object.entries(query ?? {})) if ((value ?? "") !== "") url.searchParams.set(name, value);
-  const kind = json !== undefined ? "application/json" : type;
+  const kind = json ? "application/json" : type;
   const sent = { ...headers, ...(kind && { "Content-Type": kind }), ...(token() && { Authorization: `Bearer ${token()}` }) };
   try {
-    return await fetch(url, { method, headers: sent, body: json !== undefined ? JSON.stringify(json) : body, signal });
+    return await fetch(url, { method, headers: sent, body: json ? JSON.stringify(json) : body, signal });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Refusal(0, { title: "The service does not answer", detail: "Is the daemon running? Nothing is lost here." });
   }
 }
 
-async function refusal(response) {
-  const problem = await response.json().catch(() => ({ title: `The service answered ${response.status}` }));
-  return new Refusal(response.status, problem);
-}
-
-let shown = null; // aborted when the page that asks is left
+let shown = null; // until this is aborted somebody reads the page that asks
 export const readUntil = (signal) => (shown = signal);
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
@@ -49,27 +39,22 @@ export const readUntil = (signal) => (shown = signal);
 export async function ask(method, path, { signal = shown, ...more } = {}) {
   const options = { ...more, signal: method === "GET" ? signal : null };
   let response = await send(method, path, options);
-  if (response.status === 401 && signIn !== null && (await signIn())) response = await send(method, path, options);
+  if (response.status === 401 && (await signIn?.())) response = await send(method, path, options);
   signal?.throwIfAborted();
-  if (!response.ok) throw await refusal(response);
+  if (!response.ok) throw new Refusal(response.status, await response.json().catch(() => ({})));
   return response;
 }
 
 // The answer's JSON.
 export const get = async (path, query, signal) => (await ask("GET", path, { query, signal })).json();
-export const post = async (path, json, options = {}) => (await ask("POST", path, { ...options, json })).json();
+export const post = async (path, json, options) => (await ask("POST", path, { ...options, json })).json();
 export const remove = async (path) => (await ask("DELETE", path)).json();
 
 // A file saved under `name`. With a token it is fetched first, since a link cannot carry one.
 export async function save(path, name) {
-  const anchor = document.createElement("a");
-  anchor.download = name;
-  if (token()) anchor.href = URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob());
-  else anchor.href = address(path);
-  document.body.append(anchor);
-  anchor.click();
-  anchor.remove();
-  if (token()) setTimeout(() => URL.revokeObjectURL(anchor.href), 60000);
+  const href = token() ? URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob()) : address(path);
+  Object.assign(document.createElement("a"), { download: name, href }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 60000);
 }
 
 // Submits a scene; the job as it is at once, done or not.
@@ -78,35 +63,18 @@ export const submit = (scene) => post("v1/jobs", scene, { headers: { Prefer: "wa
 // What the scene would come to, without running it: faults come as a Refusal.
 export const check = (scene) => post("v1/jobs?dry_run=1", scene);
 
-// Follows a job to its end, which is returned: `onChange(job)` after each news of it. Where the connection breaks the state is
-// asked for instead; while nobody answers (a daemon that starts anew takes its jobs up again) the job has `isLost`.
+// Follows a job to its end, which is returned: `onChange(job)` each second and at its end. While nobody answers (a daemon that
+// starts anew takes its jobs up again) the job has `isLost`.
 export async function follow(job, onChange, signal) {
-  const path = `v1/jobs/${job.id}`;
   for (;;) {
     try {
-      job = await get(path, undefined, signal);
+      job = await get(`v1/jobs/${job.id}`, { wait: 1 }, signal);
       onChange(job);
       if (job.finished) return job;
-      await events(`${path}/events`, (news) => onChange({ ...job, ...news }), signal);
     } catch (error) {
-      if (error.name === "AbortError" || (error.status >= 400 && error.status < 500)) throw error;
-      if (error.status === 0) onChange({ ...job, isLost: true });
+      if (!(error.status === 0 || error.status >= 500)) throw error;
+      onChange({ ...job, isLost: true });
       await new Promise((resolve) => setTimeout(resolve, 1000));
-    }
-  }
-}
-
-async function events(path, onChange, signal) {
-  const response = await ask("GET", path, { headers: { Accept: "text/event-stream" }, signal });
-  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
-  for (let rest = ""; ; ) {
-    const { value, done } = await reader.read();
-    if (done) return;
-    const blocks = (rest + value).split("\n\n");
-    rest = blocks.pop();
-    for (const block of blocks) {
-      const data = block.match(/(?<=^data:).*/gm);
-      if (data) onChange(JSON.parse(data.join("\n")));
     }
   }
 }

@@ -15,9 +15,8 @@ function put(node, attributes, children) {
 
 // h("p.quiet", {onclick, style: {width}}, "text", h("b", null, "bold")); null and false are left out.
 export function h(name, attributes, ...children) {
-  const [tag, ...classes] = name.split("."), node = document.createElement(tag);
-  node.classList.add(...classes);
-  return put(node, attributes, children);
+  const [tag, ...classes] = name.split(".");
+  return put(document.createElement(tag), { class: classes.join(" ") || null, ...attributes }, children);
 }
 
 // The same for SVG.
@@ -106,7 +105,7 @@ export function table(caption, columns, rows, { sort = false } = {}) {
       { scope: at === 0 && "row", class: kind(column) }, (column.cell ?? column.value)(row) ?? "–")))));
   }
   draw();
-  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
+  return h("div.scroll", { tabindex: "0", role: "region", "aria-label": caption },
     h("table", null, h("caption", null, caption), h("thead", null, h("tr", null, heads)), body));
 }
 
@@ -118,11 +117,10 @@ export const hint = (...children) => h("p.hint", null, children);
 // Something that opens: the content is made when it is first seen.
 export function folded(summary, make, open = false) {
   const inner = h("div"), box = h("details", { open, ontoggle: show }, h("summary", null, summary), inner);
-  function show() {
+  async function show() {
     if (!box.open || inner.hasChildNodes()) return;
-    const content = make();
-    fill(inner, content instanceof Promise ? "Loading …" : content);
-    if (content instanceof Promise) content.then((node) => fill(inner, node), (error) => fill(inner, failure(error)));
+    fill(inner, "Loading …");
+    fill(inner, await Promise.try(make).catch(failure));
   }
   show();
   return box;

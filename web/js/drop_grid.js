@@ -51,7 +51,7 @@ export function dropGrid({ pointer, schema, draft }) {
   }
   add();
   const heads = ["#", ...columns.map(([name, { "x-unit": unit }]) => title(name) + (unit ? `, ${unit}` : "")), "e"];
-  const element = h("div", null, h("div", { class: "scroll" }, h("table", { class: "drops", "aria-label": "Drops" },
+  const element = h("div", null, h("div.scroll", null, h("table.drops", { "aria-label": "Drops" },
     h("thead", null, h("tr", null, heads.map((head) => h("th", { scope: "col" }, head)))), body)),
   hint("Enter goes down, Tab right; columns can be pasted."));
   return { element, refresh() {
@@ -60,8 +60,10 @@ export function dropGrid({ pointer, schema, draft }) {
       const row = draft.check?.evaluation?.rows.find(({ from }) => from === `drop ${at + 1}`);
       outcome.className = outcome.value = faults.length > 0 ? "fault" : "";
       if (row) outcome.value = number(row.restitution, 3);
-      cells.forEach((cell, k) =>
-        cell.setAttribute("aria-invalid", faults.some((fault) => fault.pointer.endsWith(columns[k][0]))));
+      cells.forEach((cell, k) => {
+        cell.parentElement.dataset.pointer = `${pointer}/${at}/${columns[k][0]}`;
+        cell.setAttribute("aria-invalid", draft.faultsAt(cell.parentElement.dataset.pointer).length > 0);
+      });
     }
   } };
 }

@@ -17,17 +17,16 @@ export const page = {
   title: () => "Runs",
   show(host) {
     let last = "", isAgain = false;
-    const list = h("div", { class: "runs" }, "Loading …");
-    const choice = (values) => h("select", null, h("option", { value: "" }, "All"),
+    const list = h("div.runs", null, "Loading …");
+    const choice = (name, values) => h("select", { name }, h("option", { value: "" }, "All"),
       values.map((value) => h("option", { value }, STATES[value] ?? title(value))));
-    const fields = { q: h("input", { type: "search" }), status: choice(Object.keys(STATES)), kind: choice(KINDS) };
-    const labelled = (text, field) => h("label", null, text, " ", field);
-    fill(host, h("h1", null, "Runs"),
-      h("form", { class: "row", role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
-        labelled("Title or label", fields.q), labelled("State", fields.status), labelled("Study", fields.kind)), list);
+    const search = h("form.row", { role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
+      h("label", null, "Title or label ", h("input", { name: "q", type: "search" })),
+      h("label", null, "State ", choice("status", Object.keys(STATES))), h("label", null, "Study ", choice("kind", KINDS)));
+    fill(host, h("h1", null, "Runs"), search, list);
 
     function choose() {
-      note({ ...Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])), before: null });
+      note({ ...Object.fromEntries(new FormData(search)), before: null });
       load();
     }
 
@@ -62,6 +61,7 @@ export const page = {
     const target = (job) => (job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`);
     const columns = [
       { label: "Run", cell: (job) => [h("a", { id: job.id, href: link(target(job)) }, named(job)), " ",
+        job.labels && h("span.hint", null, job.labels.join(", "), " "),
         isOpen(job) && button("Cancel", ({ target }) => cancel(job, target),
           { id: `stop-${job.id}`, "aria-label": `Cancel ${named(job)}` })] },
       { label: "State", cell: badge },
@@ -73,7 +73,7 @@ export const page = {
 
     function follow() {
       const { query } = read();
-      for (const [name, field] of Object.entries(fields)) field.value = query[name] ?? "";
+      for (const field of search) field.value = query[field.name] ?? "";
       load();
     }
     follow();

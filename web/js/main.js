@@ -1,17 +1,16 @@
 // Which page is shown, and what stands around it: navigation, theme, token.
 import { read } from "./address.js";
 import { get, onUnauthorised, readUntil, setToken, token } from "./api.js";
-import { failure, fill, h, tell } from "./dom.js";
+import { failure, fill, h, once, tell } from "./dom.js";
 
 // A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, leave()?}:
 // for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
-const pages = new Map(Object.entries({ // by its path, the module's name before "_page.js"
-  "": "scene", scene: "scene", jobs: "jobs", "jobs/*": "job", "results/*": "result", compare: "compare", materials: "materials",
-  "materials/*": "material", "materials/*/measure": "measure", records: "records", "records/*": "record", shell: "shell",
-}));
+// "materials" is in materials_page.js, "materials/felt" in material_page.js, "materials/felt/measure" in measure_page.js.
+const pages = ["scene", "jobs", "job", "result", "compare", "materials", "material", "measure", "records", "record", "shell"];
 
-const main = document.getElementById("main");
-let shown = null; // {path, controller: promise, stop}
+const [main, themeButton, tokenButton, skip, version] = ["main", "theme", "token", "skip", "version"]
+  .map((id) => document.getElementById(id));
+let shown = null; // {path, stop, controller: promise}
 
 async function show() {
   const last = shown;
@@ -22,39 +21,37 @@ async function show() {
   }
   last?.stop.abort();
   last?.controller.then((controller) => controller?.leave?.());
-  const address = read(), path = address.path.join("/"), stop = new AbortController(), { signal } = stop;
+  const address = read(), path = address.path.join("/"), stop = new AbortController();
+  shown = { path, stop, controller: open(address, path, stop.signal, last) };
+}
+
+async function open(address, path, signal, last) {
   readUntil(signal);
   if (last) fill(main, "Loading …"); // what is left takes no clicks
-  const name = pages.get(path.replace(/\/[^/]+/, "/*")), [within = "scene"] = address.path;
+  const [first = "scene", one, part] = address.path, name = part ?? (one ? first.slice(0, -1) : first);
   for (const anchor of document.querySelectorAll("#pages a"))
-    anchor.ariaCurrent = anchor.getAttribute("href") === `#/${within === "results" ? "jobs" : within}` ? "page" : null;
-  const { promise: controller, resolve: settle } = Promise.withResolvers();
-  shown = { path, controller, stop };
+    anchor.ariaCurrent = anchor.hash === `#/${first === "results" ? "jobs" : first}` ? "page" : null;
   try {
-    if (!name) throw new Error(`There is no page "${path}" here.`);
+    if (!pages.includes(name)) throw new Error(`There is no page "${path}" here.`);
     const { page } = await import(`./${name}_page.js`);
-    if (signal.aborted) return settle(null);
-    const title = page.title(address);
+    if (signal.aborted) return null;
+    const title = page.title(address), host = h("div.page", null, "Loading …");
     document.title = `${title} · impactd`;
-    const host = h("div", { class: "page" });
     fill(main, host);
     if (last) {
       scrollTo(0, 0);
       main.focus({ preventScroll: true });
       tell(title);
     }
-    settle(await page.show(host, address, signal));
+    return await page.show(host, address, signal);
   } catch (error) {
-    settle(null);
-    if (!signal.aborted) {
-      if (main.querySelector(".page h1") === null) fill(main, h("h1", null, "This page could not be shown"));
-      main.append(failure(error));
-    }
+    if (signal.aborted) return null;
+    if (main.querySelector(".page h1") === null) fill(main, h("h1", null, "This page could not be shown"));
+    main.append(failure(error));
   }
 }
 
 // The theme: the system's until the reader chooses.
-const themeButton = document.getElementById("theme");
 const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)");
 const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
 function setTheme(theme) {
@@ -64,46 +61,39 @@ function setTheme(theme) {
   themeButton.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
   dispatchEvent(new Event("themechange")); // plots draw themselves anew
 }
-themeButton.addEventListener("click", () => {
+themeButton.onclick = () => {
   setTheme(isDark() ? "light" : "dark");
   localStorage.setItem("impactd.theme", root.dataset.theme);
-});
-system.addEventListener("change", () => setTheme());
+};
+system.onchange = () => setTheme();
 setTheme(localStorage.getItem("impactd.theme"));
 
 // The token, asked for where the service wants one, kept until the tab is closed.
-const tokenButton = document.getElementById("token");
-let asking = null;
-function askToken() {
-  asking ??= new Promise((resolve) => {
-    const input = h("input", { type: "password", autocomplete: "off", required: true });
-    const button = (text, value) => h("button", { value, formnovalidate: true }, text);
-    const dialog = h("dialog", { onclose }, h("form", { method: "dialog" }, h("h2", null, "A token is asked for"),
-      h("p", null, "Whoever runs this service makes one with ", h("code", null, "impactd token create"), "."),
-      h("label", null, "Token ", input), h("div", { class: "row" }, h("button", { class: "primary", value: "use" }, "Use it"),
-        button("Not now", ""), token() && button("Forget the one in use", "forget"))));
-    function onclose() {
-      const isUsed = dialog.returnValue === "use";
-      if (dialog.returnValue) setToken(isUsed ? input.value.trim() : "");
-      tokenButton.hidden = !token();
-      dialog.remove();
-      asking = null;
-      resolve(isUsed);
-    }
-    document.body.append(dialog);
-    dialog.showModal();
-  });
-  return asking;
-}
+const askToken = once(() => new Promise((resolve) => {
+  const input = h("input", { type: "password", autocomplete: "off", required: true });
+  const button = (text, value) => h("button", { value, formnovalidate: true }, text);
+  const dialog = h("dialog", { onclose }, h("form", { method: "dialog" }, h("h2", null, "A token is asked for"),
+    h("p", null, "Whoever runs this service makes one with ", h("code", null, "impactd token create"), "."),
+    h("label", null, "Token ", input), h("div.row", null, h("button.primary", { value: "use" }, "Use it"),
+      button("Not now", ""), token() && button("Forget the one in use", "forget"))));
+  function onclose() {
+    const isUsed = dialog.returnValue === "use";
+    if (dialog.returnValue) setToken(isUsed ? input.value.trim() : "");
+    tokenButton.hidden = !token();
+    dialog.remove();
+    resolve(isUsed);
+  }
+  document.body.append(dialog);
+  dialog.showModal();
+}));
 onUnauthorised(askToken);
 tokenButton.hidden = !token();
-tokenButton.addEventListener("click", () => askToken().then(show));
+tokenButton.onclick = () => askToken().then(show);
 
-document.getElementById("skip").addEventListener("click", (event) => {
+skip.onclick = (event) => {
   event.preventDefault();
   main.focus();
-});
-get("version").then(({ version, engine }) =>
-  (document.getElementById("version").textContent = `impactd ${version}, engine ${engine}`), () => {});
+};
+get("version").then((is) => (version.textContent = `impactd ${is.version}, engine ${is.engine}`), () => {});
 addEventListener("hashchange", show);
 show();

@@ -1,19 +1,30 @@
-// Forms that write what is said of materials, by the service's schemas.
+// Forms by a schema that are sent as a whole: what is said of materials, and others.
 import { swap } from "./address.js";
 import { post, schema } from "./api.js";
 import { makeDraft } from "./draft.js";
 import { failure, fill, h, notice, once } from "./dom.js";
-import { form } from "./form.js";
+import { focusField, form } from "./form.js";
 import { differences, path, readMaterial } from "./material_parts.js";
+import { places } from "./outcome.js";
 
-// A form by a schema's name: send(value, outcome) when it is submitted.
-export async function schemaForm(name, value, label, send) {
+// For catch(): says a refusal's faults at their fields, and in `outcome` with the way there; with `moves` the focus goes to the first.
+export const refusal = (draft, fields, outcome) => (error, moves) => {
+  const { title, errors = [] } = error;
+  draft.say(null, errors);
+  fill(outcome, errors.some(({ pointer }) => pointer)
+    ? places("bad", title, errors, (pointer) => focusField(fields, pointer)) : failure(error));
+  if (moves) fields.querySelector("[aria-invalid=true]")?.focus();
+};
+
+// A form by a schema or a promise of it: send(value, outcome) when it is submitted. Options are form()'s.
+export async function schemaForm(of, value, label, send, options) {
   const draft = makeDraft(value), fields = h("div"), outcome = h("div", { role: "status" });
-  form(fields, { schema: await schema(name), draft, shows: (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer) });
-  const submit = once(() => send(draft.scene, outcome).catch((error) => {
-    draft.say(null, error.errors ?? []);
-    fill(outcome, failure(error));
-  }));
+  form(fields, { schema: await of, draft,
+    shows: (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer), ...options });
+  const refused = refusal(draft, fields, outcome), submit = once(() => {
+    fill(outcome, "Wait …");
+    return send(draft.scene, outcome).catch((error) => refused(error, true));
+  });
   return h("form", { novalidate: true, onsubmit(event) {
     event.preventDefault();
     submit();
@@ -22,7 +33,7 @@ export async function schemaForm(name, value, label, send) {
 
 // One that posts to a part of a material, under the ETag that it was `seen` with; then the revision of the answer is shown. Who
 // comes second is told what was said meanwhile, and can do it again.
-export const writeForm = (name, value, label, seen, part) => schemaForm(name, value, label, async (json, outcome) => {
+export const writeForm = (name, value, label, seen, part, options) => schemaForm(schema(name), value, label, async (json, outcome) => {
   try {
     const { revision } = await post(path(seen.slug, part), json, { headers: { "If-Match": seen.etag } });
     swap(`materials/${seen.slug}`, { revision });
@@ -34,4 +45,4 @@ export const writeForm = (name, value, label, seen, part) => schemaForm(name, va
     outcome.querySelector("button").focus();
     seen = now;
   }
-});
+}, options);

@@ -6,8 +6,7 @@ import { writeForm } from "./material_form.js";
 import { badge, differences, FIGURES, path, readMaterial, shown, STATUS } from "./material_parts.js";
 import { moment, title } from "./units.js";
 
-const to = (text, page, query, kind) => h("a", { href: link(`materials/${page}`, query), class: kind }, text);
-const byWhom = ({ author, reviewer, created }) => `${author ?? reviewer ?? "the local user"}, ${moment(created)}`;
+const to = (text, page, query) => h("a", { href: link(`materials/${page}`, query) }, text);
 
 function facts(material, properties) {
   const others = Object.keys(properties).filter((name) => !/^(name|comment|measurem|table|restitution|contact_time)/.test(name));
@@ -29,36 +28,35 @@ function changes(material, properties) {
     folded("Change what it says", () => writeForm("material_revision", said, "Make it a revision", material, "/revisions")));
 }
 
-const tests = (slug, { count, measurements }) => panel("Drop tests", h("p", null, `Kept here: ${count}`),
-  h("ul", null, measurements.map(({ measurement, drops, traces, ...one }) => h("li", null,
-    to(`Test ${measurement}`, `${slug}/measure`, { measurement }), `, ${byWhom(one)}, drops: ${drops}, traces: ${traces}`))));
+const DONE = { measure: "Kept", approve: "Approved", deprecate: "Deprecated", revert: "Reverted by" };
+const trail = (slug, steps) => panel("Trail", h("ul", null, steps.map(({ action, revision, measurement, who, why, when }) =>
+  h("li", null, DONE[action] ?? "Wrote", " ", measurement ? to(`test ${measurement}`, `${slug}/measure`, { measurement })
+    : to(`revision ${revision}`, slug, { revision }), `: ${why} (${who ?? "the local user"}, ${moment(when)})`))));
 
 // What changed since the revision that is shown, or since the one before the newest, and the way back to it.
 async function history(material, revisions) {
   const { slug, revision, latest } = material;
-  return panel("Revisions", table("The newest first", [
-    { label: "Revision", cell: ({ revision }) => to(`Revision ${revision}`, slug, { revision }) }, ...FIGURES, STATUS,
-    { label: "Why", value: (row) => `${row.comment} (${byWhom(row)})` },
-    { label: "Review", value: ({ review }) => review && `${review.reason} (${byWhom(review)})` },
-  ], revisions),
+  return panel("Revisions", table("The newest first",
+    [{ label: "Revision", cell: ({ revision }) => to(`Revision ${revision}`, slug, { revision }) }, ...FIGURES, STATUS], revisions),
   latest > 1 && await differences(slug, Math.min(revision, latest - 1), latest),
-  revision < latest
-    && await writeForm("material_revert", { to: revision, comment: `as revision ${revision}` }, "Revert", material, "/revert"));
+  revision < latest && await writeForm("material_revert", { to: revision, comment: `as revision ${revision}` },
+    `Revert to revision ${revision}`, material, "/revert", { only: ["comment"] }));
 }
 
 export const page = {
   title: ({ path: [, slug] }) => slug,
   async show(host, { path: [, slug], query }) {
-    const list = (part) => get(path(slug, part), { limit: 100 });
-    const [material, { revisions }, measured, { properties }] = await Promise.all([readMaterial(slug, query.revision),
-      list("/revisions"), list("/measurements"), schema("material_revision")]);
+    const list = (part) => get(path(slug, part), { limit: 100 }), material = await readMaterial(slug, query.revision);
     const { revision, latest, status, name } = material, buffer = `${slug}@${revision}`;
+    const [{ revisions }, { history: steps }, { total, results }, { properties }] = await Promise.all([list("/revisions"),
+      list("/history"), list(`@${revision}/used-by`), schema("material_revision")]);
     fill(host, h("h1", null, name, " ", badge(status)),
-      h("p", { class: "quiet" }, h("code", null, buffer), ` of ${latest}. Scenes without a revision take the newest approved.`),
-      h("div", { class: "row" }, h("a", { href: link("scene", { buffer }), class: "button" }, "Simulate with it"),
-        to("Enter a drop test", `${slug}/measure`, {}, "button")),
-      h("div", { class: "columns" }, facts(material, properties),
-        h("div", null, changes(material, properties), tests(slug, measured))),
+      h("p.quiet", null, h("code", null, buffer), ` of ${latest}. Scenes without a revision take the newest approved.`),
+      h("div.row", null, h("a.button", { href: link("scene", { buffer }) }, "Simulate with it"),
+        h("a.button", { href: link(`materials/${slug}/measure`) }, "Enter a drop test")),
+      folded(`Results made with it: ${total}`, () => h("ul", null, results.map(({ id, created }) =>
+        h("li", null, h("a", { href: link(`results/${id}`) }, moment(created)))))),
+      h("div.columns", null, facts(material, properties), changes(material, properties), trail(slug, steps)),
       await history(material, revisions));
   },
 };

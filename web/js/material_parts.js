@@ -1,16 +1,11 @@
 // What the pages of materials share: figures with their ±, status, what differs between revisions.
 import { ask, get } from "./api.js";
-import { fresh, h, table } from "./dom.js";
+import { h, table } from "./dom.js";
 import { number, pretty, quantity, scale, title } from "./units.js";
 
 export const path = (slug, rest = "") => `v1/materials/${encodeURIComponent(slug)}${rest}`;
 const KINDS = { approved: "ok", draft: "warn", deprecated: "bad" };
 export const badge = (status) => h("span", { class: `badge ${KINDS[status]}` }, status);
-
-export function labelled(label, control) {
-  control.id ||= fresh("field");
-  return h("div", null, h("label", { for: control.id }, label), h("br"), control);
-}
 
 // "25 ± 1 ms", "0.61"
 export function figure(value, deviation, unit) {
@@ -19,8 +14,8 @@ export function figure(value, deviation, unit) {
     : `${number(value / factor)} ± ${number(deviation / factor, 2)} ${pretty(scaled)}`.trim();
 }
 
-export const range = (least, most, unit) =>
-  (least === most ? quantity(least, unit) : `${quantity(least, unit)} to ${quantity(most, unit)}`);
+export const range = (least, most, unit) => (least === most ? quantity(most, unit)
+  : `${number(least / scale(Math.abs(most), unit)[0])} to ${quantity(most, unit)}`);
 
 // e or T_c of a material; of a table over approach speed what it spans.
 function measured(material, name, unit) {
@@ -48,8 +43,7 @@ export const shown = (value, unit) => (typeof value === "number" ? quantity(valu
 // What the second of two revisions says otherwise.
 export async function differences(slug, first, second) {
   const { to, differences: rows } = await get(path(slug, "/diff"), { from: first, to: second });
-  const about = h("p", null, `Revision ${second} is ${to.status}: ${to.comment}`);
-  return [about, table(`From revision ${first} to revision ${second}`, [
+  return [h("p", null, `Revision ${second}, ${to.status}: ${to.comment}`), table(`From revision ${first} to revision ${second}`, [
     { label: "What", value: (row) => title(row.pointer.slice(1)) },
     { label: `Revision ${first}`, value: (row) => shown(row.from, row.unit) },
     { label: `Revision ${second}`, value: (row) => shown(row.to, row.unit) },

@@ -3,10 +3,10 @@
 import { go, link } from "./address.js";
 import { ask, post, schema } from "./api.js";
 import { makeDraft } from "./draft.js";
-import { failure, figures, fill, h, hint, notice, panel } from "./dom.js";
+import { figures, fill, h, hint, notice, panel } from "./dom.js";
 import { dropGrid } from "./drop_grid.js";
 import { form } from "./form.js";
-import { writeForm } from "./material_form.js";
+import { refusal, writeForm } from "./material_form.js";
 import { path, QUANTITIES, range, readMaterial } from "./material_parts.js";
 import { traceWidget } from "./trace_view.js";
 import { quantity } from "./units.js";
@@ -16,7 +16,7 @@ function results({ evaluation, warnings }) {
   const known = QUANTITIES.filter(([name]) => evaluation?.[name].count > 0).map(([name, label, unit]) => {
     const { mean, low, high, why, count, outliers } = evaluation[name];
     return [label, [quantity(mean, unit),
-      hint(low === null ? why : `95 %: ${range(low, high, unit)}`, `; ${count} readings, ${outliers} far off`)]];
+      hint(low === null ? why : `95 %: ${range(low, high, unit)}`, `; readings: ${count}, far off: ${outliers}`)]];
   });
   return [known.length > 0 ? figures(known) : "Nothing counts yet.",
     warnings.map(({ detail }) => hint(detail))];
@@ -24,42 +24,45 @@ function results({ evaluation, warnings }) {
 
 // The first step: the readings, and what they come to.
 async function entry(host, { slug }, signal) {
-  const draft = makeDraft({}, signal);
-  const fields = h("div"), out = h("div"), outcome = h("div");
-  const button = h("button", { class: "primary", onclick: keep }, "Keep this test (Ctrl+Enter)");
-  const send = (query) => post(path(slug, "/measurements"), draft.scene, { query });
+  const draft = makeDraft({}, signal), fields = h("div"), outcome = h("div");
+  const out = h("div", { role: "status" }, "Heights or speeds give e, durations or force traces T_c.");
+  const button = h("button.primary", { onclick: keep }, "Keep this test (Ctrl+Enter)");
+  const refused = refusal(draft, fields, outcome);
   let turn = 0, timer;
-  function refused(error) {
-    draft.say(null, error.errors ?? []);
-    fill(outcome, failure(error));
+
+  // Whether it was answered; what was typed meanwhile is asked for anew.
+  async function send(query, answered, moves) {
+    const mine = ++turn;
+    clearTimeout(timer);
+    fill(outcome, "Wait …");
+    try {
+      const answer = await post(path(slug, "/measurements"), draft.scene, { query });
+      if (mine === turn) answered(answer);
+      return true;
+    } catch (error) {
+      if (mine === turn) refused(error, moves);
+    }
   }
-  async function evaluate() {
-    const mine = ++turn, answer = await send({ dry_run: 1 }).catch((error) => mine === turn && refused(error));
-    if (!answer || mine !== turn) return;
+  function evaluated(answer) {
     fill(out, results(answer));
-    draft.say(answer, []);
     fill(outcome);
+    draft.say(answer, []);
   }
   async function keep() {
     button.disabled = true; // a test that is kept stays for good
-    clearTimeout(timer);
-    turn++;
-    try {
-      go(`materials/${slug}/measure`, { measurement: (await send()).measurement });
-    } catch (error) {
-      refused(error);
-      fields.querySelector("[aria-invalid=true]")?.focus();
-      button.disabled = false;
-    }
+    button.disabled = await send({}, ({ measurement }) => go(`materials/${slug}/measure`, { measurement }), true);
   }
   form(fields, { schema: await schema("measurement"), draft, shows: (pointer) => /^.(drops|traces)/.test(pointer),
-    widgets: [[/^.drops$/, dropGrid], [/^.traces.\d+.force$/, traceWidget]] });
-  fill(host, h("div", { class: "columns", onkeydown: (event) => event.key === "Enter" && event.ctrlKey && button.click() },
+    widgets: [[/^.drops$/, dropGrid], [/^.traces.\d+.force$/, traceWidget],
+      [/interval$/, () => ({ element: h("div", { hidden: true }), refresh() {} })]] }); // a trace's file tells it
+  fill(host, h("div.columns", { onkeydown: (event) => event.key === "Enter" && event.ctrlKey && button.click() },
     panel("What was read", fields), panel("What it comes to", out, button, outcome)));
   draft.onChange(({ pointer }) => {
-    if (pointer === undefined || draft.scene.traces?.some(({ force }) => !force)) return; // its file is yet to be chosen
+    if (pointer === undefined || button.disabled) return;
+    turn++;
     clearTimeout(timer);
-    timer = setTimeout(evaluate, 400);
+    if (!draft.scene.traces?.some(({ force }) => !force)) // its file is yet to be chosen
+      timer = setTimeout(send, 400, { dry_run: 1 }, evaluated);
   });
   fields.querySelector("tbody input").focus();
   return { leave: () => clearTimeout(timer) };
@@ -69,7 +72,7 @@ async function entry(host, { slug }, signal) {
 async function proposal(host, material, measurements) {
   const answer = await ask("GET", path(material.slug, "/proposal"), { query: { measurements } }), found = await answer.json();
   const seen = { ...material, etag: answer.headers.get("ETag") };
-  fill(host, h("div", { class: "columns" }, panel(`What comes of test ${measurements}`, found.revision === null
+  fill(host, h("div.columns", null, panel(`What comes of test ${measurements}`, found.revision === null
     ? notice("warn", "No revision", h("p", null, found.why))
     : await writeForm("material_revision", found.revision, `Make it revision ${seen.latest + 1}`, seen, "/revisions")),
   panel("What it comes to", results(found))));

@@ -3,7 +3,7 @@ import { go, link, note, read } from "./address.js";
 import { ask, get, save } from "./api.js";
 import { button, faults, figures, fill, h } from "./dom.js";
 import { plot } from "./plot.js";
-import { moment, number, quantity, words } from "./units.js";
+import { moment, number, quantity, title } from "./units.js";
 
 const UNITS = { duration: "s", interval: "s", peak: "m/s^2", peak_time: "s", peak_velocity: "m/s", end_velocity: "m/s" };
 const POINTS = 1500; // buckets of a view, some 60 kB
@@ -16,15 +16,15 @@ export const page = {
   async show(host, address) {
     const path = `v1/records/${encodeURIComponent(address.path[1])}`;
     const { links, used_by, name, created, ...facts } = await get(path);
-    const news = h("div"), picture = h("div", { class: "panel" });
+    const news = h("div"), picture = h("div.panel", null);
     const act = (label, does) => button(label, () => does().catch(faults(news)));
-    fill(host, h("h1", null, name), h("div", { class: "row" },
-      h("a", { class: "button", href: link("scene", { record: name }) }, "Use in a scene"),
+    fill(host, h("h1", null, name), h("div.row", null,
+      h("a.button", { href: link("scene", { record: name }) }, "Use in a scene"),
       ["csv", "npy", "mat", "json"].map((format) =>
         act(`.${format}`, () => save(`${path}/samples.${format}`, `${name}.${format}`))),
       act("Delete", async () => confirm(`Delete ${name} for good?`) && (await ask("DELETE", path), go("records")))),
-    news, picture, h("div", { class: "panel" }, figures(Object.entries({ ...facts, uploaded: moment(created), ...used_by })
-      .map(([fact, value]) => [words(fact), told(fact, value)]))));
+    news, picture, h("div.panel", null, figures(Object.entries({ ...facts, uploaded: moment(created), ...used_by })
+      .filter(([, value]) => value !== null).map(([fact, value]) => [title(fact), told(fact, value)]))));
 
     const say = (fact) => told(fact, facts[fact]);
     const chart = plot(picture, { title: `Base acceleration of ${name}`, whole: [0, facts.duration],
@@ -39,7 +39,7 @@ export const page = {
         = await get(`${path}/samples.json`, { from, to, points: POINTS });
       if (asked !== location.hash) return; // zoomed on
       const x = min.map((_, at) => start + (at * bucket) / rate), values = bucket > 1 ? { low: min, high: max } : { y: min };
-      chart.set({ range: [from, to], series: [{ label: "acceleration", color: 1, x, ...values }] });
+      chart.set({ range: [from, to], series: [{ label: "acceleration", x, ...values }] });
     }
     const draw = () => load().catch(faults(news));
     draw();

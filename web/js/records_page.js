@@ -1,46 +1,46 @@
-// The ground motions that the daemon keeps: listed, searched, and new ones uploaded.
+// The ground motions that the daemon keeps: listed, and new ones uploaded.
 import { go, link } from "./address.js";
-import { ask, get } from "./api.js";
-import { faults, fill, h, hint, once, panel, table } from "./dom.js";
-import { makeDraft } from "./draft.js";
-import { form } from "./form.js";
+import { get, post } from "./api.js";
+import { faults, fill, h, hint, panel, table } from "./dom.js";
+import { frame } from "./fields.js";
+import { schemaForm } from "./material_form.js";
 import { told } from "./record_page.js";
+import { title } from "./units.js";
 
 const MOST = 500; // listed
-const COLUMNS = ["name", "earthquake", "station", "duration", "peak", "interval"].map((label) => ({ label,
-  value: (row) => row[label], cell: ({ name, [label]: value }) =>
-    (label === "name" ? h("a", { href: link(`records/${name}`) }, name) : told(label, value)) }));
+const COLUMNS = ["name", "earthquake", "station", "duration", "peak", "interval"].map((name, at) => ({ label: title(name),
+  numeric: at > 2, value: (row) => row[name],
+  cell: (row) => (at === 0 ? h("a", { href: link(`records/${row.name}`) }, row.name) : told(name, row[name])) }));
 
 const text = { type: "string" }, untold = "where the file does not tell it";
-const QUERY = {
+const UPLOAD = { required: ["file", "name"], properties: {
+  file: { description: "PEER's AT2, times beside accelerations, or one column" },
   name: { ...text, description: "letters, digits, . _ -" }, unit: { enum: ["m/s^2", "g", "cm/s^2"], description: untold },
   interval: { type: "number", exclusiveMinimum: 0, "x-unit": "s", description: `between samples, ${untold}` },
   source: text, processing: text, earthquake: text, station: text, notes: text,
-};
+} };
 
-function uploadForm() {
-  const draft = makeDraft({}), fields = h("div"), news = h("div");
-  const chooser = h("input", { type: "file", required: true, onchange() {
-    draft.set("/name", chooser.files[0]?.name.replace(/\.\w*$/, "").replace(/\W+/g, "_"));
+function chooser(context) {
+  const { pointer, schema, draft } = context, input = h("input", { type: "file", onchange() {
+    const [file] = input.files;
+    draft.set(pointer, file);
+    draft.set("/name", file?.name.replace(/\.\w*$/, "").replace(/\W+/g, "_"));
   } });
-  form(fields, { schema: { properties: QUERY, required: ["name"] }, draft, shows: () => true });
+  return { ...frame(context, input, schema.description), refresh() {} };
+}
 
-  const upload = once(() => {
-    fill(news, h("label", null, "Sending … ", h("progress")));
-    return ask("POST", "v1/records", { query: draft.scene, body: chooser.files[0], type: "text/plain" })
-      .then((answer) => answer.json()).then(({ name }) => go(`records/${name}`)).catch(faults(news));
-  });
-  return h("form", { onsubmit: (event) => (event.preventDefault(), upload()) }, h("label", null, "File ", chooser),
-    hint("PEER's AT2, times beside accelerations, or one column"), fields, news,
-    h("button", { class: "primary" }, "Upload"));
+async function upload({ file, ...query }) {
+  if (!file) throw new Error("Choose a file.");
+  go(`records/${(await post("v1/records", undefined, { query, body: file, type: "text/plain" })).name}`);
 }
 
 export const page = {
   title: () => "Ground motions",
-  show(host) {
-    const list = h("div");
-    fill(host, h("h1", null, "Ground motions"), h("p", null, "Records that shake the base of a scene; one never changes."),
-      list, panel("Upload one", uploadForm()));
+  async show(host) {
+    const list = h("div", null, "Loading …");
+    fill(host, h("h1", null, "Ground motions"), h("p", null, "Records that shake the base of a scene; one never changes."), list,
+      panel("Upload one", await schemaForm(UPLOAD, {}, "Upload", upload,
+        { widgets: [[/^.file$/, chooser]], shows: (pointer) => /unit|interval/.test(pointer) })));
     get("v1/records", { limit: MOST }).then(({ records }) => fill(list,
       records.length > 0 ? table("Records", COLUMNS, records, { sort: true }) : h("p", null, "There are none yet."),
       records.length === MOST && hint(`The first ${MOST} by name.`)))

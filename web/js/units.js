@@ -4,7 +4,7 @@ const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-
 
 const superscript = (power) => String(power).replace("-", "⁻").replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]);
 
-const isUnknown = (value) => value === null || value === undefined || Number.isNaN(value);
+const isUnknown = (value) => Number.isNaN(value ?? NaN);
 
 // "0.01531", "1.2 × 10⁻⁹"; "–" for what is not known.
 export function number(value, digits = 4) {
