@@ -7,7 +7,7 @@ import { focusField, form } from "./form.js";
 import { differences, path, readMaterial } from "./material_parts.js";
 import { places } from "./outcome.js";
 
-// For catch(): says a refusal's faults at their fields, and in `outcome` with the way there; with `moves` the focus goes to the first.
+// Says a refusal's faults at their fields, and in `outcome` with the way there; with `moves` the focus goes to the first.
 export const refusal = (draft, fields, outcome) => (error, moves) => {
   const { title, errors = [] } = error;
   draft.say(null, errors);

@@ -15,7 +15,7 @@ export const page = {
   title: (address) => `Record ${address.path[1]}`,
   async show(host, address) {
     const path = `v1/records/${encodeURIComponent(address.path[1])}`;
-    const { links, used_by, name, created, ...facts } = await get(path);
+    const { links, used_by, name, created, digest, ...facts } = await get(path);
     const news = h("div"), picture = h("div.panel", null);
     const act = (label, does) => button(label, () => does().catch(faults(news)));
     fill(host, h("h1", null, name), h("div.row", null,

@@ -14,19 +14,20 @@ const COLUMNS = ["name", "earthquake", "station", "duration", "peak", "interval"
 
 const text = { type: "string" }, untold = "where the file does not tell it";
 const UPLOAD = { required: ["file", "name"], properties: {
-  file: { description: "PEER's AT2, times beside accelerations, or one column" },
+  file: {},
   name: { ...text, description: "letters, digits, . _ -" }, unit: { enum: ["m/s^2", "g", "cm/s^2"], description: untold },
   interval: { type: "number", exclusiveMinimum: 0, "x-unit": "s", description: `between samples, ${untold}` },
   source: text, processing: text, earthquake: text, station: text, notes: text,
 } };
 
 function chooser(context) {
-  const { pointer, schema, draft } = context, input = h("input", { type: "file", onchange() {
+  const { pointer, draft } = context, input = h("input", { type: "file", onchange() {
     const [file] = input.files;
     draft.set(pointer, file);
     draft.set("/name", file?.name.replace(/\.\w*$/, "").replace(/\W+/g, "_"));
   } });
-  return { ...frame(context, input, schema.description), refresh() {} };
+  const { element } = frame(context, input, "PEER's AT2, times beside accelerations, or one column");
+  return { element: h("div", null, element), refresh() {} };
 }
 
 async function upload({ file, ...query }) {
