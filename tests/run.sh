@@ -155,6 +155,10 @@ test_ended() {
             fi
         fi
     fi
+    if [ "$2" -ne 0 ] && [ "$bad" -eq 0 ]; then
+        echo "FAIL  ${one#* } counts no failure and ends with $2"
+        bad=1
+    fi
     passed=$((passed + good))
     failed=$((failed + bad))
 }

@@ -197,15 +197,19 @@ static Status judge(const TraceInterval *likely, bool is_form_sure, double noise
     return STATUS_OK;
 }
 
-// The best pulse, from where the contact is taken to begin to where it is taken to end.
+// The best pulse on the baseline there, from where the contact is taken to begin to where it is
+// taken to end; its window begins at sample `origin`.
 static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFound *found,
-                   const TraceRun *run, Reals *pulse) {
+                   const TraceRun *run, double origin, Reals *pulse) {
     if (!reals_make(pulse, TRACE_PULSE))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < TRACE_PULSE; i++) {
-        const double s = shape->length * (double)i / (TRACE_PULSE - 1);
-        const double force = fit->residue.amplitude * trace_shape_force(shape, s);
-        pulse->at[i] = found->baseline + run->peak * (fit->residue.baseline + force);
+        const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
+        const double place = origin + part[0] + share * (part[1] - part[0]);
+        const double force =
+            fit->residue.amplitude * trace_shape_force(shape, shape->length * share);
+        pulse->at[i] =
+            trace_found_baseline(found, place) + run->peak * (fit->residue.baseline + force);
     }
     return STATUS_OK;
 }
@@ -248,7 +252,7 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
         !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
     TraceInterval likely;
     TRY(trace_interval(window, fits, count, is_form_sure, &likely));
-    TRY(draw(fit, &shape, found, run, &contact->seen.pulse));
+    TRY(draw(fit, &shape, found, run, origin, &contact->seen.pulse));
     const TraceContact counted = *contact;
     contact->seen.start = (origin + fit->at.part[0]) * interval;
     contact->seen.end = (origin + fit->at.part[1]) * interval;

@@ -72,16 +72,24 @@ static void line_through_parts(const double *force, size_t count, double *scratc
     c[0] = (value[PARTS / 2 - 1] + value[PARTS / 2]) / 2;
 }
 
-static double place_of(size_t i, size_t count) {
-    return count > 1 ? 2 * (double)i / (double)(count - 1) - 1 : 0;
+static double place_of(double i, size_t count) {
+    return count > 1 ? 2 * i / (double)(count - 1) - 1 : 0;
+}
+
+double trace_found_baseline(const TraceFound *found, double sample) {
+    const double u = place_of(sample, found->samples);
+    return found->baseline + u * (found->bend[0] + u * found->bend[1]);
 }
 
 static void take_off(TraceFound *found, const Reals *force, const double *c) {
     for (size_t i = 0; i < force->count; i++) {
-        const double u = place_of(i, force->count);
+        const double u = place_of((double)i, force->count);
         found->force[i] = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
     }
     found->baseline = c[0];
+    found->bend[0] = c[1];
+    found->bend[1] = c[2];
+    found->samples = force->count;
 }
 
 // A polynomial of so many terms added to c, through the samples outside contacts, by least squares;
@@ -91,7 +99,7 @@ static double refine(const Reals *force, const bool *is_inside, size_t terms, do
     for (size_t i = 0; i < force->count; i++) {
         if (is_inside[i])
             continue;
-        const double u = place_of(i, force->count), power[TERMS] = {1, u, u * u};
+        const double u = place_of((double)i, force->count), power[TERMS] = {1, u, u * u};
         const double left = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
         for (size_t j = 0; j < terms; j++) {
             for (size_t k = 0; k < terms; k++)
@@ -112,7 +120,7 @@ static double refine(const Reals *force, const bool *is_inside, size_t terms, do
             c[j] += a[j][TERMS] / a[j][j];
     double sum = 0;
     for (size_t i = 0; i < force->count; i++) {
-        const double u = place_of(i, force->count);
+        const double u = place_of((double)i, force->count);
         const double left = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
         sum += is_inside[i] ? 0 : left * left;
     }

@@ -15,6 +15,8 @@ typedef struct TraceRun {
 typedef struct TraceFound {
     double *force;      // without baseline
     double baseline;    // in the middle
+    double bend[2];     // times u and u^2 it is added elsewhere, u from -1 to 1 over the trace [N]
+    size_t samples;
     double noise;       // standard deviation
     double noise_count; // samples outside contacts, which it is from
     double threshold;
@@ -26,5 +28,8 @@ typedef struct TraceFound {
 // `threshold` NAN: from the noise. STATUS_NO_MEMORY. Cleared by trace_found_clear in any case.
 Status trace_find(const Reals *force, double threshold, TraceFound *found);
 void trace_found_clear(TraceFound *found);
+
+// The baseline there, also between samples [N].
+double trace_found_baseline(const TraceFound *found, double sample);
 
 #endif

@@ -190,7 +190,7 @@ test("A table of materials has its faults told by row and column, and comes in w
   await page.getByText("Import", { exact: true }).click();
   fs.writeFileSync(file, "slug,name,restitution,source\nlab_one,One,1.3,own\n");
   await page.getByLabel(/^A table/).setInputFiles(file);
-  await says(page.getByRole("alert"), /\/2\/restitution must be within/);
+  await says(page.getByRole("alert"), /row 2, restitution must be within/);
   const mended = path.join(folder, "mended.csv");
   fs.writeFileSync(mended, "slug,name,restitution,source\nlab_one,One,0.3,own\n");
   await page.getByLabel(/^A table/).setInputFiles(mended);

@@ -40,6 +40,13 @@ def is_sanitized():
     return sanitizer() != ""
 
 
+def cpu_of(process):
+    """What a process has used so far [s of a processor]."""
+    with open(f"/proc/{process}/stat", encoding="utf-8") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def run(*arguments, text="", timeout=120, environment=None):
     """Runs impactd to its end; returns code, standard output and standard error."""
     done = subprocess.run([impactd(), *arguments], input=text, capture_output=True, text=True,

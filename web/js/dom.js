@@ -65,17 +65,17 @@ export function tell(text) {
 
 // A box with a heading: kind is "info", "warn", "bad" or "ok". "bad" is told at once.
 export const notice = (kind, title, ...more) =>
-  h("div", { class: `notice ${kind}`, role: kind === "bad" && "alert" }, h("strong", null, title), ...more);
+  h(`div.notice.${kind}`, { role: kind === "bad" && "alert" }, h("strong", null, title), more);
 
 // A fault as a sentence, with the name that was meant.
 export const sentence = ({ detail, did_you_mean: meant }) => `${detail}${meant ? ` (did you mean "${meant}"?)` : ""}`;
 
 // What went wrong, as the service said it: with every fault and its place.
-export function failure(error) {
-  const faults = error.errors ?? [];
-  const say = (fault) => h("li", null, fault.pointer && h("code", null, fault.pointer), " ", sentence(fault));
-  return notice("bad", error.title ?? "That did not work",
-    faults.length > 0 ? h("ul", null, faults.map(say)) : h("p", null, error.message ?? error.detail));
+export function failure({ title, errors, message, detail }) {
+  const place = ({ pointer, row, column }) => (row ? `row ${row}, ${column}` : pointer);
+  const say = (fault) => h("li", null, h("code", null, place(fault)), " ", sentence(fault));
+  return notice("bad", title ?? "That did not work",
+    errors?.length > 0 ? h("ul", null, errors.map(say)) : h("p", null, message ?? detail));
 }
 
 // For catch(): says in `host` what went wrong. That the reader went away is no fault.

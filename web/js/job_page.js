@@ -18,7 +18,7 @@ export const page = {
     fill(host, h("h1", null, named(job)), h("section.panel", null, state, bar, told, news,
       h("div.row", null, cancelButton, change)), table);
 
-    // After each news of it: how long it has run, how long it will at this pace, and which rows of a sweep are there.
+    // How long it has run, how long it will at this pace, which rows of a sweep are there.
     function draw(next) {
       job = next;
       const { status, progress, timing: { run } } = job, isGoing = isOpen(job);

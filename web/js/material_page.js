@@ -28,10 +28,10 @@ function changes(material, properties) {
     folded("Change what it says", () => writeForm("material_revision", said, "Make it a revision", material, "/revisions")));
 }
 
-const DONE = { measure: "Kept", approve: "Approved", deprecate: "Deprecated", revert: "Reverted by" };
+const DONE = { measure: "Kept", approve: "Approved", deprecate: "Deprecated", revert: "Reverted by", import: "Took in" };
 const trail = (slug, steps) => panel("Trail", h("ul", null, steps.map(({ action, revision, measurement, who, why, when }) =>
   h("li", null, DONE[action] ?? "Wrote", " ", measurement ? to(`test ${measurement}`, `${slug}/measure`, { measurement })
-    : to(`revision ${revision}`, slug, { revision }), `: ${why} (${who ?? "the local user"}, ${moment(when)})`))));
+    : revision ? to(`revision ${revision}`, slug, { revision }) : "a file", `: ${why} (${who ?? "the local user"}, ${moment(when)})`))));
 
 // What changed since the revision that is shown, or since the one before the newest, and the way back to it.
 async function history(material, revisions) {

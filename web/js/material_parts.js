@@ -5,7 +5,7 @@ import { number, pretty, quantity, scale, title } from "./units.js";
 
 export const path = (slug, rest = "") => `v1/materials/${encodeURIComponent(slug)}${rest}`;
 const KINDS = { approved: "ok", draft: "warn", deprecated: "bad" };
-export const badge = (status) => h("span", { class: `badge ${KINDS[status]}` }, status);
+export const badge = (status) => h(`span.badge.${KINDS[status]}`, null, status);
 
 // "25 ± 1 ms", "0.61"
 export function figure(value, deviation, unit) {

@@ -11,7 +11,7 @@ const FILTERS = { q: ["Words", ""], kind: ["Kind", "rubber"], e: ["Restitution e
 const COLUMNS = [
   { label: "Material", value: (row) => row.name, cell: (row) => h("a", { href: link(`materials/${row.slug}`) }, row.name) },
   { label: "Kind", value: (row) => row.kind }, ...FIGURES,
-  { label: "Measured at", value: (row) => row.most_speed, cell: (row) => range(row.least_speed, row.most_speed, "m/s") }, STATUS,
+  { label: "Measured at", numeric: true, value: (row) => row.most_speed, cell: (row) => range(row.least_speed, row.most_speed, "m/s") }, STATUS,
 ];
 
 const search = (query) => h("form.row.level", { role: "search", onsubmit(event) {

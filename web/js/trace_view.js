@@ -5,10 +5,8 @@ import { plot } from "./plot.js";
 import { extent } from "./study_bits.js";
 import { number, quantity, words } from "./units.js";
 
-const DRAWN = 20000;
-
-// {interval, force} of lines of a time in s and a force in N; what stands before them is a heading. Where a semicolon or a tab
-// parts them, a comma is a decimal one.
+// {interval, force} of lines of a time in s and a force in N; what stands before them is a heading. Beside a semicolon or a
+// tab a comma is a decimal one.
 function readTrace(text) {
   const all = text.trim().split(/\r?\n/).map((line) => (/[;\t]/.test(line) ? line.replaceAll(",", ".").split(/[;\t]/)
     : line.trim().split(/[,\s]+/)).map(parseFloat));
@@ -25,10 +23,10 @@ const told = ({ contact, contact_time, restitution, note }) => [
   contact && `${quantity(contact.peak, "N", 3)} at ${quantity(contact.start ?? contact.first, "s", 3)}`,
   contact_time !== null && `T_c ${quantity(contact_time, "s", 3)}, e ${number(restitution, 3)}`, note].filter(Boolean).join(", ");
 
-// What plot() draws of a trace and its rows of the evaluation, undefined while it is awaited. Of very many samples there are
-// extremes of buckets, so that no peak is lost.
+// What plot() draws of a trace and its rows of the evaluation, undefined while it is awaited. Very many samples are
+// drawn as extremes of buckets: no peak is lost.
 function picture({ interval, force }, evaluation, rows) {
-  const x = [], low = [], high = [], size = Math.ceil(force.length / DRAWN);
+  const x = [], low = [], high = [], size = Math.ceil(force.length / 20000);
   for (let at = 0; at < force.length; at += size) {
     const [least, most] = extent(force.slice(at, at + size));
     x.push(at * interval);

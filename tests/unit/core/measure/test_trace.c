@@ -264,15 +264,16 @@ static void a_coarse_converter_is_no_contact(void **state) {
 static void the_pulse_is_drawn_over_the_trace(void **state) {
     (void)state;
     for (int rule = 0; rule < 2; rule++) {
-        // The same contact without baseline, finely: what the pulse should be at its places.
+        // The same contact without the drifting baseline, finely: what the pulse should be at its
+        // places.
         Record record, fine;
-        const double start = 0.02003, interval = 2e-6;
+        const double start = 0.03003, interval = 2e-6;
         record_new(&record, 1e-4, 400, 0);
         record_add(&record, start, 0.7, 0.004, 0.1, 1, 0, rule);
         record_new(&fine, interval, 3000, 0);
         record_add(&fine, 0.001, 0.7, 0.004, 0.1, 1, 0, rule);
         for (size_t i = 0; i < record.force.count; i++)
-            record.values[i] = 17 - record.values[i];
+            record.values[i] = 17 + 0.1 * (double)i - record.values[i];
         TraceWay way = usual;
         way.separation = rule;
         TraceReading reading = look(&record, &way);
@@ -282,9 +283,9 @@ static void the_pulse_is_drawn_over_the_trace(void **state) {
             const double share = (double)i / (TRACE_PULSE - 1);
             const double time = seen->start + share * (seen->end - seen->start);
             const double force = fine.values[(size_t)((time - start + 0.001) / interval + 0.5)];
-            if (!(fabs(17 - seen->pulse.at[i] - force) < 3e-3 * fabs(seen->peak)))
-                fail_msg("rule %d, point %zu: %g N in place of %g N", rule, i,
-                         17 - seen->pulse.at[i], force);
+            const double drawn = 17 + 1000 * time - seen->pulse.at[i];
+            if (!(fabs(drawn - force) < 3e-3 * fabs(seen->peak)))
+                fail_msg("rule %d, point %zu: %g N in place of %g N", rule, i, drawn, force);
         }
         trace_reading_clear(&reading);
     }
