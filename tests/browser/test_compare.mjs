@@ -55,6 +55,16 @@ test("By keyboard a result is added and taken out", async ({ page, daemon, url }
   await leads(page, /compare\?a=r-\w+$/);
 });
 
+test("What has no force of an impact is compared too: the impulse model, and a scene at rest", async ({ page, daemon, url }) => {
+  const [sponge] = await pair(daemon);
+  const impulse = await daemon.run("paper_free_sponge", { contact: { model: "impulse" } });
+  const rest = await daemon.run("paper_free_sponge", { excitation: { kind: "free" } });
+  await page.goto(url(`#/compare?a=${sponge}&b=${impulse.result}&c=${rest.result}`));
+  await says(page.getByRole("main"), /B impulse from 46 ms on/);
+  await says(page.getByRole("table", { name: "Numbers that differ" }), /Impacts\s+22\s+30[^]*0 ×/);
+  await says(page.getByRole("figure", { name: "Over time" }), /A \S+ between −12\.89 mm and 15 mm/);
+});
+
 test("Contact models of a scene: what the impulse model makes of its spectrum", async ({ page, daemon, url }) => {
   const { result } = await daemon.run("compare_sponge");
   await page.goto(url(`#/results/${result}`));

@@ -64,7 +64,7 @@ async function compare(host, runs) {
     ({ label: title(place(input)), unit: unitOf(input, fields), values }))),
   pairs.flatMap((pair) => pair.warnings).map(({ detail }) => hint(detail))));
 
-  firstImpacts(push, runs.filter((one) => one.impact?.time.values.length > 2));
+  firstImpacts(push, runs.filter(({ impact }) => impact && impact.time.values.length > 2));
   const [psd] = pairs[0].psd ?? [], channel = psd?.channel, some = runs.filter((one) => one.psd?.channels[channel]);
   if (channel) spectra(spectrum, channel, psd.unit, some.map((one) => ({ ...one, x: one.psd.frequency.values,
     y: one.psd.channels[channel].values })));
