@@ -13,6 +13,7 @@
 #include "server/encode/svg.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/http/shield.h"
 #include "server/materials/measurement.h"
 
 enum { TESTS_MOST = 100, FORMATS = 2 };
@@ -205,6 +206,8 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     int format, separation;
     char tag[MATERIAL_TAG];
     TRY(choose_format(request, reply, &format, problem));
+    if (format != 0)
+        reply->policy = shield_drawing_policy;
     TRY(store_material_state(app->store, slug, &state, problem));
     TRY(material_separation(app, request, &separation, problem));
     material_tag(slug, state.latest, state.version, tag);

@@ -9,8 +9,10 @@
 #include "server/api/app.h"
 #include "server/codec/read.h"
 #include "server/encode/answer.h"
+#include "server/encode/svg.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
+#include "server/http/shield.h"
 
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
@@ -41,8 +43,8 @@ static Status answer_read(const ResultRow *row, const StudyKind *kind, StudyAnsw
     return answer->study->kind == kind->answer ? STATUS_OK : refuse_other(kind, problem);
 }
 
-Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
-                    const AnswerFormat **format, Problem *problem) {
+static Status choose_format(const Request *request, const AnswerFormat *formats, Reply *reply,
+                            const AnswerFormat **format, Problem *problem) {
     const char *extension = request->parameters[1], *types[ANSWER_FORMATS] = {NULL};
     char names[64];
     answer_formats_name(formats, "", names, sizeof names);
@@ -62,6 +64,14 @@ Status study_format(const Request *request, const AnswerFormat *formats, Reply *
                            "none of the formats fits Accept; there are %s, by extension too",
                            names);
     *format = &formats[choice];
+    return STATUS_OK;
+}
+
+Status study_format(const Request *request, const AnswerFormat *formats, Reply *reply,
+                    const AnswerFormat **format, Problem *problem) {
+    TRY(choose_format(request, formats, reply, format, problem));
+    if ((*format)->content_type == svg_type)
+        reply->policy = shield_drawing_policy;
     return STATUS_OK;
 }
 

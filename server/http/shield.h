@@ -10,8 +10,8 @@ typedef struct ShieldHeader {
 extern const ShieldHeader shield_headers[]; // ends with name == NULL
 extern const ShieldHeader shield_tls;       // under TLS as well
 
-// Content-Security-Policy of what is no page, and of the dashboard: its own files and answers, no
-// inline script or style, and no text becomes markup.
-extern const char shield_policy[], shield_page_policy[];
+// Content-Security-Policy of what is no page; of a drawing, which has its colours in itself; of the
+// dashboard: its own files and answers, no inline script or style, and no text becomes markup.
+extern const char shield_policy[], shield_drawing_policy[], shield_page_policy[];
 
 #endif

@@ -25,6 +25,16 @@ test("A sweep's map: a cell tells its number, a click opens its point, the point
   await until("the point's clearance", async () => (await page.getByRole("textbox", { name: "Clearance" }).inputValue()) === "0.028");
 });
 
+test("A study's chart opened by itself has its colours, light and dark", async ({ daemon, newPage }) => {
+  const { result } = await daemon.run("compare_sponge");
+  const fills = await Promise.all(["light", "dark"].map(async (colorScheme) => {
+    const page = await newPage({ colorScheme });
+    await page.goto(`${daemon.url}/v1/results/${result}/compare.svg`);
+    return page.evaluate(() => getComputedStyle(document.querySelector(".page")).fill);
+  }));
+  assert.deepEqual(fills, ["rgb(255, 255, 255)", "rgb(22, 24, 28)"]);
+});
+
 test("Below a study stands the scene's own run", async ({ page, daemon, url }) => {
   await open(page, daemon, url, "compare_sponge");
   assert.equal(await page.getByRole("region", { name: "Summary" }).count(), 0);

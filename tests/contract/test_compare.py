@@ -94,7 +94,13 @@ def test_the_study_sets_contact_models_side_by_side():
                                 ("psd.level [dB]", entry["psd"]["level"]),
                                 ("divergence [s]", entry["divergence"]["time"])):
                 assert row[cell] == "nan" if value is None else float(row[cell]) == value, (row, cell)
-        check_chart(daemon.get(base + "/compare.svg").body.decode(), ["impulse", "spring_damper, zero_force"])
+        chart = daemon.get(base + "/compare.svg")
+        check_chart(chart.body.decode(), ["impulse", "spring_damper, zero_force"])
+        known = daemon.get(base + "/compare.svg", headers={"If-None-Match": chart.headers["etag"]})
+        assert known.status == 304
+        for told in (chart, known): # its own rules and nothing else
+            policy = told.headers["content-security-policy"]
+            assert policy.startswith("default-src 'none'; style-src 'unsafe-inline'; ") and "script" not in policy, policy
         assert daemon.get(base + "/compare", headers={"Accept": "text/csv"}).headers["content-type"].startswith("text/csv")
         assert daemon.get(base + "/sensitivity.json").status == 404
         assert daemon.get(base + "/compare.npy").status == 404

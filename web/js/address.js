@@ -40,13 +40,14 @@ export function note(changes, push = false) {
 }
 
 // A text for the URL from a value, and back: JSON, deflated, in base64url.
+const through = (data, step) => new Response(new Blob([data]).stream().pipeThrough(step));
 export async function pack(value) {
-  const stream = new Blob([JSON.stringify(value)]).stream().pipeThrough(new CompressionStream("deflate-raw"));
-  return (await new Response(stream).bytes()).toBase64({ alphabet: "base64url", omitPadding: true });
+  const bytes = await through(JSON.stringify(value), new CompressionStream("deflate-raw")).arrayBuffer();
+  const text = Array.from(new Uint8Array(bytes), (byte) => String.fromCharCode(byte)).join("");
+  return btoa(text).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
 export async function unpack(text) {
-  const bytes = Uint8Array.fromBase64(text, { alphabet: "base64url" });
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  return JSON.parse(await new Response(stream).text());
+  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
+  return through(bytes, new DecompressionStream("deflate-raw")).json();
 }

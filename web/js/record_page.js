@@ -16,7 +16,7 @@ export const page = {
   async show(host, address) {
     const path = `v1/records/${encodeURIComponent(address.path[1])}`;
     const { links, used_by, name, created, digest, ...facts } = await get(path);
-    const news = h("div"), picture = h("div.panel", null);
+    const news = h("div"), picture = h("div.panel");
     const act = (label, does) => button(label, () => does().catch(faults(news)));
     fill(host, h("h1", null, name), h("div.row", null,
       h("a.button", { href: link("scene", { record: name }) }, "Use in a scene"),

@@ -1,4 +1,4 @@
-// What one wants to know first: the figures, how exact they are, what they cost, and where the energy went.
+// What one wants to know first: figures, how exact they are, what they cost, where the energy went.
 import { link } from "./address.js";
 import { get } from "./api.js";
 import { figures, h, table } from "./dom.js";

@@ -34,7 +34,7 @@ export function quantity(value, unit, digits = 4) {
 // "m/s^2" as "m/s²".
 export const pretty = (unit) => (unit ?? "").replace(/\^(-?\d+)/g, (_, power) => superscript(power));
 
-// "peak_contact_force" as "peak contact force"; names of letters stay.
+// "peak_contact_force" as "peak contact force".
 export const words = (name) => String(name).replaceAll("_", " ").replace(/\brms\b/g, "RMS").replace(/\bpsd\b/g, "PSD");
 export const title = (name) => words(name).replace(/^./, (letter) => letter.toUpperCase());
 
@@ -45,5 +45,5 @@ export function moment(text) {
   return when.toLocaleString("en-GB", { ...(isToday ? {} : { dateStyle: "medium" }), timeStyle: "short" });
 }
 
-// "r-a29adbf1…": enough of an id to tell it from others.
+// "r-a29adbf1…": enough to tell it by.
 export const brief = (id) => (id.length > 14 ? `${id.slice(0, 10)}…` : id);
