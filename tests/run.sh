@@ -102,7 +102,10 @@ run() {
     local runner=() folder=build
     [ "$1" = release ] || folder=build-$1
     [ "$1" != tsan ] || runner=("${still[@]}")
-    if [ "$2" = ctest ]; then exec "${runner[@]}" ctest --preset "$1" -j "$((($(nproc) + 1) / 2))"; fi
+    if [ "$2" = ctest ]; then
+        # Half of the processors, all of them when it is the last.
+        exec "${runner[@]}" ctest --preset "$1" -j "$(((${#queue[@]} > 0 ? $(nproc) + 1 : 2 * $(nproc)) / 2))"
+    fi
     if is_recorded "$*" || [ "$2" = "$judge" ]; then export IMPACTD_RECORD=$work/said; fi
     exec "${runner[@]}" "$python" "$2" --build "$folder"
 }
