@@ -119,6 +119,11 @@ const weight = (list) => (list[0].file === "test_pages.mjs" ? Infinity : list.le
 const files = [...new Set(chosen.map(({ file }) => file))]
   .map((file) => chosen.filter((one) => one.file === file)).sort((a, b) => weight(b) - weight(a));
 let passed = 0, failed = 0;
+// A promise that a test left behind must not end the others.
+process.on("unhandledRejection", (error) => {
+  failed++;
+  console.log(`FAIL  left behind: ${error?.stack ?? error}`);
+});
 async function work() {
   for (let list; (list = files.shift()); ) {
     const daemon = new Daemon(build, values.at);
