@@ -120,7 +120,7 @@ export function folded(summary, make, open = false) {
   async function show() {
     if (!box.open || inner.hasChildNodes()) return;
     fill(inner, "Loading …");
-    fill(inner, await Promise.try(make).catch(failure));
+    fill(inner, await (async () => make())().catch(failure));
   }
   show();
   return box;

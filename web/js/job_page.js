@@ -32,7 +32,8 @@ export const page = {
       fill(told, job.isLost && notice("warn", "The service does not answer; the run goes on when it is back"),
         job.problem && failure(job.problem),
         job.result_deleted && notice("info", "Its result was deleted"));
-      if (job.study === "sweep" && progress > 5 && !isLooking) look().catch(fail); // up to there its scene alone runs
+      // Before, its scene alone runs.
+      if (job.study === "sweep" && progress > 5 && !isLooking) look().catch(fail).finally(() => (isLooking = !isOpen(job)));
     }
 
     async function look() {
@@ -40,7 +41,6 @@ export const page = {
       const { sweepView } = await import("./sweep_view.js");
       rows ??= await sweepView(table, `${path}/table.json`, id);
       await rows.refresh();
-      isLooking = !isOpen(job);
     }
 
     async function cancel() {
