@@ -2,7 +2,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/command/command.h"
 
 // The first file opened takes the number of a closed standard stream, and would be given what is

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/base/shared.h"
+#include "core/base/refcount.h"
 #include "core/base/status.h"
 
 typedef enum FieldKind {

@@ -1,6 +1,6 @@
 // Flores, Machado, Silva and Martins 2011: N = k p^n (1 + D p'/v0) with D = 8 (1 - e) / (5 e), made
 // for soft buffers too.
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 
 static double flores_factor(double e) {
     return 8 * (1 - e) / (5 * e);

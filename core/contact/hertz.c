@@ -1,5 +1,5 @@
 // Hertz: N = k p^n with n = 1.5 for two spheres, which gives all energy back.
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 
 const ContactLaw contact_hertz = {
     .kind = {"hertz", "an elastic contact, N = k p^n: restitution 1", contact_fields,

@@ -1,7 +1,7 @@
 // Hunt and Crossley 1975: N = k p^n (1 + D p'/v0), once with the D that gives exactly the
 // restitution asked for, D (1 + e) = ln((1 + D) / (1 - e D)), and once with the first-order D of
 // their paper, which gives a higher one.
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 
 const ContactLaw contact_hunt_crossley = {
     .kind = {"hunt_crossley",

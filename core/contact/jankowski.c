@@ -7,8 +7,8 @@
 // follows at phase arccos(z), so e = exp(-z arccos(z) / sqrt(1 - z^2)).
 #include <math.h>
 
-#include "core/contact/identify.h"
-#include "core/contact/power.h"
+#include "core/contact/identification.h"
+#include "core/contact/power_law.h"
 #include "core/math/quadrature.h"
 
 static double jankowski_factor(double e) {

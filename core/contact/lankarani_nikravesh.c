@@ -1,6 +1,6 @@
 // Lankarani and Nikravesh 1990: N = k p^n (1 + D p'/v0) with D = (3/4) (1 - e^2), from the energy
 // that a nearly elastic impact loses.
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 
 static double lankarani_nikravesh_factor(double e) {
     return 0.75 * (1 - e) * (1 + e);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/linear.h"
+#include "core/math/symmetric_eigen.h"
 
 enum { ROUNDINGS = 8 };
 

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/stops.h"
+#include "core/plan/contact_setup.h"
 
 static Status decide_contact(const Scene *scene, Plan *plan) {
     Decisions *decisions = &plan->report.decisions;

@@ -4,8 +4,8 @@
 #define CORE_PLAN_PLAN_H
 
 #include "core/base/field.h"
-#include "core/contact/freeze.h"
-#include "core/contact/identify.h"
+#include "core/contact/contact_parameters.h"
+#include "core/contact/identification.h"
 #include "core/plan/modes.h"
 #include "core/scene/scene.h"
 

@@ -15,10 +15,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/excite/chirp.h"
-#include "core/excite/pulse.h"
-#include "core/excite/random.h"
-#include "core/excite/sine.h"
+#include "core/excitation/chirp.h"
+#include "core/excitation/pulse_common.h"
+#include "core/excitation/random.h"
+#include "core/excitation/sine.h"
 #include "core/plan/truncation_mode.h"
 
 static const double pi = 3.14159265358979323846;

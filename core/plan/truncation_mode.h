@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "core/excite/record.h"
+#include "core/excitation/recorded_motion.h"
 #include "core/plan/truncation_levels.h"
 
 // One mode, and the run it is in.

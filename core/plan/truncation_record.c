@@ -2,7 +2,7 @@
 // the modes are, and the others lie between these.
 #include <math.h>
 
-#include "core/math/exponential.h"
+#include "core/math/matrix_exponential.h"
 #include "core/plan/truncation_mode.h"
 
 // What one mode makes of a record, share 1.

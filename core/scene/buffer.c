@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/contact/identify.h"
-#include "core/contact/power.h"
+#include "core/contact/identification.h"
+#include "core/contact/power_law.h"
 
 // clang-format off
 static const Field row_fields[] = {

@@ -5,7 +5,7 @@
 #define CORE_SCENE_BUFFER_H
 
 #include "core/base/field.h"
-#include "core/contact/freeze.h"
+#include "core/contact/contact_parameters.h"
 
 enum { BUFFER_ROWS = 1000 };
 

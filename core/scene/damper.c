@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-#include "core/contact/identify.h"
+#include "core/contact/identification.h"
 
 const char *const identified_for_names[] = {
     [IDENTIFIED_FOR_SCENE] = "scene", [IDENTIFIED_FOR_RIG] = "rig", NULL};

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/contact/contact.h"
-#include "core/contact/identify.h"
+#include "core/contact/identification.h"
 
 const char *const material_base_names[] = {
     [MATERIAL_BASE_FIXED] = "fixed", [MATERIAL_BASE_FREE] = "free", NULL};

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "core/contact/identify.h"
+#include "core/contact/identification.h"
 
 // clang-format off
 const Field scene_fields[] = {

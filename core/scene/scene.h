@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "core/contact/contact.h"
-#include "core/excite/excitation.h"
+#include "core/excitation/excitation.h"
 #include "core/scene/damper.h"
 #include "core/scene/structure.h"
 

@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "core/math/linear.h"
+#include "core/math/symmetric_eigen.h"
 
 // clang-format off
 const Field structure_fields[] = {

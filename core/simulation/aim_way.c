@@ -11,9 +11,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "core/plan/truncation.h"
+#include "core/plan/modal_truncation.h"
 #include "core/result/metric.h"
-#include "core/simulation/impulses.h"
+#include "core/simulation/impulse_variant.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
 

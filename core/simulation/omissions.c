@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-#include "core/simulation/request_channels.h"
+#include "core/simulation/channel_names.h"
 
 static const double FORCED_SHARE = 2.0 / 3, ROW_SHARE = 0.1, SEARCH_SHARE = 0.1;
 static const double ROWS_A_SECOND = 7; // of a damper, at a guess

@@ -4,7 +4,7 @@
 #ifndef CORE_SIMULATION_OMISSIONS_H
 #define CORE_SIMULATION_OMISSIONS_H
 
-#include "core/plan/regime.h"
+#include "core/plan/reachability.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/keep.h"
-#include "core/simulation/aim.h"
-#include "core/simulation/bare.h"
-#include "core/simulation/caution.h"
+#include "core/plan/mode_selection.h"
+#include "core/simulation/accuracy_target.h"
+#include "core/simulation/undamped_baseline.h"
+#include "core/simulation/result_warnings.h"
 #include "core/simulation/choice.h"
 #include "core/simulation/omissions.h"
 #include "core/simulation/simulation.h"

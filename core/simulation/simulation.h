@@ -3,11 +3,11 @@
 #ifndef CORE_SIMULATION_SIMULATION_H
 #define CORE_SIMULATION_SIMULATION_H
 
-#include "core/base/watch.h"
+#include "core/base/progress.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
-#include "core/result/spectrum.h"
-#include "core/result/work.h"
+#include "core/result/welch.h"
+#include "core/result/work_counters.h"
 #include "core/scene/scene.h"
 #include "core/solve/solver.h"
 #include "core/solve/workspace.h"

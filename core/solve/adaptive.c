@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/solve/adaptive_motion.h"
-#include "core/solve/frame_events.h"
+#include "core/solve/contact_events.h"
 #include "core/solve/steps_run.h"
 
 enum { STILL_MOST = 1000 };

@@ -5,7 +5,7 @@
 #define CORE_SOLVE_ADAPTIVE_MOTION_H
 
 #include "core/math/ode.h"
-#include "core/solve/steps.h"
+#include "core/solve/time_stepping.h"
 
 // Of each damper.
 enum { ADAPTIVE_FIRST, ADAPTIVE_SECOND, ADAPTIVE_PEAK, ADAPTIVE_WATCHED };

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "core/math/root.h"
+#include "core/math/polynomial_root.h"
 
 // Structure and free mass. r is the free mass's displacement relative to the structure, counted
 // from whatever the solver chose as its origin (a stop after contact with it, so that small

@@ -22,7 +22,7 @@
 #include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "core/solve/refine.h"
 #include "core/solve/solver.h"
 

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "core/solve/frame_ode.h"
+#include "core/solve/power_contact.h"
 
 double exact_tolerance(const Accuracy *accuracy) {
     const double asked =

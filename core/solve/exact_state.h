@@ -7,16 +7,16 @@
 #include <math.h>
 
 #include "core/solve/arc.h"
-#include "core/solve/cursor.h"
-#include "core/solve/flight.h"
-#include "core/solve/hold.h"
+#include "core/solve/base_motion_cursor.h"
+#include "core/solve/exact_flight.h"
+#include "core/solve/exact_hold.h"
 #include "core/solve/hop.h"
 #include "core/solve/lanes.h"
-#include "core/solve/ledger.h"
+#include "core/solve/impact_log.h"
 #include "core/solve/pulse.h"
-#include "core/solve/record.h"
+#include "core/solve/exact_record.h"
 #include "core/solve/solver.h"
-#include "core/solve/trust.h"
+#include "core/solve/rounding_growth.h"
 
 // Solver steps of a sample among many, and of a stretch to or of a contact in closed form.
 #define EXACT_SAMPLE_STEPS 0.1

@@ -1,66 +1,316 @@
+// Each mode is a system of its own, q'' = -d q' - w^2 q - participation a_g. The free masses feel
+// the base alone: z'' = -a_g, and r = z - x.
+//
+// With V^2 = p'p + q'W^2 q, V grows by no more than |participation| |a_g| in unit time, and
+// |r''| <= reach V + |lean| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
 #include "core/solve/flight.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
-#include "core/math/exponential.h"
+#include "core/math/matrix_exponential.h"
 
-enum {
-    X,
-    V,
-    R,
-    W,
-    A,
-    B,
-    SUM,
-    SIZE
-}; // B is the slope or the sine's other half, SUM the integral of a_g
+enum { Q, P, A, B, SIZE, WORTH = 32 };
+enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
-static void pick_row(const long double *transition, int row, double target[4]) {
-    static const int columns[4] = {X, V, A, B};
-    for (int i = 0; i < 4; i++)
-        target[i] = (double)transition[row * SIZE + columns[i]];
-}
-
-static void pick_form(const long double *form, double target[10]) {
-    static const int columns[4] = {X, V, A, B};
-    for (int i = 0, n = 0; i < 4; i++)
-        for (int j = i; j < 4; j++)
-            target[n++] = (double)(form[columns[i] * SIZE + columns[j]] * (i == j ? 1 : 2));
-}
-
-void flight_make(Flight *flight, const Motion *motion, double base_omega, double length) {
-    long double system[SIZE * SIZE] = {0};
-    system[X * SIZE + V] = 1;
-    system[V * SIZE + X] = -(long double)motion->omega2;
-    system[V * SIZE + V] = -(long double)motion->damping;
-    system[V * SIZE + A] = -1;
-    system[R * SIZE + W] = 1;
-    system[W * SIZE + X] = motion->omega2;
-    system[W * SIZE + V] = motion->damping;
-    system[SUM * SIZE + A] = 1;
-    if (base_omega > 0) { // a_g = A cos + B sin, seen from wherever the interval starts
-        system[A * SIZE + B] = base_omega;
-        system[B * SIZE + A] = -(long double)base_omega;
-    } else {
-        system[A * SIZE + B] = 1;
+void frame_flight_ground(double omega, double length, double ground[2], double fall[2]) {
+    const bool is_sine = omega > 0;
+    long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
+    system[VALUE * GROUND + SLOPE] = is_sine ? omega : 1;
+    system[SLOPE * GROUND + VALUE] = is_sine ? -(long double)omega : 0;
+    system[SUM * GROUND + VALUE] = 1;
+    system[FALL * GROUND + SUM] = 1;
+    exponential_increment(system, GROUND, length, gain);
+    for (int column = 0; column < 2; column++) {
+        ground[column] = (double)gain[SUM * GROUND + column];
+        fall[column] = (double)gain[FALL * GROUND + column];
     }
-    long double transition[SIZE * SIZE], forms[2][SIZE * SIZE];
-    exponential(system, SIZE, length, transition);
-    // What x and v gain: rounding 1 - small would err the same way in every step.
-    transition[X * SIZE + X] -= 1;
-    transition[V * SIZE + V] -= 1;
-    pick_row(transition, X, flight->x);
-    pick_row(transition, V, flight->v);
-    pick_row(transition, R, flight->r);
-    pick_row(transition, W, flight->w);
-    flight->a[0] = (double)transition[SUM * SIZE + A];
-    flight->a[1] = (double)transition[SUM * SIZE + B];
-    const long double v_row[SIZE] = {[V] = 1}, a_row[SIZE] = {[A] = 1};
-    const long double *const pairs[2][2] = {{v_row, v_row}, {a_row, v_row}};
-    exponential_forms(system, SIZE, length, 2, pairs, forms[0]);
-    pick_form(forms[0], flight->vv);
-    pick_form(forms[1], flight->av);
-    flight->length = length;
-    flight->omega = sqrt(motion->omega2);
-    flight->curvature = motion->damping + flight->omega;
+}
+
+static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
+    const long double share = frame->modes->participation[i], damping = frame->diagonal[i];
+    const double omega = frame->turning;
+    const bool is_sine = omega > 0;
+    long double system[SIZE * SIZE] = {0};
+    system[Q * SIZE + P] = 1;
+    system[P * SIZE + Q] = -(long double)frame->omega2[i];
+    system[P * SIZE + P] = -damping;
+    system[P * SIZE + A] = -share;
+    system[A * SIZE + B] = is_sine ? omega : 1;
+    system[B * SIZE + A] = is_sine ? -(long double)omega : 0;
+    long double gain[SIZE * SIZE], forms[2][SIZE * SIZE];
+    exponential_increment(system, SIZE, flight->length, gain);
+    for (int column = 0; column < 4; column++) {
+        flight->gains.q[column][i] = (double)gain[Q * SIZE + column];
+        flight->gains.p[column][i] = (double)gain[P * SIZE + column];
+    }
+    const long double speed[SIZE] = {[P] = 1}, base[SIZE] = {[A] = 1};
+    const long double *const pairs[2][2] = {{speed, speed}, {base, speed}};
+    exponential_forms(system, SIZE, flight->length, 2, pairs, forms[0]);
+    // Off the diagonal both halves count.
+    static const int places[7][2] = {{Q, Q}, {Q, P}, {P, P}, {Q, A}, {Q, B}, {P, A}, {P, B}};
+    for (int k = 0; k < 7; k++)
+        flight->loss[k][i] = (double)(damping * forms[0][places[k][0] * SIZE + places[k][1]] *
+                                      (places[k][0] == places[k][1] ? 1 : 2));
+    static const int works[4][2] = {{A, Q}, {B, Q}, {A, P}, {B, P}};
+    for (int k = 0; k < 4; k++)
+        flight->input[k][i] = (double)(share * 2 * forms[1][works[k][0] * SIZE + works[k][1]]);
+    static const int bases[3][2] = {{A, A}, {A, B}, {B, B}};
+    for (int k = 0; k < 3; k++) {
+        const int at = bases[k][0] * SIZE + bases[k][1];
+        const long double twice = bases[k][0] == bases[k][1] ? 1 : 2;
+        flight->loss_base[k] += (double)(damping * twice * forms[0][at]);
+        flight->input_base[k] += (double)(share * twice * forms[1][at]);
+    }
+}
+
+Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem) {
+    const size_t n = frame->mode_count;
+    memset(flight, 0, sizeof *flight);
+    if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
+        return STATUS_OK; // a_g has its kinks inside the intervals
+    if (frame->diagonal == NULL) {
+        // Where making it would cost more than it saves there is none.
+        if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
+            return STATUS_OK;
+        TRY(frame_dense_make(&flight->dense, 1, frame, NULL, problem));
+    }
+    // Gains, loss and input; whole vectors, filled up with zeros.
+    double **arrays[8 + FRAME_SUMS + 4];
+    for (size_t i = 0; i < 4; i++) {
+        arrays[i] = &flight->gains.q[i];
+        arrays[4 + i] = &flight->gains.p[i];
+        arrays[8 + FRAME_SUMS + i] = &flight->input[i];
+    }
+    for (size_t i = 0; i < FRAME_SUMS; i++)
+        arrays[8 + i] = &flight->loss[i];
+    const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
+    const size_t padded = frame->padded;
+    const size_t starts = FRAME_FOUR * (2 * n + 2);
+    const size_t ends = FRAME_FOUR * frame_lanes_padded(2 * n + 2);
+    flight->block = calloc((count + FRAME_SUMS) * padded + starts + ends, sizeof *flight->block);
+    if (flight->block == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
+    for (size_t i = 0; i < count; i++)
+        *arrays[i] = flight->block + i * padded;
+    flight->sums = flight->block + count * padded;
+    flight->start = flight->sums + FRAME_SUMS * padded;
+    flight->gained = flight->start + starts;
+    flight->length = frame->interval;
+    frame_flight_ground(frame->turning, flight->length, flight->ground, flight->fall);
+    for (size_t i = 0; i < n && count > 0; i++)
+        make_mode(flight, frame, i);
+    return STATUS_OK;
+}
+
+void frame_flight_clear(FrameFlight *flight) {
+    frame_dense_clear(&flight->dense);
+    free(flight->block);
+}
+
+// Rows 1 to count of the trail.
+static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+                      size_t count) {
+    const size_t n = frame->mode_count, padded = trail->padded;
+    double *start = flight->start, *gained = flight->gained;
+    for (size_t k = 0; k < count; k++) {
+        const size_t now = k * padded, next = now + padded;
+        memcpy(start, trail->q + now, n * sizeof *start);
+        memcpy(start + n, trail->p + now, n * sizeof *start);
+        start[2 * n] = trail->a[k];
+        start[2 * n + 1] = trail->b[k];
+        frame->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
+        for (size_t i = 0; i < n; i++) {
+            trail->q[next + i] = trail->q[now + i] + gained[i];
+            trail->p[next + i] = trail->p[now + i] + gained[n + i];
+            trail->moved[next + i] = trail->moved[now + i] + gained[i];
+            trail->sped[next + i] = trail->sped[now + i] + gained[n + i];
+        }
+    }
+}
+
+static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+                const Slice *slices, size_t count) {
+    const size_t n = frame->mode_count;
+    memcpy(trail->q, frame->q, n * sizeof *trail->q);
+    memcpy(trail->p, frame->p, n * sizeof *trail->p);
+    for (size_t k = 0; k < count; k++) {
+        trail->a[k] = slices[k].value;
+        trail->b[k] = slices[k].slope;
+        trail->ground[k] =
+            flight->ground[0] * slices[k].value + flight->ground[1] * slices[k].slope;
+    }
+    if (flight->dense.block != NULL)
+        fly_dense(flight, trail, frame, count);
+    else
+        frame->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
+                          trail->p, trail->moved, trail->sped);
+}
+
+bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, double bend,
+                           double length) {
+    const double sag = bend * length * length / 8;
+    const double most = frame_room(damper, SIDE_RIGHT) - sag;
+    const double least = sag - frame_room(damper, SIDE_LEFT);
+    return from < most && to < most && from > least && to > least;
+}
+
+static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                           size_t count, FrameWork *work) {
+    const FrameDense *dense = &flight->dense;
+    const size_t n = frame->mode_count, size = dense->size;
+    for (size_t from = 0; from < count; from += FRAME_FOUR) {
+        const size_t many = count - from < FRAME_FOUR ? count - from : FRAME_FOUR;
+        for (size_t k = from; k < from + many; k++) {
+            double *start = flight->start + (k - from) * size;
+            memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
+            memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
+            start[2 * n] = trail->a[k];
+            start[2 * n + 1] = trail->b[k];
+            work->input -= trail->a[k] * frame_dot(dense->input[0], start, size) +
+                           trail->b[k] * frame_dot(dense->input[1], start, size);
+        }
+        frame->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
+                                    flight->gained);
+        for (size_t k = 0; k < many; k++)
+            work->damping +=
+                frame_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
+    }
+}
+
+static void add_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                     size_t count, FrameWork *work) {
+    const size_t n = frame->mode_count;
+    const size_t padded = trail->padded;
+    double *sums = flight->sums;
+    memset(sums, 0, FRAME_SUMS * padded * sizeof *sums);
+    frame->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
+    for (size_t j = 0; j < FRAME_SUMS; j++)
+        work->damping += frame_dot(flight->loss[j], sums + j * padded, n);
+    // The sums' last four are over (q value, q slope, p value, p slope).
+    for (size_t j = 0; j < 4; j++)
+        work->input -= frame_dot(flight->input[j], sums + (3 + j) * padded, n);
+    const double *lb = flight->loss_base, *ib = flight->input_base;
+    for (size_t k = 0; k < count; k++) {
+        const double a = trail->a[k], b = trail->b[k];
+        work->damping += a * (lb[0] * a + lb[1] * b) + lb[2] * b * b;
+        work->input -= a * (ib[0] * a + ib[1] * b) + ib[2] * b * b;
+    }
+}
+
+double frame_flight_shaken(const Slice *slice, double length) {
+    const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
+    return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
+}
+
+// Of one damper along the trail: rows 1 to count of r and z. Its absolute velocity stays.
+static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *frame, size_t d,
+                   size_t count, const Slice *slices) {
+    const FrameDamper *damper = &frame->damper[d];
+    double *r = trail->r + d * TRAIL_ROWS, *z = trail->z + d * TRAIL_ROWS, far = damper->r;
+    double moved[TRAIL_ROWS];
+    frame->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
+    r[0] = damper->r;
+    z[0] = frame_dot(damper->shape, trail->p, frame->mode_count) + damper->w;
+    for (size_t k = 0; k < count; k++) {
+        far += flight->length * z[k] -
+               (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
+        r[k + 1] = far - moved[k];
+        z[k + 1] = z[k] - trail->ground[k];
+    }
+}
+
+// sqrt(p'p + q'W^2 q) over an interval that begins with such a size, or over `many`.
+static double grown(const FrameFlight *flight, const Frame *frame, double size, double shaken,
+                    size_t many) {
+    const double length = (double)many * flight->length;
+    const double left = 1 - frame->growth * length; // exp(growth length) < 1 / left
+    return left > 0.5 ? (size + length * frame->drive * shaken) / left : INFINITY;
+}
+
+// Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
+// than `bend`.
+static size_t count_clear(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+                          size_t d, double bend, const Slice *slices, size_t count) {
+    const FrameDamper *damper = &frame->damper[d];
+    const double *r = trail->r + d * TRAIL_ROWS, length = flight->length;
+    double least = r[0], most = r[0];
+    for (size_t k = 1; k <= count; k++) {
+        least = r[k] < least ? r[k] : least;
+        most = r[k] > most ? r[k] : most;
+    }
+    if (frame_flight_is_clear(damper, least, most, bend, length))
+        return count;
+    for (size_t k = 0; k < count; k++) {
+        if (frame_flight_is_clear(damper, r[k], r[k + 1], bend, length))
+            continue;
+        // The bound of this interval alone is closer.
+        const double shaken = frame_flight_shaken(&slices[k], length);
+        const double size =
+            frame_size_of(frame, trail->q + k * trail->padded, trail->p + k * trail->padded);
+        const double own =
+            damper->reach * grown(flight, frame, size, shaken, 1) + fabs(damper->lean) * shaken;
+        if (!frame_flight_is_clear(damper, r[k], r[k + 1], own, length))
+            return k;
+    }
+    return count;
+}
+
+// A guess of how many intervals it takes to the next stop: to fly further would be in vain.
+static size_t guess(const FrameFlight *flight, const Frame *frame, size_t count) {
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double step = fabs(damper->w) * flight->length;
+        const double room = damper->w > 0 ? frame_room(damper, SIDE_RIGHT) - damper->r
+                                          : frame_room(damper, SIDE_LEFT) + damper->r;
+        if (room < (double)(count - 1) * step)
+            count = 1 + (size_t)fmax(room / step, 0);
+    }
+    return count;
+}
+
+size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
+                        size_t count, FrameWork *work) {
+    const size_t n = frame->mode_count;
+    double shaken = 0;
+    if (frame->has_stops)
+        count = guess(flight, frame, count);
+    fly(flight, trail, frame, slices, count);
+    for (size_t k = 0; k < count; k++)
+        shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
+    const double most =
+        frame->has_stops ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
+    for (size_t d = 0; d < frame->dampers; d++) {
+        const FrameDamper *damper = &frame->damper[d];
+        const double bend = damper->reach * most + fabs(damper->lean) * shaken;
+        follow(flight, trail, frame, d, count, slices);
+        if (frame->has_stops)
+            count = count_clear(flight, trail, frame, d, bend, slices, count);
+    }
+    if (count == 0)
+        return 0;
+    if (work != NULL) {
+        *work = (FrameWork){0};
+        if (flight->dense.block != NULL)
+            add_dense_work(flight, trail, frame, count, work);
+        else
+            add_work(flight, trail, frame, count, work);
+    }
+    const size_t end = count * trail->padded;
+    double speed = 0;
+    for (size_t k = 0; k < count; k++)
+        speed += trail->ground[k];
+    for (size_t d = 0; d < frame->dampers; d++) {
+        FrameDamper *damper = &frame->damper[d];
+        const double *z = trail->z + d * TRAIL_ROWS;
+        for (size_t k = 0; k < count && work != NULL; k++)
+            work->input -= damper->plan->mass * trail->ground[k] * (z[k] - trail->ground[k] / 2);
+        damper->r = trail->r[d * TRAIL_ROWS + count];
+        damper->w -= speed + frame_dot(damper->shape, trail->sped + end, n);
+        damper->force = 0;
+    }
+    memcpy(frame->q, trail->q + end, n * sizeof *frame->q);
+    memcpy(frame->p, trail->p + end, n * sizeof *frame->p);
+    return count;
 }

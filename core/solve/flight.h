@@ -1,60 +1,44 @@
-// Whole sample intervals of free flight by one matrix each, made once per run: exact for a still
-// base, one linear over the interval, and a sine. Not for contacts and not for parts of an
-// interval: those are arcs. Used by the exact solver.
+// Whole sample intervals of flight of all masses by one step each, made once per run: exact for a
+// still base, one linear over the interval, and a sine; with a bound on how far each gap can bend
+// meanwhile. Not for contacts and not for parts of an interval: those are arcs. Used by frame.c.
 #ifndef CORE_SOLVE_FLIGHT_H
 #define CORE_SOLVE_FLIGHT_H
 
-#include "core/solve/arc.h"
+#include "core/solve/taylor_step.h"
+#include "core/solve/transition.h"
+#include "core/solve/modal_state.h"
+#include "core/solve/frame_trail.h"
 
-typedef struct Flight {
-    double length;     // of the interval [s]
-    double x[4], v[4]; // rows of the transition over (x, v, value, slope)
-    double r[4], w[4]; // what these add to r + w length, and to w
-    double a[2];       // integral of a_g over (value, slope)
-    double vv[10],
-        av[10];       // quadratic forms of the integrals of v^2 and a_g v, upper triangle by rows
-    double curvature; // |r''| is at most curvature * (|v| + omega |x| + length max|a_g|)
-    double omega;     // sqrt(K / M) [rad/s]
-} Flight;
+typedef struct FrameFlight {
+    double length;    // of the interval [s]; 0: there are no such steps
+    FrameDense dense; // in place of gains, loss and input where damping couples the modes
+    FrameGains gains;
+    // Work, mode after mode: loss over FRAME_SUMS, input over the last four of these.
+    double *loss[FRAME_SUMS], *input[4];
+    double loss_base[3], input_base[3]; // over (value^2, value slope, slope^2), all modes
+    double ground[2], fall[2];          // integral of a_g over (value, slope), and its integral
+    double *sums;                       // scratch, as are the next
+    double *start, *gained;             // FRAME_FOUR times (q, p, value, slope), and their gains
+    double *block;
+} FrameFlight;
 
-// `omega` is the base's (0: linear).
-void flight_make(Flight *flight, const Motion *motion, double base_omega, double length);
+// Freed by frame_flight_clear, also after a failure.
+Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem);
+void frame_flight_clear(FrameFlight *flight);
 
-static inline double flight_form(const double *form, const double *y) {
-    return y[0] * (form[0] * y[0] + form[1] * y[1] + form[2] * y[2] + form[3] * y[3]) +
-           y[1] * (form[4] * y[1] + form[5] * y[2] + form[6] * y[3]) +
-           y[2] * (form[7] * y[2] + form[8] * y[3]) + y[3] * form[9] * y[3];
-}
+// Moves the state over so many of `count` intervals, at most TRAIL_MOST, as no stop can be reached
+// in, returns how many, leaves their samples in the trail, and says what they add up to, if `work`
+// is not NULL. 0: it must go by arcs, and nothing has changed.
+size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
+                        size_t count, FrameWork *work);
 
-// The state at the interval's end. `integrals` gets all but ww; aw is for the free mass: of a_g (v
-// + w), minus av.
-static inline State flight_step(const Flight *flight, const State *start, const Slice *slice,
-                                ArcIntegrals *integrals) {
-    const double y[4] = {start->x, start->v, slice->value, slice->slope};
-    const State end = {
-        start->x + (flight->x[0] * y[0] + flight->x[1] * y[1] +
-                    (flight->x[2] * y[2] + flight->x[3] * y[3])),
-        start->v + (flight->v[0] * y[0] + flight->v[1] * y[1] +
-                    (flight->v[2] * y[2] + flight->v[3] * y[3])),
-        start->r + (flight->length * start->w + (flight->r[0] * y[0] + flight->r[1] * y[1] +
-                                                 (flight->r[2] * y[2] + flight->r[3] * y[3]))),
-        start->w + (flight->w[0] * y[0] + flight->w[1] * y[1] +
-                    (flight->w[2] * y[2] + flight->w[3] * y[3]))};
-    integrals->a = flight->a[0] * y[2] + flight->a[1] * y[3];
-    integrals->vv = flight_form(flight->vv, y);
-    integrals->av = flight_form(flight->av, y);
-    // The free mass feels the base alone: its absolute velocity stays, so the work is a matter of
-    // its own.
-    integrals->aw = integrals->a * (start->v + start->w - integrals->a / 2) - integrals->av;
-    return end;
-}
-
-// The most |r''| can be over the interval [m/s^2].
-static inline double flight_curvature(const Flight *flight, const State *start, double base_most) {
-    const double speed = (start->v < 0 ? -start->v : start->v) +
-                         flight->omega * (start->x < 0 ? -start->x : start->x) +
-                         flight->length * base_most;
-    return flight->curvature * speed;
-}
+// Whether r stays between the stops on its way, bent by no more than `bend` [m/s^2].
+bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, double bend,
+                           double length);
+// Over (value, slope): the integral of a_g over `length`, and its integral; `omega` is the base's
+// (0: linear).
+void frame_flight_ground(double omega, double length, double ground[2], double fall[2]);
+// |a_g| is not larger [m/s^2].
+double frame_flight_shaken(const Slice *slice, double length);
 
 #endif

@@ -4,13 +4,13 @@
 #ifndef CORE_SOLVE_FRAME_ENGINE_H
 #define CORE_SOLVE_FRAME_ENGINE_H
 
-#include "core/solve/frame_arc.h"
-#include "core/solve/frame_events.h"
-#include "core/solve/frame_flight.h"
-#include "core/solve/frame_ode.h"
-#include "core/solve/frame_press.h"
-#include "core/solve/frame_record.h"
-#include "core/solve/frame_state.h"
+#include "core/solve/taylor_step.h"
+#include "core/solve/contact_events.h"
+#include "core/solve/flight.h"
+#include "core/solve/power_contact.h"
+#include "core/solve/sustained_contact.h"
+#include "core/solve/recorder.h"
+#include "core/solve/modal_state.h"
 
 // All zero is empty.
 typedef struct FrameEngine {

@@ -1,12 +1,12 @@
 // How a Frame comes to be: from a plan, its modes and its dampers.
-#include "core/solve/frame_state.h"
+#include "core/solve/modal_state.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/linear.h"
+#include "core/math/symmetric_eigen.h"
 
 static const double NEARLY = 1e-9;
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 #include "core/solve/frame_ode_step.h"
 
 static const double SPAN = 0.3;         // a step is about so long, in (root of depth) / speed

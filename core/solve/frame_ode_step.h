@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "core/solve/frame_ode.h"
+#include "core/solve/power_contact.h"
 
 static inline double frame_ode_penetration(const FrameDamper *damper) {
     return fmax(frame_sign(damper->side) * damper->r, 0);

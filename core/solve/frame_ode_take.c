@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/contact/power.h"
+#include "core/contact/power_law.h"
 #include "core/solve/frame_ode_step.h"
-#include "core/solve/frame_record.h"
+#include "core/solve/recorder.h"
 
 // The state at s.
 void frame_ode_state(FrameOde *ode, const Slice *slice, double s, bool is_ended) {

@@ -4,7 +4,7 @@
 #ifndef CORE_SOLVE_FRAME_TRAIL_H
 #define CORE_SOLVE_FRAME_TRAIL_H
 
-#include "core/solve/frame_state.h"
+#include "core/solve/modal_state.h"
 
 enum { TRAIL_MOST = 16, TRAIL_ROWS = TRAIL_MOST + 1 };
 

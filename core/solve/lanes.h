@@ -9,7 +9,7 @@
 
 #include "core/result/channel.h"
 #include "core/result/response.h"
-#include "core/solve/cursor.h"
+#include "core/solve/base_motion_cursor.h"
 
 enum { LANES = 8 };
 

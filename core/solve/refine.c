@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "core/solve/cursor.h"
+#include "core/solve/base_motion_cursor.h"
 
 enum { WATCH_VALUES = 1 << 18 }; // made between two looks at the watch
 

@@ -5,8 +5,8 @@
 #define CORE_SOLVE_REFINE_H
 
 #include "core/base/status.h"
-#include "core/base/watch.h"
-#include "core/excite/base.h"
+#include "core/base/progress.h"
+#include "core/excitation/base_motion.h"
 
 // How many values it takes for a run of `samples` output samples; 0: there is nothing to refine.
 size_t refine_count(const Base *base, double sample_rate, size_t samples);

@@ -4,11 +4,11 @@
 #define CORE_SOLVE_SOLVER_H
 
 #include "core/base/field.h"
-#include "core/base/watch.h"
-#include "core/excite/base.h"
+#include "core/base/progress.h"
+#include "core/excitation/base_motion.h"
 #include "core/plan/plan.h"
 #include "core/result/response.h"
-#include "core/result/work.h"
+#include "core/result/work_counters.h"
 #include "core/solve/workspace.h"
 
 // First member of every solver's settings, the scene's "accuracy" object.

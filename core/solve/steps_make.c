@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/stops.h"
-#include "core/solve/steps.h"
+#include "core/plan/contact_setup.h"
+#include "core/solve/time_stepping.h"
 
 // Explicit steps that are too long for what is known beforehand to move.
 static Status check_reach(const Steps *steps) {

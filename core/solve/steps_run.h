@@ -5,7 +5,7 @@
 #define CORE_SOLVE_STEPS_RUN_H
 
 #include "core/solve/solver.h"
-#include "core/solve/steps.h"
+#include "core/solve/time_stepping.h"
 
 // The "accuracy" object of a solver with steps of one length.
 typedef struct AccuracyStep {

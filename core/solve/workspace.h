@@ -3,7 +3,7 @@
 #ifndef CORE_SOLVE_WORKSPACE_H
 #define CORE_SOLVE_WORKSPACE_H
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 
 // All zero is empty.
 typedef struct Workspace {

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/study/compare_variants.h"
-#include "core/study/member.h"
+#include "core/study/study_run.h"
 
 enum { BUCKETS = 400 }; // of a trace
 

@@ -2,7 +2,7 @@
 #ifndef CORE_STUDY_COMPARE_RUN_H
 #define CORE_STUDY_COMPARE_RUN_H
 
-#include "core/study/compare.h"
+#include "core/study/model_comparison.h"
 
 extern const StudyMembers compare_members;
 

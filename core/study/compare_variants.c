@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/impulses.h"
-#include "core/simulation/request_channels.h"
-#include "core/study/member.h"
+#include "core/simulation/impulse_variant.h"
+#include "core/simulation/channel_names.h"
+#include "core/study/study_run.h"
 
 static const ContactLaw *own_law(const Simulation *simulation) {
     return dampers_contact_law(&simulation->scene.dampers, scene_contact(&simulation->scene));

@@ -3,7 +3,7 @@
 #ifndef CORE_STUDY_COMPARE_VARIANTS_H
 #define CORE_STUDY_COMPARE_VARIANTS_H
 
-#include "core/study/compare.h"
+#include "core/study/model_comparison.h"
 
 enum { COMPARE_VARIANTS = 24 };
 

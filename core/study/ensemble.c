@@ -1,10 +1,10 @@
 // The tables of what is asked and answered, and what of it can be judged before anything runs.
 #include "core/study/ensemble.h"
 
-#include "core/excite/random.h"
+#include "core/excitation/random.h"
 #include "core/study/ensemble_run.h"
-#include "core/study/ensemble_spectra.h"
-#include "core/study/tradeoff_ladder.h"
+#include "core/study/spectrum_accumulator.h"
+#include "core/study/candidate_settings.h"
 
 enum { RUNS = 10000 };
 

@@ -6,12 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/random.h"
-#include "core/study/ensemble_rule.h"
-#include "core/study/ensemble_spectra.h"
-#include "core/study/ensemble_statistics.h"
-#include "core/study/member.h"
-#include "core/study/tradeoff_ladder.h"
+#include "core/excitation/random.h"
+#include "core/study/stopping_rule.h"
+#include "core/study/spectrum_accumulator.h"
+#include "core/study/statistics.h"
+#include "core/study/study_run.h"
+#include "core/study/candidate_settings.h"
 
 // What the study has at hand.
 typedef struct EnsembleWork {

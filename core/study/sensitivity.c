@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/ensemble_spectra.h"
-#include "core/study/member.h"
-#include "core/study/sensitivity_band.h"
-#include "core/study/sensitivity_change.h"
+#include "core/study/spectrum_accumulator.h"
+#include "core/study/study_run.h"
+#include "core/study/uncertainty_bands.h"
+#include "core/study/parameter_perturbation.h"
 #include "core/study/sensitivity_run.h"
-#include "core/study/sensitivity_spread.h"
+#include "core/study/input_uncertainty.h"
 
 enum { RUNS = 2000, RUNS_USUAL = 200, SPREADS = 1000 };
 

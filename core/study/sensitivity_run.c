@@ -9,12 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/ensemble_statistics.h"
-#include "core/study/member.h"
-#include "core/study/sensitivity_band.h"
-#include "core/study/sensitivity_change.h"
-#include "core/study/sensitivity_contact.h"
-#include "core/study/tradeoff_ladder.h"
+#include "core/study/statistics.h"
+#include "core/study/study_run.h"
+#include "core/study/uncertainty_bands.h"
+#include "core/study/parameter_perturbation.h"
+#include "core/study/contact_sensitivity.h"
+#include "core/study/candidate_settings.h"
 
 // Quotients agree that differ by no more than this part of the largest, or by so little that
 // nothing depends on the parameter.

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/record.h"
-#include "core/study/sweep_judge.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/study/sweep_validation.h"
 #include "core/study/sweep_run.h"
 
 // Small scenes' points that are judged while whoever submits them waits: some 20 ms.

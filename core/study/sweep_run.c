@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/sweep_judge.h"
+#include "core/study/sweep_validation.h"
 
 // What the study has at hand.
 typedef struct SweepWork {

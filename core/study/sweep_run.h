@@ -3,7 +3,7 @@
 #ifndef CORE_STUDY_SWEEP_RUN_H
 #define CORE_STUDY_SWEEP_RUN_H
 
-#include "core/study/sweep_plan.h"
+#include "core/study/sweep_grid.h"
 
 // Runs a point and writes its metrics to `values`, one for each that the study asks for; NAN where
 // it is unknown, and all of them where it failed. `fault` is left with why. STATUS_OK also then;

@@ -6,8 +6,8 @@
 
 #include "core/solve/solvers.h"
 #include "core/study/tradeoff_budget.h"
-#include "core/study/tradeoff_ladder.h"
-#include "core/study/tradeoff_measure.h"
+#include "core/study/candidate_settings.h"
+#include "core/study/tradeoff_run.h"
 
 enum { SOLVERS = 32, REPEATS = 1000 };
 

@@ -5,7 +5,7 @@
 #ifndef CORE_STUDY_TRADEOFF_H
 #define CORE_STUDY_TRADEOFF_H
 
-#include "core/simulation/compare.h"
+#include "core/simulation/error_metrics.h"
 #include "core/study/study.h"
 
 // What is asked.

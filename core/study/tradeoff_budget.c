@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "core/study/tradeoff_ladder.h"
+#include "core/study/candidate_settings.h"
 
 SimulationLimits budget_point(const TradeoffStudy *study, const SimulationLimits *limits) {
     SimulationLimits own = limits != NULL ? *limits : (SimulationLimits){0};

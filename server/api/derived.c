@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/measure/derived.h"
+#include "core/drop_test/pair_parameters.h"
 #include "server/api/materials.h"
 #include "server/api/query.h"
 #include "server/base/link.h"

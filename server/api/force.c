@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/closeup.h"
+#include "core/simulation/impact_history.h"
 #include "server/api/results.h"
 #include "server/api/tables.h"
 #include "server/base/clock.h"

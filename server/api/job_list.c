@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/date.h"
+#include "core/base/rfc3339.h"
 #include "core/base/field.h"
 #include "core/study/study.h"
 #include "server/api/app.h"

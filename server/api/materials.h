@@ -3,7 +3,7 @@
 #ifndef SERVER_API_MATERIALS_H
 #define SERVER_API_MATERIALS_H
 
-#include "core/measure/evaluation.h"
+#include "core/drop_test/evaluation.h"
 #include "server/api/app.h"
 #include "server/api/patience.h"
 #include "server/base/bytes.h"

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/import.h"
-#include "core/excite/record.h"
+#include "core/formats/ground_motion_text.h"
+#include "core/excitation/recorded_motion.h"
 #include "server/codec/read.h"
 #include "server/http/body.h"
 #include "server/http/header.h"

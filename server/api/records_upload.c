@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/import.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/base/clock.h"
 #include "server/codec/read.h"
 #include "server/http/body.h"

@@ -3,7 +3,7 @@
 #ifndef SERVER_CODEC_MATERIAL_BODIES_H
 #define SERVER_CODEC_MATERIAL_BODIES_H
 
-#include "core/measure/drop_test.h"
+#include "core/drop_test/drop_test.h"
 #include "core/scene/material.h"
 
 // A new material, or a new revision of one: then the slug is the address's.

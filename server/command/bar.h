@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "core/base/watch.h"
+#include "core/base/progress.h"
 
 typedef struct Bar {
     bool is_terminal, is_drawn;

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/import.h"
-#include "core/excite/record.h"
+#include "core/formats/ground_motion_text.h"
+#include "core/excitation/recorded_motion.h"
 #include "server/codec/write.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/measure/proposal.h"
+#include "core/drop_test/material_proposal.h"
 #include "core/scene/damper.h"
 #include "server/command/materials_ask.h"
 

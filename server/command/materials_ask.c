@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/measure/derived.h"
-#include "core/measure/evaluation.h"
+#include "core/drop_test/pair_parameters.h"
+#include "core/drop_test/evaluation.h"
 #include "core/scene/buffer.h"
 #include "core/scene/material.h"
 #include "server/codec/amend.h"

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/measure/proposal.h"
-#include "core/measure/trace_text.h"
+#include "core/drop_test/material_proposal.h"
+#include "core/formats/force_trace_text.h"
 #include "server/codec/amend.h"
 #include "server/codec/write.h"
 #include "server/command/materials_ask.h"

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/excite/import.h"
-#include "core/excite/record.h"
+#include "core/formats/ground_motion_text.h"
+#include "core/excitation/recorded_motion.h"
 #include "server/client/told_record.h"
 #include "server/command/daemon.h"
 #include "server/command/scene_file.h"

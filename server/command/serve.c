@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "core/study/sweep.h"
 #include "server/api/app.h"
 #include "server/base/clock.h"

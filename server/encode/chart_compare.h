@@ -3,7 +3,7 @@
 #ifndef SERVER_ENCODE_CHART_COMPARE_H
 #define SERVER_ENCODE_CHART_COMPARE_H
 
-#include "core/study/compare.h"
+#include "core/study/model_comparison.h"
 #include "server/base/bytes.h"
 
 // Appends the whole document. Variants that were not run, or are too many to be told apart, stand

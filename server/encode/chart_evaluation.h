@@ -4,7 +4,7 @@
 #ifndef SERVER_ENCODE_CHART_EVALUATION_H
 #define SERVER_ENCODE_CHART_EVALUATION_H
 
-#include "core/measure/evaluation.h"
+#include "core/drop_test/evaluation.h"
 #include "server/base/bytes.h"
 
 // Appends the whole document. Readings without a speed stand at the left edge.

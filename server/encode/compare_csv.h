@@ -2,7 +2,7 @@
 #ifndef SERVER_ENCODE_COMPARE_CSV_H
 #define SERVER_ENCODE_COMPARE_CSV_H
 
-#include "core/study/compare.h"
+#include "core/study/model_comparison.h"
 #include "server/base/bytes.h"
 
 // Appends the whole document: model, rule, status, k_b and c_b of the first stop, the summary's

@@ -4,7 +4,7 @@
 #ifndef SERVER_JOBS_ASIDE_H
 #define SERVER_JOBS_ASIDE_H
 
-#include "core/base/watch.h"
+#include "core/base/progress.h"
 #include "server/jobs/job.h"
 
 typedef struct Asides Asides;

@@ -4,8 +4,8 @@
 #ifndef SERVER_JOBS_DOCUMENTS_H
 #define SERVER_JOBS_DOCUMENTS_H
 
-#include "core/base/watch.h"
-#include "core/study/inquiry.h"
+#include "core/base/progress.h"
+#include "core/study/study_request.h"
 #include "server/base/bytes.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan);

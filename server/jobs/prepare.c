@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/simulation/caution.h"
+#include "core/simulation/result_warnings.h"
 #include "core/study/sweep.h"
 #include "server/base/digest.h"
 #include "server/codec/read.h"

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/pointer.h"
+#include "core/base/json_pointer.h"
 #include "server/materials/catalogue.h"
 
 // The first of the faults alone tell what names there are.

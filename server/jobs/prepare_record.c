@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/scalar.h"
+#include "core/base/json_scalar.h"
 #include "core/study/sweep.h"
 #include "server/store/record_rows.h"
 

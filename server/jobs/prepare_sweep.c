@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/pointer.h"
+#include "core/base/json_pointer.h"
 #include "core/study/sweep.h"
 #include "server/base/bytes.h"
 #include "server/jobs/prepare_material.h"

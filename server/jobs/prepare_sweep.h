@@ -1,9 +1,9 @@
 // A sweep made ready: names on its axes become revisions, materials are pinned, all is judged and
-// completed. Not its points (core/study/sweep_plan.h). Used by prepare.c.
+// completed. Not its points (core/study/sweep_grid.h). Used by prepare.c.
 #ifndef SERVER_JOBS_PREPARE_SWEEP_H
 #define SERVER_JOBS_PREPARE_SWEEP_H
 
-#include "core/study/inquiry.h"
+#include "core/study/study_request.h"
 #include "server/store/store.h"
 
 // Behind prepare_materials, in place of inquiry_complete, of an inquiry whose study is a sweep.

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/date.h"
+#include "core/base/rfc3339.h"
 #include "server/codec/material_bodies.h"
 #include "server/codec/write.h"
 #include "server/materials/catalogue.h"

@@ -5,7 +5,7 @@
 #ifndef SERVER_MATERIALS_EXCHANGE_H
 #define SERVER_MATERIALS_EXCHANGE_H
 
-#include "core/measure/drop_test.h"
+#include "core/drop_test/drop_test.h"
 #include "core/scene/material.h"
 #include "server/store/material_import.h"
 

@@ -1,10 +1,10 @@
 // A measurement as the rest of the server takes it: the store's row with its drop test read, and
 // the JSON that it and evaluations are told in. Not the evaluation itself
-// (core/measure/evaluation.h). Used by api/.
+// (core/drop_test/evaluation.h). Used by api/.
 #ifndef SERVER_MATERIALS_MEASUREMENT_H
 #define SERVER_MATERIALS_MEASUREMENT_H
 
-#include "core/measure/evaluation.h"
+#include "core/drop_test/evaluation.h"
 #include "server/base/bytes.h"
 #include "server/store/material_rows.h"
 

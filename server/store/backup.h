@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "core/base/status.h"
-#include "core/base/watch.h"
+#include "core/base/progress.h"
 
 typedef struct BackupRequest {
     const char *directory; // the daemon's

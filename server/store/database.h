@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "core/base/status.h"
-#include "core/base/watch.h"
+#include "core/base/progress.h"
 #include "server/base/embedded.h"
 
 typedef struct Database Database;

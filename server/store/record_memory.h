@@ -3,7 +3,7 @@
 #ifndef SERVER_STORE_RECORD_MEMORY_H
 #define SERVER_STORE_RECORD_MEMORY_H
 
-#include "core/excite/record.h"
+#include "core/excitation/recorded_motion.h"
 
 typedef struct RecordMemory RecordMemory;
 

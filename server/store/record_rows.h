@@ -4,7 +4,7 @@
 #ifndef SERVER_STORE_RECORD_ROWS_H
 #define SERVER_STORE_RECORD_ROWS_H
 
-#include "core/excite/record.h"
+#include "core/excitation/recorded_motion.h"
 #include "server/store/store.h"
 
 enum { RECORDS_MOST = 20000, RECORD_TWINS = 4 };

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/random.h"
-#include "core/math/fourier.h"
+#include "core/excitation/random.h"
+#include "core/math/fft.h"
 #include "core/solve/solver.h"
 #include "server/base/clock.h"
 #include "server/base/process.h"

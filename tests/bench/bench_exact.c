@@ -3,7 +3,7 @@
 // Smallest of the repeats.
 #include <stdio.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/support/paper.h"

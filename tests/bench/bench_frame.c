@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
-#include "core/solve/frame.h"
+#include "core/math/fft.h"
+#include "core/solve/event_engine.h"
 #include "server/base/clock.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"

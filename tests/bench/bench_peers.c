@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/peers.h"

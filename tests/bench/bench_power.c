@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "core/solve/exact_accuracy.h"
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "core/solve/solvers.h"
 #include "core/solve/steps_run.h"
 #include "server/base/clock.h"

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/support/paper.h"

@@ -10,8 +10,8 @@
 #include <sys/resource.h>
 #include <time.h>
 
-#include "core/math/fourier.h"
-#include "core/study/sweep_judge.h"
+#include "core/math/fft.h"
+#include "core/study/sweep_validation.h"
 #include "server/base/clock.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"

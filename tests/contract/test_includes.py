@@ -13,7 +13,7 @@ import program  # noqa: E402
 # Floors from the ground up. A room may include itself, every floor below, and on its own floor the rooms
 # named before it: the order is total, so circles cannot be built. The server may include all of the core.
 FLOORS = {
-    "core": [["base", "math"], ["contact", "excite", "result"], ["scene"], ["plan", "measure"], ["solve"],
+    "core": [["base", "math"], ["contact", "excitation", "result"], ["scene"], ["plan", "drop_test", "formats"], ["solve"],
              ["simulation"], ["study"]],
     "server": [["base", "store"], ["codec", "materials", "auth", "jobs"], ["encode", "http"], ["api"],
                ["options", "options_show", "client", "command", "main", "install"]],
@@ -36,8 +36,8 @@ FOREIGN = {
     "malloc.h": ["server/base/process.c"],
     "sqlite3.h": ["server/store/database.c", "server/store/row.c"],
     "jansson.h": ["server/codec/"],
-    "fftw3.h": ["core/math/fourier.c"],
-    "lapacke.h": ["core/math/linear.c"],
+    "fftw3.h": ["core/math/fft.c"],
+    "lapacke.h": ["core/math/symmetric_eigen.c"],
     "arkode/": ["core/math/ode.c"],
     "nvector/": ["core/math/ode.c"],
     "gnutls/": ["server/base/digest.c", "server/base/certificate.c"],
@@ -58,8 +58,8 @@ BANNED = {
     r"json_object_\w+|json_array_\w+|json_loadb|json_loads|json_dumps": ("JSON is codec's", ["server/codec/"]),
     r"sqlite3_\w+": ("SQL is the store's", ["server/store/database.c", "server/store/row.c"]),
     r"MHD_\w+": ("libmicrohttpd is the listener's", MHD_FILES),
-    r"fftw_\w+": ("FFTW is fourier.c's", ["core/math/fourier.c"]),
-    r"LAPACKE_\w+": ("LAPACK is linear.c's", ["core/math/linear.c"]),
+    r"fftw_\w+": ("FFTW is fft.c's", ["core/math/fft.c"]),
+    r"LAPACKE_\w+": ("LAPACK is symmetric_eigen.c's", ["core/math/symmetric_eigen.c"]),
     r"gnutls_\w+": ("GnuTLS is digest.c's and certificate.c's", ["server/base/digest.c", "server/base/certificate.c"]),
     r"libdeflate_\w+": ("libdeflate is deflate.c's", ["server/base/deflate.c"]),
     r"curl_\w+": ("libcurl is client/http.c's", ["server/client/http.c"]),

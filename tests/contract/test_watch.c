@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "server/jobs/intake.h"
 

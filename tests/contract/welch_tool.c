@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
-#include "core/result/spectrum.h"
+#include "core/math/fft.h"
+#include "core/result/welch.h"
 #include "tests/support/doubles.h"
 
 static int index_of(const char *const *names, const char *name) {

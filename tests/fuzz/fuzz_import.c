@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "core/excite/import.h"
+#include "core/formats/ground_motion_text.h"
 
 enum { TEXT_MOST = 4096, MUTATIONS_MOST = 6, ROUNDS_TIMED = 256 };
 

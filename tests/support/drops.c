@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "core/base/noise.h"
+#include "core/base/philox.h"
 #include "server/codec/read.h"
 #include "tests/support/document.h"
 

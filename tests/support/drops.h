@@ -4,7 +4,7 @@
 #define TESTS_SUPPORT_DROPS_H
 
 #include "core/contact/contact.h"
-#include "core/measure/drop_test.h"
+#include "core/drop_test/drop_test.h"
 
 // One contact of an impactor of 0.11 kg with a buffer on a base that does not move.
 typedef struct DropMade {

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/random.h"
-#include "core/excite/sine.h"
+#include "core/excitation/random.h"
+#include "core/excitation/sine.h"
 #include "tests/support/scenes.h"
 
 const PaperBuffer paper_buffers[5] = {

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/record.h"
-#include "core/excite/sine.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/excitation/sine.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "core/excite/base.h"
+#include "core/excitation/base_motion.h"
 #include "core/plan/plan.h"
 
 enum { TRUTH_STOREYS = 12, TRUTH_DAMPERS = 3 };

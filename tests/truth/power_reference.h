@@ -5,7 +5,7 @@
 #ifndef TESTS_TRUTH_POWER_REFERENCE_H
 #define TESTS_TRUTH_POWER_REFERENCE_H
 
-#include "core/excite/base.h"
+#include "core/excitation/base_motion.h"
 #include "core/plan/plan.h"
 
 typedef struct PowerImpact {

@@ -10,9 +10,9 @@
 
 #include <cmocka.h>
 
-#include "core/contact/identify.h"
-#include "core/excite/sine.h"
-#include "core/math/fourier.h"
+#include "core/contact/identification.h"
+#include "core/excitation/sine.h"
+#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -19,11 +19,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
-#include "core/math/student.h"
+#include "core/math/fft.h"
+#include "core/math/student_t.h"
 #include "core/study/ensemble.h"
-#include "core/study/ensemble_rule.h"
-#include "core/study/inquiry.h"
+#include "core/study/stopping_rule.h"
+#include "core/study/study_request.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"
 

@@ -10,10 +10,10 @@
 
 #include <cmocka.h>
 
-#include "core/excite/chirp.h"
-#include "core/excite/pulse.h"
-#include "core/excite/record.h"
-#include "core/excite/sine.h"
+#include "core/excitation/chirp.h"
+#include "core/excitation/pulse_common.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/excitation/sine.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

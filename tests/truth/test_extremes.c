@@ -21,7 +21,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "tests/truth/extremes.h"
 #include "tests/truth/extremes_judge.h"
 

@@ -10,10 +10,10 @@
 
 #include <cmocka.h>
 
-#include "core/excite/random.h"
-#include "core/excite/record.h"
-#include "core/excite/sine.h"
-#include "core/math/fourier.h"
+#include "core/excitation/random.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/excitation/sine.h"
+#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

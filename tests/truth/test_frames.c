@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "tests/support/doubles.h"
 #include "tests/support/frames.h"
 #include "tests/truth/drawn.h"

@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-#include "core/plan/truncation.h"
-#include "core/simulation/compare.h"
+#include "core/plan/modal_truncation.h"
+#include "core/simulation/error_metrics.h"
 #include "core/solve/solver.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"

@@ -13,9 +13,9 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "core/solve/exact_accuracy.h"
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "tests/support/scenes.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/power_reference.h"

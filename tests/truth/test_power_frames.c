@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
 #include "core/solve/steps_run.h"

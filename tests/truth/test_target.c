@@ -15,7 +15,7 @@
 #include <cmocka.h>
 
 #include "core/result/metric.h"
-#include "core/simulation/compare.h"
+#include "core/simulation/error_metrics.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"
 

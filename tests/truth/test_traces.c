@@ -9,9 +9,9 @@
 
 #include <cmocka.h>
 
-#include "core/base/noise.h"
-#include "core/measure/trace.h"
-#include "core/simulation/closeup.h"
+#include "core/base/philox.h"
+#include "core/drop_test/force_trace.h"
+#include "core/simulation/impact_history.h"
 #include "tests/support/scenes.h"
 #include "traces.h"
 

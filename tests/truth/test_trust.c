@@ -14,8 +14,8 @@
 
 #include <cmocka.h>
 
-#include "core/excite/random.h"
-#include "core/math/fourier.h"
+#include "core/excitation/random.h"
+#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/truth/drawn.h"
 

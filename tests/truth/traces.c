@@ -5,9 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/base/noise.h"
-#include "core/contact/identify.h"
-#include "core/measure/trace.h"
+#include "core/base/philox.h"
+#include "core/contact/identification.h"
+#include "core/drop_test/force_trace.h"
 
 static double force_of(const Identified *pair, double contact_time, double time) {
     if (time < 0 || time > contact_time)

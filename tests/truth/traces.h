@@ -1,6 +1,6 @@
 // Force traces of drop tests whose e and T_c are known: the closed form of one contact, sampled,
 // with noise and baseline, and how often what is read from many of them covers the truth. Not the
-// reading (core/measure/trace.h). Used by test_traces.c.
+// reading (core/drop_test/force_trace.h). Used by test_traces.c.
 #ifndef TESTS_TRUTH_TRACES_H
 #define TESTS_TRUTH_TRACES_H
 

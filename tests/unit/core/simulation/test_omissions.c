@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solver.h"
 #include "server/codec/read.h"

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excite/pulse.h"
-#include "core/excite/record.h"
-#include "core/math/fourier.h"
+#include "core/excitation/pulse_common.h"
+#include "core/excitation/recorded_motion.h"
+#include "core/math/fft.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/exponential.h"
+#include "core/math/matrix_exponential.h"
 #include "core/solve/arc.h"
 
 enum { X, V, R, W, A, B, SIZE };

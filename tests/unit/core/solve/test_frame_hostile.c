@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "core/solve/solvers.h"
 #include "tests/support/frames.h"
 

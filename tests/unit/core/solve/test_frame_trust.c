@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "tests/support/frames.h"
 
 enum { STOREYS = 3, NEIGHBOURS = 4, SAMPLES = 30001 };

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/frame.h"
+#include "core/solve/event_engine.h"
 #include "tests/support/frames.h"
 
 static const double STIFFNESS = 300, VISCOUS = 0.4, GYROSCOPIC = 9;

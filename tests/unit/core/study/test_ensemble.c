@@ -10,10 +10,10 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/excite/random.h"
-#include "core/math/fourier.h"
+#include "core/excitation/random.h"
+#include "core/math/fft.h"
 #include "core/study/ensemble.h"
-#include "core/study/inquiry.h"
+#include "core/study/study_request.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

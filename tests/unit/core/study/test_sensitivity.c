@@ -9,11 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/math/fourier.h"
-#include "core/study/inquiry.h"
+#include "core/math/fft.h"
+#include "core/study/study_request.h"
 #include "core/study/sensitivity.h"
-#include "core/study/sensitivity_change.h"
-#include "core/study/sensitivity_spread.h"
+#include "core/study/parameter_perturbation.h"
+#include "core/study/input_uncertainty.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/inquiry.h"
-#include "core/study/sweep_judge.h"
+#include "core/study/study_request.h"
+#include "core/study/sweep_validation.h"
 #include "core/study/sweep_run.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"

@@ -9,8 +9,8 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/math/fourier.h"
-#include "core/study/inquiry.h"
+#include "core/math/fft.h"
+#include "core/study/study_request.h"
 #include "core/study/tradeoff.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"

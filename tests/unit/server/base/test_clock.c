@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "core/base/date.h"
+#include "core/base/rfc3339.h"
 #include "core/base/status.h"
 #include "server/base/clock.h"
 

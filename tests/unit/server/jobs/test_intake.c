@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/intake_state.h"
 #include "server/store/database.h"

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/base/clock.h"
 #include "server/jobs/gather.h"
 #include "server/jobs/order.h"

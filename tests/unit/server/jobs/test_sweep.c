@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "core/math/fourier.h"
+#include "core/math/fft.h"
 #include "server/jobs/sweep.h"
 #include "server/jobs/sweep_rows.h"
 #include "tests/support/room.h"

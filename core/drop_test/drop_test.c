@@ -1,0 +1,254 @@
+// A body that falls from rest arrives with sqrt(2 g h). A base that is free to move takes up part
+// of what is given back: with u the impactor's rebound speed over its approach speed v, of masses m
+// on M, momentum m v = M w - m u v gives the base's w, and the speed of parting is
+//
+//   u v + w = v (m + (m + M) u) / M,
+//
+// which is e v. On a fixed base it is u v.
+#include "core/drop_test/drop_test.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "core/base/rfc3339.h"
+#include "core/contact/identification.h"
+#include "core/drop_test/force_trace.h"
+#include "core/scene/material.h"
+
+enum { POINTER_SIZE = sizeof((Fault){0}.pointer), TEXT_MOST = 1000, NOTE_MOST = 10000 };
+
+// By how much a speed may differ from what its height gives: air and friction slow a fall.
+static const double height_tolerance = 0.2;
+
+// clang-format off
+static const Field drop_fields[] = {
+    FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "from which the impactor fell, above the buffer at rest"),
+    FIELD_REAL(Drop, rebound_height, "m", AT_LEAST(0), OPTIONAL, "to which it rose again"),
+    FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "relative to the base, just before contact"),
+    FIELD_REAL(Drop, rebound_speed, "m/s", AT_LEAST(0), OPTIONAL, "relative to the base, just after contact"),
+    FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "how long the contact lasted"),
+    FIELD_TEXT(Drop, excluded, TEXT_MOST, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Drop, note, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of this drop"),
+    FIELD_END
+};
+
+static const Field trace_fields[] = {
+    FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "from one sample to the next"),
+    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MOST, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
+    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MOST, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
+    FIELD_TEXT(Trace, excluded, TEXT_MOST, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Trace, note, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of this trace"),
+    FIELD_END
+};
+
+const Field drop_test_fields[] = {
+    FIELD_TEXT(DropTest, impactor, TEXT_MOST, PRESENCE_OPTIONAL, 0, "what fell: \"steel ball, 30 mm\""),
+    FIELD_REAL(DropTest, impactor_mass, "kg", ABOVE(0), OPTIONAL, "its mass"),
+    FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
+    FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
+    FIELD_TEXT(DropTest, geometry, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out; heights count by 9.80665 whatever is said here"),
+    FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
+    FIELD_TEXT(DropTest, instrument, TEXT_MOST, PRESENCE_OPTIONAL, 0, "that it was read with"),
+    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "when it was done: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
+    FIELD_TEXT(DropTest, person, TEXT_MOST, PRESENCE_OPTIONAL, 0, "or lab that did it"),
+    FIELD_TEXT(DropTest, source, TEXT_MOST, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
+    FIELD_TEXT(DropTest, notes, NOTE_MOST, PRESENCE_OPTIONAL, 0, "whatever else there is to say"),
+    FIELD_REAL(DropTest, height_uncertainty, "m", AT_LEAST(0), OPTIONAL, "standard uncertainty of one height"),
+    FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one speed"),
+    FIELD_REAL(DropTest, time_uncertainty, "s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one contact time"),
+    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MOST, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
+    FIELD_END
+};
+// clang-format on
+
+static bool has(double value) {
+    return !isnan(value);
+}
+
+static double fall_speed(double height) {
+    return sqrt(2 * STANDARD_GRAVITY * height);
+}
+
+double drop_test_mass(const DropTest *test) {
+    if (test->base == MATERIAL_BASE_FREE)
+        return has(test->impactor_mass) && has(test->base_mass)
+                   ? effective_mass(test->impactor_mass, test->base_mass)
+                   : (double)NAN;
+    return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
+}
+
+double drop_approach(const Drop *drop) {
+    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
+}
+
+double drop_rebound(const DropTest *test, const Drop *drop) {
+    if (has(drop->rebound_speed))
+        return drop->rebound_speed;
+    const double rise = fall_speed(drop->rebound_height);
+    if (test->base != MATERIAL_BASE_FREE)
+        return rise;
+    const double m = test->impactor_mass, M = test->base_mass;
+    return (m * drop_approach(drop) + (m + M) * rise) / M;
+}
+
+static Status add(Problem *problem, const char *pointer, const char *name, double value,
+                  const char *unit, const char *sentence) {
+    char place[POINTER_SIZE];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence);
+}
+
+static Status missing(Problem *problem, const char *pointer, const char *name,
+                      const char *sentence) {
+    char place[POINTER_SIZE];
+    pointer_join(place, sizeof place, pointer, name);
+    return problem_add(problem, STATUS_INVALID, place, "%s", sentence);
+}
+
+// A speed that its height contradicts.
+static Status check_speed(double height, double speed, const char *name, const char *pointer,
+                          Problem *problem) {
+    const double falls = fall_speed(height);
+    if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
+        return STATUS_OK;
+    char sentence[160];
+    snprintf(sentence, sizeof sentence,
+             "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g m/s",
+             100 * height_tolerance, falls, height, speed);
+    return add(problem, pointer, name, speed, "m/s", sentence);
+}
+
+static Status check_rebound(const DropTest *test, const Drop *drop, const char *pointer,
+                            Problem *problem) {
+    const bool has_rise = has(drop->rebound_height), has_speed = has(drop->rebound_speed);
+    if (has_rise && has(drop->drop_height) && drop->rebound_height > drop->drop_height) {
+        char sentence[160];
+        snprintf(sentence, sizeof sentence,
+                 "must be at most the drop_height of %.6g m, is %.6g m: more than all was given "
+                 "back; a drop that does not count takes \"excluded\" with the reason",
+                 drop->drop_height, drop->rebound_height);
+        return add(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
+    }
+    if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE && !has(drop_test_mass(test)))
+        return missing(problem, pointer, "rebound_height",
+                       "needs impactor_mass and base_mass on a free base, which takes part of "
+                       "the rebound; or rebound_speed relative to the base in its place");
+    const double before = drop_approach(drop), after = drop_rebound(test, drop);
+    if (!(after > before * (1 + 1e-9)))
+        return STATUS_OK;
+    char sentence[160];
+    snprintf(sentence, sizeof sentence,
+             "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: more than all was "
+             "given back",
+             before, after);
+    return has_speed ? add(problem, pointer, "rebound_speed", after, "m/s", sentence)
+                     : add(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
+}
+
+// Of a drop that counts, whose numbers are good one by one.
+static Status check_drop(const DropTest *test, const Drop *drop, const char *pointer,
+                         Problem *problem) {
+    const bool has_before = has(drop->drop_height) || has(drop->approach_speed);
+    const bool has_after = has(drop->rebound_height) || has(drop->rebound_speed);
+    if (!has_after && !has(drop->contact_time))
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "must tell a rebound (rebound_height or rebound_speed), a contact_time, "
+                           "or both: without them it says nothing");
+    if (has_after && !has_before)
+        return missing(problem, pointer,
+                       has(drop->rebound_height) ? "drop_height" : "approach_speed",
+                       "is required beside a rebound");
+    Status status = STATUS_OK;
+    if (check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer, problem) !=
+        STATUS_OK)
+        status = STATUS_INVALID;
+    // On a free base the two are not of the same body.
+    if (test->base != MATERIAL_BASE_FREE &&
+        check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer, problem) !=
+            STATUS_OK)
+        status = STATUS_INVALID;
+    if (status == STATUS_OK && has_after)
+        status = check_rebound(test, drop, pointer, problem);
+    return status;
+}
+
+static Status check_drops(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    char drops[POINTER_SIZE], place[POINTER_SIZE];
+    pointer_join(drops, sizeof drops, pointer, "drops");
+    for (size_t i = 0; i < test->drops.count; i++) {
+        pointer_index(place, sizeof place, drops, i);
+        const Drop *drop = &test->drops.at[i];
+        if (drop->excluded == NULL && !problem_concerns(problem, place) &&
+            check_drop(test, drop, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    return status;
+}
+
+size_t drop_test_samples(const DropTest *test) {
+    size_t samples = 0;
+    for (size_t i = 0; i < test->traces.count; i++)
+        samples += test->traces.at[i].force.count;
+    return samples;
+}
+
+static Status check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = STATUS_OK;
+    char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    for (size_t i = 0; i < test->traces.count; i++) {
+        const Trace *of = &test->traces.at[i];
+        pointer_index(trace, sizeof trace, traces, i);
+        pointer_join(place, sizeof place, trace, "force");
+        if (of->excluded == NULL && !problem_concerns(problem, trace) &&
+            trace_check(of->interval, &of->force, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
+    }
+    const size_t samples = drop_test_samples(test);
+    if (samples > TRACE_SAMPLES_MOST)
+        status = problem_add(problem, STATUS_INVALID, traces,
+                             "must have at most %d samples in all, have %zu: cut them to the "
+                             "contacts, or send them as several measurements",
+                             TRACE_SAMPLES_MOST, samples);
+    return status;
+}
+
+static Status check_base(const DropTest *test, const char *pointer, Problem *problem) {
+    if (has(test->base_mass) && test->base != MATERIAL_BASE_FREE)
+        return add(problem, pointer, "base_mass", test->base_mass, "kg",
+                   test->base == MATERIAL_BASE_FIXED
+                       ? "must be absent beside \"base\": \"fixed\", which does not move"
+                       : "needs \"base\": \"free\" beside it: the mass of a base that moves");
+    return STATUS_OK;
+}
+
+Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem) {
+    Status status = fields_check(drop_test_fields, test, pointer, problem);
+    char place[POINTER_SIZE], traces[POINTER_SIZE];
+    pointer_join(place, sizeof place, pointer, "drops");
+    pointer_join(traces, sizeof traces, pointer, "traces");
+    // Lists that could not be read are empty, too.
+    if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
+        !problem_concerns(problem, traces)) {
+        status = problem_add(problem, STATUS_INVALID, place,
+                             "is required unless there are traces: at least one drop");
+    }
+    pointer_join(place, sizeof place, pointer, "date");
+    int64_t unix_ms;
+    if (test->date != NULL && !problem_concerns(problem, place) &&
+        !date_read(test->date, &unix_ms)) {
+        Fault fault = {.detail = "must be a date as 2026-11-21, or one with a time of day as "
+                                 "2026-11-21T09:30:00Z"};
+        text_fit(fault.pointer, sizeof fault.pointer, place);
+        text_quote(fault.value, sizeof fault.value, test->date);
+        status = problem_put(problem, STATUS_INVALID, &fault);
+    }
+    if (check_base(test, pointer, problem) != STATUS_OK)
+        status = STATUS_INVALID;
+    if (check_traces(test, pointer, problem) != STATUS_OK)
+        status = STATUS_INVALID;
+    return check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
+}

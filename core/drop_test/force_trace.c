@@ -1,0 +1,415 @@
+// From a trace to its contacts. Each is set into a window of its own, with as much baseline on both
+// sides as there is, in which the pulse is fitted. A figure of T_c is given only where five samples
+// or more are in contact and the pulse that fits them is one of a kind; else an interval, and why.
+#include "core/drop_test/force_trace.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/drop_test/contact_detection.h"
+#include "core/drop_test/fit_confidence.h"
+
+enum { SAMPLES_LEAST = 5, TRACE_LEAST = 8 };
+
+// An interval this wide over T_c is no figure, nor is one that reaches to so high an L.
+static const double widest = 0.5, faintest = 4.2;
+
+// A fit that leaves so much of the peak is none.
+static const double worst = 0.15;
+
+// clang-format off
+const Field trace_seen_fields[] = {
+    FIELD_REAL(TraceSeen, baseline, "N", ANY, OPTIONAL, "of the trace"),
+    FIELD_REAL(TraceSeen, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
+    FIELD_REAL(TraceSeen, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
+    FIELD_REAL(TraceSeen, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
+    FIELD_REAL(TraceSeen, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceSeen, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceSeen, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
+    FIELD_REAL(TraceSeen, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceSeen, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceSeen, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
+    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, no pulse fits, or the trace begins or ends meanwhile"),
+    FIELD_REAL(TraceSeen, end, "s", ANY, OPTIONAL, "when it ends"),
+    FIELD_REALS(TraceSeen, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
+    FIELD_REAL(TraceSeen, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceSeen, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
+    FIELD_END
+};
+// clang-format on
+
+__attribute__((format(printf, 2, 3))) static Status tell(char **why, const char *format, ...) {
+    char text[TRACE_WHY_MOST];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    free(*why);
+    *why = strdup(text);
+    return *why == NULL ? STATUS_NO_MEMORY : STATUS_OK;
+}
+
+// How much longer a contact may be than what is seen of it above that share of its peak, and how
+// much of that may be before, in what is seen.
+static double hidden(double level, int separation, double *before) {
+    double most = 0;
+    *before = 0;
+    for (int i = 0; i <= 4; i++) {
+        const TraceShape shape = trace_shape(i * 0.75, 0, separation);
+        const TraceVisible visible = trace_shape_visible(&shape, fmin(level, 0.95));
+        const double seen = fmax(visible.to - visible.from, 0.02);
+        most = fmax(most, (1 - seen) / seen);
+        *before = fmax(*before, visible.from / seen);
+    }
+    return most;
+}
+
+// What of the trace one contact has for itself.
+typedef struct Stretch {
+    size_t from, to;             // samples from .. to - 1
+    bool is_at_begin, is_at_end; // of the trace
+} Stretch;
+
+static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) {
+    const TraceRun *run = &found->runs[number];
+    const size_t length = run->last - run->first + 1;
+    const double level = found->threshold / fabs(run->peak);
+    double before;
+    const double after = hidden(level, SEPARATION_ZERO_PENETRATION, &before);
+    const size_t about = (size_t)((double)length * (4 + 2 * after)) + 24;
+    Stretch stretch = {.from = run->first > about ? run->first - about : 0,
+                       .to = count - run->last > about ? run->last + about : count};
+    // Behind a contact there may be an end below the threshold.
+    if (number > 0) {
+        const size_t end = found->runs[number - 1].last;
+        const size_t wall = run->first - (run->first - end) / 3;
+        stretch.from = stretch.from > wall ? stretch.from : wall;
+    }
+    if (number + 1 < found->count) {
+        const size_t gap = found->runs[number + 1].first - run->last - 1;
+        const size_t wall = run->last + 1 + gap * 2 / 3;
+        stretch.to = stretch.to < wall ? stretch.to : wall;
+    }
+    stretch.is_at_begin = stretch.from == 0;
+    stretch.is_at_end = stretch.to == count;
+    return stretch;
+}
+
+static void fill_window(const TraceFound *found, const TraceRun *run, const Stretch *stretch,
+                        int separation, TraceWindow *window) {
+    const size_t samples = stretch->to - stretch->from;
+    const size_t m = (samples + TRACE_BLOCKS_MOST - 1) / TRACE_BLOCKS_MOST;
+    *window = (TraceWindow){
+        .blocks = samples / m,
+        .per_block = m,
+        .separation = separation,
+        .first = (long)(run->first - stretch->from),
+        .last = (long)(run->last - stretch->from),
+    };
+    for (size_t k = 0; k < window->blocks; k++) {
+        const double *force = found->force + stretch->from + k * m;
+        double sum = 0;
+        for (size_t i = 0; i < m; i++)
+            sum += force[i] / run->peak;
+        const double mean = sum / (double)m;
+        window->mean[k] = mean;
+        window->sum += mean;
+        window->square += mean * mean;
+    }
+    const double noise = found->noise / run->peak;
+    window->noise_freedom = fmax(found->noise_count - (double)samples, 0);
+    window->noise_square = noise * noise * window->noise_freedom;
+    double before;
+    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    const double length = (double)(window->last - window->first + 1);
+    const long end = (long)(window->blocks * m) - 1;
+    window->least_start = window->first - (long)ceil(1.5 * before * length) - 2 - (long)length / 8;
+    window->most_end = window->last + (long)ceil(1.5 * after * length) + 2 + (long)length / 8;
+    // A sample on either side must be out of contact.
+    window->least_start = window->least_start > 1 ? window->least_start : 1;
+    window->most_end = window->most_end < end - 1 ? window->most_end : end - 1;
+}
+
+// Without a fit: from what is seen above the threshold.
+static void count_samples(const TraceFound *found, const TraceRun *run, int separation,
+                          double interval, TraceContact *contact) {
+    const double seen = (double)(run->last - run->first);
+    double before;
+    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    contact->least_contact_time = seen * interval;
+    contact->most_contact_time = (seen + 2) * (1 + after) * interval;
+}
+
+// rms of what the fit leaves of the window's means during contact [peak], of *count of them.
+static double left_over(const TraceWindow *window, const TraceFit *fit, size_t *count) {
+    TraceShape shape;
+    double T, sum = 0;
+    trace_point_shape(window, &fit->at, &shape, &T);
+    const long m = (long)window->per_block;
+    *count = 0;
+    for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++) {
+        const double at = (double)(k * m) + (double)(m - 1) / 2;
+        const double force = trace_shape_force(&shape, (at - fit->at.part[0]) / T);
+        const double left =
+            window->mean[k] - fit->residue.amplitude * force - fit->residue.baseline;
+        sum += left * left;
+        ++*count;
+    }
+    return sqrt(sum / fmax((double)*count - 4, 1));
+}
+
+// No figure: an interval that holds also what counting samples leaves open.
+static void withdraw(const TraceContact *counted, TraceContact *contact) {
+    contact->least_contact_time = fmin(contact->least_contact_time, counted->least_contact_time);
+    contact->most_contact_time = fmax(contact->most_contact_time, counted->most_contact_time);
+    contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
+    contact->restitution = contact->restitution_uncertainty = (double)NAN;
+}
+
+static Status judge(const TraceInterval *likely, bool is_form_sure, double noise, int separation,
+                    const TraceContact *counted, TraceContact *contact) {
+    const double width = contact->most_contact_time - contact->least_contact_time;
+    const bool is_wide = !(width < widest * contact->contact_time);
+    if (!is_form_sure) {
+        if (is_wide)
+            withdraw(counted, contact);
+        return tell(&contact->why,
+                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
+                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
+    }
+    if (is_wide) {
+        withdraw(counted, contact);
+        return tell(&contact->why,
+                    "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
+                    "more samples in contact would tell them apart",
+                    contact->least_contact_time, contact->most_contact_time);
+    }
+    if (likely->decay.mean + 2 * likely->decay.deviation > faintest) {
+        withdraw(counted, contact);
+        return tell(&contact->why, "the force fades away without an end that could be told: pulses "
+                                   "with a restitution of next to nothing fit the trace as well");
+    }
+    return STATUS_OK;
+}
+
+// The best pulse on the baseline there, from where the contact is taken to begin to where it is
+// taken to end; its window begins at sample `origin`.
+static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFound *found,
+                   const TraceRun *run, double origin, Reals *pulse) {
+    if (!reals_make(pulse, TRACE_PULSE))
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < TRACE_PULSE; i++) {
+        const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
+        const double place = origin + part[0] + share * (part[1] - part[0]);
+        const double force =
+            fit->residue.amplitude * trace_shape_force(shape, shape->length * share);
+        pulse->at[i] =
+            trace_found_baseline(found, place) + run->peak * (fit->residue.baseline + force);
+    }
+    return STATUS_OK;
+}
+
+static Status fit_contact(TraceWindow *window, const TraceFound *found, const TraceRun *run,
+                          const Stretch *stretch, double interval, const TraceFit *fits,
+                          size_t count, TraceContact *contact) {
+    if (count == 0)
+        return tell(&contact->why, "no pulse of the model's fits");
+    const TraceFit *fit = &fits[0];
+    contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
+    const double origin = (double)stretch->from;
+    contact->seen.first = (origin + (double)fit->first) * interval;
+    contact->seen.last = (origin + (double)fit->last) * interval;
+    TraceShape shape;
+    double T;
+    trace_point_shape(window, &fit->at, &shape, &T);
+    const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
+    contact->seen.crossing_shortfall = 1 - (visible.pressed - visible.from);
+    contact->seen.impulse =
+        fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
+    size_t means;
+    contact->seen.misfit_share = left_over(window, fit, &means);
+    const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
+    contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
+    if (contact->seen.samples < SAMPLES_LEAST)
+        return tell(&contact->why,
+                    "only %d samples are in contact, and pulses of very different length fit so "
+                    "few: 5 are the least, 20 are better",
+                    (int)contact->seen.samples);
+    if (contact->seen.misfit_share > worst && contact->seen.misfit_share > 2 * noise)
+        return tell(&contact->why,
+                    "the trace is no pulse of the model's under the separation rule %s: the best "
+                    "one leaves %.2g %% of the peak",
+                    separation_names[window->separation], 100 * contact->seen.misfit_share);
+    // So much is seldom left by chance, of so many means and of a noise known from so many samples.
+    const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
+    const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
+    const bool is_form_sure =
+        !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
+    TraceInterval likely;
+    TRY(trace_interval(window, fits, count, is_form_sure, &likely));
+    TRY(draw(fit, &shape, found, run, origin, &contact->seen.pulse));
+    const TraceContact counted = *contact;
+    contact->seen.start = (origin + fit->at.part[0]) * interval;
+    contact->seen.end = (origin + fit->at.part[1]) * interval;
+    contact->contact_time = likely.contact_time.mean * interval;
+    contact->contact_time_uncertainty = likely.contact_time.deviation * interval;
+    contact->least_contact_time = likely.least * interval;
+    contact->most_contact_time = likely.most * interval;
+    contact->restitution = fmin(exp(-likely.decay.mean), 1);
+    contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
+    return judge(&likely, is_form_sure, noise, window->separation, &counted, contact);
+}
+
+// Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
+// is m_e g over the fitted m_e v0, and that hangs on the pull but little.
+static bool settle(double weight, double unit, TraceWindow *window, TraceFit *fit) {
+    double rate_before = 0, gap_before = 0;
+    for (int round = 0; round < 12; round++) {
+        TraceShape shape;
+        double T;
+        if (!isfinite(fit->residue.sum) || !trace_point_shape(window, &fit->at, &shape, &T))
+            return false;
+        const double rate = window->pull_rate;
+        const double gap = weight / (fit->residue.amplitude * T * unit) - rate;
+        if (fabs(gap) < 1e-4 * rate)
+            return true;
+        // Under a strong pull the gap only halves from one to the next: so by the secant.
+        const double slope = round > 0 ? (gap - gap_before) / (rate - rate_before) : -1;
+        rate_before = rate;
+        gap_before = gap;
+        window->pull_rate = fmax(rate - gap / fmin(slope, -0.1), 0);
+        trace_refit(window, fit);
+    }
+    return false;
+}
+
+// The fits under the pull. By g / v0; without v0 from the best fit on, until it is the best under
+// the pull that follows from it; *is_settled is false where there is no such.
+static size_t fit_pulled(const TraceWay *way, size_t number, double interval, double peak,
+                         TraceWindow *window, TraceFit *fits, bool *is_settled) {
+    const bool is_known = number < way->approach_speed_count && way->approach_speeds[number] > 0;
+    *is_settled = true;
+    if (is_known)
+        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+    size_t count = trace_fit(window, fits);
+    if (is_known || !(way->effective_mass > 0))
+        return count;
+    for (int round = 0; round < 4 && count > 0; round++) {
+        TraceFit best = fits[0];
+        const double before = window->pull_rate;
+        *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
+        if (*is_settled && window->pull_rate == before)
+            return count;
+        count = trace_fit(window, fits);
+    }
+    *is_settled = false;
+    return count;
+}
+
+static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
+                           size_t samples, size_t number, TraceWindow *window,
+                           TraceContact *contact) {
+    const TraceRun *run = &found->runs[number];
+    const Stretch stretch = stretch_of(found, samples, number);
+    const double none = (double)NAN;
+    *contact = (TraceContact){.contact_time = none,
+                              .contact_time_uncertainty = none,
+                              .restitution = none,
+                              .restitution_uncertainty = none};
+    fields_clear(trace_seen_fields, &contact->seen);
+    contact->seen.baseline = found->baseline;
+    contact->seen.noise = found->noise;
+    contact->seen.threshold = found->threshold;
+    contact->seen.peak = run->peak;
+    contact->seen.samples = run->last - run->first + 1;
+    contact->seen.first = (double)run->first * interval;
+    contact->seen.last = (double)run->last * interval;
+    contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
+    contact->seen.crossing_uncertainty = interval / sqrt(6);
+    count_samples(found, run, way->separation, interval, contact);
+    if (run->first == 0 || run->last == samples - 1) {
+        contact->most_contact_time = (double)NAN;
+        return tell(&contact->why, "the trace %s during the contact",
+                    run->first == 0 ? "begins" : "ends");
+    }
+    fill_window(found, run, &stretch, way->separation, window);
+    TraceFit fits[TRACE_FITS_MOST];
+    bool is_settled = true;
+    const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
+                                                       window, fits, &is_settled)
+                                          : trace_fit(window, fits);
+    TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
+    if (!is_settled && !isnan(contact->contact_time))
+        return tell(&contact->why,
+                    "gravity is taken into account in part only: the masses and this "
+                    "force do not lead to one approach speed; check them, or give it");
+    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
+        return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
+                                   "nor the masses are known");
+    return STATUS_OK;
+}
+
+Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem) {
+    if (!(interval > 0) || !isfinite(interval))
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "its interval must be above 0 s, is %g", interval);
+    if (force->count < TRACE_LEAST)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "must have at least %d samples, has %zu", TRACE_LEAST, force->count);
+    for (size_t i = 0; i < force->count; i++)
+        if (!(fabs(force->at[i]) < 1e150))
+            return problem_add(problem, STATUS_INVALID, pointer,
+                               "its sample %zu must be a force below 1e150 N", i);
+    return STATUS_OK;
+}
+
+Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
+                  TraceReading *reading, Problem *problem) {
+    *reading = (TraceReading){.why = NULL};
+    TRY(trace_check(interval, force, pointer, problem));
+    TraceFound found;
+    TraceWindow *window = malloc(sizeof *window);
+    Status status = trace_find(force, way->threshold, &found);
+    if (status == STATUS_OK && window != NULL && found.count > 0) {
+        reading->contacts.at = calloc(found.count, sizeof *reading->contacts.at);
+        if (reading->contacts.at == NULL)
+            status = STATUS_NO_MEMORY;
+    }
+    if (window == NULL)
+        status = STATUS_NO_MEMORY;
+    if (status == STATUS_OK) {
+        for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
+            if (!watch_advance(way->watch, (double)i / (double)found.count)) {
+                status = STATUS_CANCELLED;
+                break;
+            }
+            reading->contacts.count++;
+            status = read_contact(interval, way, &found, force->count, i, window,
+                                  &reading->contacts.at[i]);
+        }
+        if (status == STATUS_OK && found.count == 0)
+            status =
+                tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
+        if (status == STATUS_OK && found.is_full)
+            status =
+                tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MOST);
+    }
+    trace_found_clear(&found);
+    free(window);
+    return status;
+}
+
+void trace_reading_clear(TraceReading *reading) {
+    for (size_t i = 0; i < reading->contacts.count; i++) {
+        fields_clear(trace_seen_fields, &reading->contacts.at[i].seen);
+        free(reading->contacts.at[i].why);
+    }
+    free(reading->contacts.at);
+    free(reading->why);
+    *reading = (TraceReading){.why = NULL};
+}

@@ -1,0 +1,37 @@
+// A contact of an impactor that gravity pulls into the buffer meanwhile: how much longer it lasts
+// and how much less comes back than of the isolated pair, and the way back from one to the other.
+// Not the fit of a trace, which has a pull of its own (trace.h). Used by evaluation_*.c.
+#ifndef CORE_DROP_TEST_GRAVITY_CORRECTION_H
+#define CORE_DROP_TEST_GRAVITY_CORRECTION_H
+
+#include "core/contact/contact.h"
+
+// What pulls, and how the rebound was read.
+typedef struct Pull {
+    double gravity; // [m/s^2]
+    double speed;   // of approach [m/s]
+    Separation separation;
+    bool is_by_height; // the rebound's speed is that above the buffer at rest, not at parting
+} Pull;
+
+// What e and T_c become; of a contact that does not part e is 0 and T_c infinite.
+typedef struct Pulled {
+    double restitution, contact_time;
+} Pulled;
+Pulled gravity_pull(const Pull *pull, double restitution, double contact_time);
+
+// The isolated pair's e and T_c [s] of what was read, with their relative standard uncertainties,
+// which may be NAN. False where no contact with 0 < e <= 1 comes to that.
+typedef struct Unpulled {
+    double restitution, contact_time;
+    double restitution_uncertainty, contact_time_uncertainty; // relative
+} Unpulled;
+bool gravity_remove(const Pull *pull, const Unpulled *read, Unpulled *isolated);
+
+// The same where one of the two is not read but known of the isolated pair.
+bool gravity_remove_restitution(const Pull *pull, double read, double contact_time,
+                                double *restitution);
+bool gravity_remove_contact_time(const Pull *pull, double read, double restitution,
+                                 double *contact_time);
+
+#endif

@@ -1,0 +1,284 @@
+// With relative standard deviations r_e and r_T, quadrature by the slopes of propagate.h gives
+//
+//   r_k^2 = (s_ke r_e)^2 + (2 r_T)^2,  r_c^2 = (r_e / ln e)^2 + r_T^2,
+//
+// whatever the mass: both are in proportion to it. Z, and what e and T_c become where k_b and c_b
+// are carried over from the test's pair, follow by differences of the identification itself.
+#include "core/drop_test/pair_parameters.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/contact/identification.h"
+#include "core/contact/identification_sensitivity.h"
+#include "core/math/student_t.h"
+
+// clang-format off
+static const Field figure_fields[] = {
+    FIELD_REAL(DerivedFigure, value, NULL, ANY, OPTIONAL, "null: not known"),
+    FIELD_REAL(DerivedFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c that the material states"),
+    FIELD_REAL(DerivedFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty: with high what 95 % of contacts lie between if e and T_c scatter log-normally with just these deviations, which few readings tell only roughly"),
+    FIELD_REAL(DerivedFigure, high, NULL, ANY, OPTIONAL, "value times exp(1.96 u)"),
+    FIELD_END
+};
+
+static const Field contact_rows[] = {
+    FIELD_CHOICE(DerivedContact, separation, separation_names, OPTIONAL, "the rule by which a contact ends"),
+    FIELD_REAL(DerivedContact, approach_speed, "m/s", ANY, OPTIONAL, "of the material's row; null: for every speed"),
+    FIELD_ITEM(DerivedContact, restitution, figure_fields, NULL, PRESENCE_DEFAULT, "e of this pair"),
+    FIELD_ITEM(DerivedContact, contact_time, figure_fields, NULL, PRESENCE_DEFAULT, "T_c of this pair [s]"),
+    FIELD_ITEM(DerivedContact, stiffness, figure_fields, NULL, PRESENCE_DEFAULT, "k_b [N/m]"),
+    FIELD_ITEM(DerivedContact, damping, figure_fields, NULL, PRESENCE_DEFAULT, "c_b [N s/m]"),
+    FIELD_ITEM(DerivedContact, damping_ratio, figure_fields, NULL, PRESENCE_DEFAULT, "Z"),
+    FIELD_END
+};
+
+const Field derived_pair_fields[] = {
+    FIELD_REAL(DerivedPair, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
+    FIELD_REAL(DerivedPair, structure_mass, "kg", ANY, OPTIONAL, "what it strikes; null: it does not move"),
+    FIELD_CHOICE(DerivedPair, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
+    FIELD_REAL(DerivedPair, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
+    FIELD_REAL(DerivedPair, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
+    FIELD_REAL(DerivedPair, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that was measured"),
+    FIELD_REAL(DerivedPair, most_speed, "m/s", ANY, OPTIONAL, "fastest"),
+    FIELD_LIST(DerivedPair, contacts, contact_rows, 0, PRESENCE_DEFAULT, "by row of the material's table, then by rule"),
+    FIELD_END
+};
+// clang-format on
+
+enum { RULES = 2, OUTPUTS = 3 };
+
+static const double mass_tolerance = 0.02; // of effective masses that are taken for the same
+
+static bool has(double value) {
+    return !isnan(value);
+}
+
+void derived_pair_clear(DerivedPair *pair) {
+    fields_clear(derived_pair_fields, pair);
+    warnings_clear(&pair->warnings);
+}
+
+// What is known of one row, with relative deviations.
+typedef struct Known {
+    double speed, e, T, r_e, r_T;
+} Known;
+
+static Known known_of(const Material *material, size_t index) {
+    const MaterialRow constant = {(double)NAN, material->restitution, material->contact_time,
+                                  material->restitution_deviation,
+                                  material->contact_time_deviation};
+    const MaterialRow *row = material->table.count > 0 ? &material->table.at[index] : &constant;
+    return (Known){row->approach_speed, row->restitution, row->contact_time,
+                   row->restitution_deviation / row->restitution,
+                   row->contact_time_deviation / row->contact_time};
+}
+
+static DerivedFigure figure(double value, double relative) {
+    if (!isfinite(value))
+        return (DerivedFigure){(double)NAN, (double)NAN, (double)NAN, (double)NAN};
+    const double factor = exp(student_quantile(0.95, 0) * relative);
+    if (!isfinite(factor))
+        return (DerivedFigure){value, (double)NAN, (double)NAN, (double)NAN};
+    return (DerivedFigure){value, value * relative, value / factor, value * factor};
+}
+
+// Z, e and T_c of this pair of what the test's pair had.
+typedef struct Asked {
+    double mass, test_mass;
+    int identified_for;
+    Separation separation;
+} Asked;
+
+static Identified identify(const Asked *asked, double e, double T) {
+    if (asked->identified_for != IDENTIFIED_FOR_RIG)
+        return identify_measured(asked->mass, e, T, asked->separation);
+    const Identified rig = identify_measured(asked->test_mass, e, T, asked->separation);
+    return identify_given(asked->mass, rig.stiffness, rig.damping, asked->separation);
+}
+
+static void outputs(const Asked *asked, double log_e, double log_T, double values[OUTPUTS]) {
+    const Identified it = identify(asked, exp(log_e), exp(log_T));
+    values[0] = log(it.damping_ratio);
+    values[1] = log(it.restitution);
+    values[2] = log(it.contact_time);
+}
+
+// Relative uncertainties of Z, e and T_c; what does not depend on a deviation does not need it.
+static void spread(const Asked *asked, const Known *known, double relative[OUTPUTS]) {
+    const double h = 1e-5, e = log(known->e), T = log(known->T);
+    double more[OUTPUTS], less[OUTPUTS], late[OUTPUTS], soon[OUTPUTS];
+    outputs(asked, e - h, T, less);
+    outputs(asked, e + h > 0 ? e : e + h, T, more);
+    outputs(asked, e, T + h, late);
+    outputs(asked, e, T - h, soon);
+    const double width = e + h > 0 ? h : 2 * h;
+    for (int i = 0; i < OUTPUTS; i++) {
+        const double by_e = (more[i] - less[i]) / width, by_T = (late[i] - soon[i]) / (2 * h);
+        const double part_e = fabs(by_e) < 1e-9 ? 0 : by_e * known->r_e;
+        const double part_T = fabs(by_T) < 1e-9 ? 0 : by_T * known->r_T;
+        relative[i] = hypot(part_e, part_T);
+    }
+}
+
+static DerivedContact contact_of(const Asked *asked, const Known *known) {
+    const DerivedFigure none = figure((double)NAN, 0);
+    DerivedContact contact = {.separation = (int)asked->separation,
+                              .approach_speed = known->speed,
+                              .restitution = figure(known->e, known->r_e),
+                              .contact_time = none,
+                              .stiffness = none,
+                              .damping = none,
+                              .damping_ratio = none};
+    if (!(known->e > 0))
+        return contact;
+    // Without a contact time Z is still known, and the same for every mass.
+    const bool has_time = has(known->T);
+    const Known with = {known->speed, known->e, has_time ? known->T : 1, known->r_e,
+                        has_time ? known->r_T : 0};
+    const Identified it = identify(asked, with.e, with.T);
+    double relative[OUTPUTS];
+    spread(asked, &with, relative);
+    contact.restitution = figure(it.restitution, relative[1]);
+    contact.restitution.high =
+        has(contact.restitution.high) ? fmin(contact.restitution.high, 1) : (double)NAN;
+    contact.damping_ratio = figure(it.damping_ratio, relative[0]);
+    if (!has_time)
+        return contact;
+    const Propagation by = propagate(with.e, asked->separation);
+    contact.contact_time = figure(it.contact_time, relative[2]);
+    contact.stiffness = figure(it.stiffness, hypot(by.stiffness_by_restitution * with.r_e,
+                                                   by.stiffness_by_contact_time * with.r_T));
+    contact.damping = figure(it.damping, hypot(by.damping_by_restitution * with.r_e,
+                                               by.damping_by_contact_time * with.r_T));
+    return contact;
+}
+
+static Status fill(const Material *material, int separation, DerivedPair *pair) {
+    const size_t rows = material->table.count > 0 ? material->table.count : 1;
+    pair->contacts.at = calloc(rows * RULES, sizeof *pair->contacts.at);
+    if (pair->contacts.at == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < rows; i++)
+        for (int rule = 0; rule < RULES; rule++) {
+            const Known known = known_of(material, i);
+            const Asked asked = {pair->effective_mass, pair->test_mass, pair->identified_for,
+                                 (Separation)rule};
+            if (separation == CHOICE_ABSENT || separation == rule)
+                pair->contacts.at[pair->contacts.count++] = contact_of(&asked, &known);
+        }
+    return STATUS_OK;
+}
+
+// What e and T_c would be if the buffer's k_b and c_b were those of the test's pair.
+static Status warn_of_mass(const Material *material, DerivedPair *pair) {
+    const double mass = pair->effective_mass, test = pair->test_mass;
+    const bool is_rig = pair->identified_for == IDENTIFIED_FOR_RIG;
+    if (!has(test))
+        return warnings_add(&pair->warnings, "/test_mass",
+                            "the masses of the test are not known: e and T_c belong to its pair, "
+                            "and nobody can tell how far this one is from it");
+    if (!(fabs(mass - test) > mass_tolerance * test))
+        return STATUS_OK;
+    const double percent = 100 * fabs(mass / test - 1);
+    const char *side = mass > test ? "above" : "below";
+    if (is_rig)
+        return warnings_add(&pair->warnings, "/effective_mass",
+                            "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
+                            "kg: k_b and c_b are carried over, e and T_c are those that follow",
+                            mass, percent, side, test);
+    const Known known = known_of(material, 0);
+    const int rule = pair->contacts.at[0].separation;
+    if (!has(known.T) || !(known.e > 0))
+        return warnings_add(&pair->warnings, "/effective_mass",
+                            "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
+                            "kg: e belongs to the test's pair",
+                            mass, percent, side, test);
+    const Asked asked = {mass, test, IDENTIFIED_FOR_RIG, (Separation)rule};
+    const Identified it = identify(&asked, known.e, known.T);
+    return warnings_add(&pair->warnings, "/effective_mass",
+                        "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g kg: "
+                        "e and T_c belong to the test's pair; were k_b and c_b those of the test "
+                        "(identified_for=rig), e would be %.3g in place of %.3g and T_c %.3g s in "
+                        "place of %.3g s",
+                        mass, percent, side, test, it.restitution, known.e, it.contact_time,
+                        known.T);
+}
+
+static Status warn_of_material(const Material *material, int separation, DerivedPair *pair) {
+    const size_t rows = material->table.count > 0 ? material->table.count : 1;
+    bool has_time = true, has_e = true, has_T = true, is_dead = false;
+    for (size_t i = 0; i < rows; i++) {
+        const Known known = known_of(material, i);
+        has_time = has_time && has(known.T);
+        is_dead = is_dead || !(known.e > 0);
+        has_e = has_e && has(known.r_e);
+        has_T = has_T && has(known.r_T);
+    }
+    Warnings *to = &pair->warnings;
+    if (!has_time)
+        TRY(warnings_add(to, "/contacts",
+                         "the material has no contact time: stiffness and damping are not known, "
+                         "only impulsive contact can use it"));
+    if (is_dead)
+        TRY(warnings_add(to, "/contacts",
+                         "where nothing comes back (e = 0) no stiffness and damping make it"));
+    if (!has_e || (has_time && !has_T))
+        TRY(warnings_add(to, "/contacts",
+                         "the material states no standard deviation of %s%s%s%s: what depends on "
+                         "it has no uncertainty",
+                         has_e ? "" : "e", has_e || has_T || !has_time ? "" : " and ",
+                         has_T || !has_time ? "" : "T_c",
+                         material->table.count > 0 ? " in every row" : ""));
+    if (material->separation != CHOICE_ABSENT && separation != material->separation)
+        TRY(warnings_add(to, "/contacts",
+                         "its T_c was told under %s; figures under %s are of a T_c that another "
+                         "evaluation of the same test would give differently",
+                         separation_names[material->separation],
+                         separation_names[1 - material->separation]));
+    if (!has(pair->least_speed) || !has(pair->most_speed))
+        TRY(warnings_add(to, "/least_speed",
+                         "the material does not state the range of approach speeds that was "
+                         "measured"));
+    return STATUS_OK;
+}
+
+static Status warn_of_sticking(DerivedPair *pair) {
+    for (size_t i = 0; i < pair->contacts.count; i++) {
+        const DerivedContact *contact = &pair->contacts.at[i];
+        if (has(contact->stiffness.value) && !has(contact->contact_time.value))
+            return warnings_add(&pair->warnings, "/contacts",
+                                "with this pair the contact is overdamped (Z = %.3g) and never "
+                                "ends under %s",
+                                contact->damping_ratio.value,
+                                separation_names[contact->separation]);
+    }
+    return STATUS_OK;
+}
+
+Status derived_make(const Material *material, double damper_mass, double structure_mass,
+                    int identified_for, int separation, DerivedPair *pair, Problem *problem) {
+    *pair = (DerivedPair){
+        .damper_mass = damper_mass,
+        .structure_mass = structure_mass,
+        .identified_for = identified_for,
+        .effective_mass =
+            has(structure_mass) ? effective_mass(damper_mass, structure_mass) : damper_mass,
+        .test_mass = material_test_mass(material),
+    };
+    material_speeds(material, &pair->least_speed, &pair->most_speed);
+    if (identified_for == IDENTIFIED_FOR_RIG && !has(pair->test_mass))
+        return problem_add(problem, STATUS_INVALID, "/identified_for",
+                           "must be scene: the material does not state the test's masses "
+                           "(impactor_mass, base, and base_mass of a free one), so that nothing "
+                           "can be carried over from its rig");
+    Status status = fill(material, separation, pair);
+    if (status == STATUS_OK)
+        status = warn_of_mass(material, pair);
+    if (status == STATUS_OK)
+        status = warn_of_material(material, separation, pair);
+    if (status == STATUS_OK)
+        status = warn_of_sticking(pair);
+    return status == STATUS_OK ? STATUS_OK
+                               : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
+}

@@ -1,0 +1,379 @@
+// Variable projection: for a start, an end and L the model's pulse f is known but for its size A
+// and the baseline b, which are linear: what is left to minimise is the sum of squares of x - A f -
+// b over start, end and L. The force jumps where a contact begins and ends, so the sum is smooth
+// only as long as the same samples are in contact: within a box, start and end stay in their gaps
+// between samples. There Levenberg and Marquardt's method serves; from box to box the fit climbs.
+#include "core/drop_test/pulse_fit.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/base/status.h"
+
+enum { START, END, DECAY };
+
+static const double least_decay = -1,
+                    most_decay = 4.6; // e from 2.7, which only noise makes, to 0.01
+
+TraceBox trace_box(long first, long last, long gaps) {
+    return (TraceBox){
+        .least = {(double)(first - gaps), (double)last, least_decay},
+        .most = {(double)first, (double)(last + gaps), most_decay},
+        .first = first - gaps + 1,
+        .last = last + gaps - 1,
+    };
+}
+
+bool trace_point_shape(const TraceWindow *window, const TracePoint *point, TraceShape *shape,
+                       double *contact_time) {
+    const double length = point->part[END] - point->part[START];
+    *shape =
+        trace_shape_lasting(point->part[DECAY], window->pull_rate * length, window->separation);
+    *contact_time = length / shape->length;
+    return length > 0 && isfinite(shape->length);
+}
+
+// The samples in contact; false: none.
+static bool members(const TraceWindow *window, const TracePoint *point, const TraceBox *box,
+                    long *first, long *last) {
+    const long end = (long)(window->blocks * window->per_block) - 1;
+    *first = (long)fmax(ceil(point->part[START]), (double)box->first);
+    *last = (long)fmin(floor(point->part[END]), (double)box->last);
+    return *first >= 0 && *last <= end && *first <= *last;
+}
+
+// The mean of so many values about s, `step` from one to the next: by the second difference over
+// their width, which is all that matters of a pulse over a block.
+static double mean_about(const TraceShape *shape, double s, double step, long count) {
+    const double middle = trace_shape_force(shape, s), half = step * (double)count / 2;
+    if (count == 1)
+        return middle;
+    const double about =
+        (trace_shape_force(shape, s - half) + trace_shape_force(shape, s + half)) / 2;
+    return middle + (about - middle) * (1 - 1 / ((double)count * (double)count)) / 3;
+}
+
+// The pulse of size 1 over blocks; those from *from to *to are other than 0.
+static bool pulse(const TraceWindow *window, const TracePoint *point, long first, long last,
+                  double *f, size_t *from, size_t *to) {
+    TraceShape shape;
+    double T;
+    if (!trace_point_shape(window, point, &shape, &T))
+        return false;
+    const long m = (long)window->per_block;
+    const long begin = first / m, end = last / m;
+    *from = (size_t)begin;
+    *to = (size_t)end;
+    // In whole blocks the pulse's oscillation follows from the two blocks before.
+    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step;
+    const double fall = exp(-shape.decay * step), back = fall * fall;
+    const double turn = 2 * fall * (shape.turn > 0 ? cos(x) : cosh(x));
+    double before = 0, here = 0;
+    for (long k = begin; k <= end; k++) {
+        const long lowest = k * m > first ? k * m : first;
+        const long highest = k * m + m - 1 < last ? k * m + m - 1 : last;
+        const bool is_whole = highest - lowest + 1 == m;
+        double value;
+        if (is_whole && k >= begin + 3) {
+            value = turn * here - back * before + shape.pull;
+        } else {
+            const double centre = (double)lowest + (double)(highest - lowest) / 2;
+            value =
+                mean_about(&shape, (centre - point->part[START]) / T, 1 / T, highest - lowest + 1);
+        }
+        before = here;
+        here = value - shape.pull;
+        f[k] = is_whole ? value : value * (double)(highest - lowest + 1) / (double)m;
+    }
+    return true;
+}
+
+static TraceResidue residue(const TraceWindow *window, const double *f, size_t from, size_t to) {
+    const double n = (double)window->blocks, m = (double)window->per_block;
+    double sum = 0, square = 0, product = 0;
+    for (size_t k = from; k <= to; k++) {
+        sum += f[k];
+        square += f[k] * f[k];
+        product += f[k] * window->mean[k];
+    }
+    const double ff = square - sum * sum / n, fx = product - sum * window->sum / n;
+    const double A = fx / ff, b = (window->sum - A * sum) / n;
+    if (!(ff > 0) || !(A > 0))
+        return (TraceResidue){.sum = (double)INFINITY};
+    // In full where it matters: a difference of sums would lose small residues.
+    double left = 0;
+    for (size_t k = from; k <= to; k++) {
+        const double r = window->mean[k] - A * f[k] - b;
+        left += r * r - (window->mean[k] - b) * (window->mean[k] - b);
+    }
+    double direct = 0;
+    const double all = window->square - 2 * b * window->sum + n * b * b;
+    if (left + all < 1e-6 * all) {
+        for (size_t k = 0; k < window->blocks; k++) {
+            const double r = window->mean[k] - b - (k >= from && k <= to ? A * f[k] : 0);
+            direct += r * r;
+        }
+        left = direct;
+    } else {
+        left += all;
+    }
+    return (TraceResidue){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
+}
+
+// INFINITY as sum where there is no such contact, or one of the other sign.
+static TraceResidue residue_at(const TraceWindow *window, const TracePoint *point,
+                               const TraceBox *box) {
+    double f[TRACE_BLOCKS_MOST];
+    long first, last;
+    size_t from, to;
+    if (!members(window, point, box, &first, &last) ||
+        !pulse(window, point, first, last, f, &from, &to))
+        return (TraceResidue){.sum = (double)INFINITY};
+    return residue(window, f, from, to);
+}
+
+// Slope and curvature of half the sum of squares, by differences of the pulse with the same samples
+// in contact; what size and baseline take up is projected out.
+static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
+    double f[TRACE_BLOCKS_MOST], above[TRACE_BLOCKS_MOST], d[TRACE_PARTS][TRACE_BLOCKS_MOST];
+    long first, last;
+    size_t from, to;
+    if (!members(window, &fit->at, box, &first, &last) ||
+        !pulse(window, &fit->at, first, last, f, &from, &to))
+        return false;
+    const double n = (double)window->blocks, m = (double)window->per_block;
+    const double A = fit->residue.amplitude, b = fit->residue.baseline;
+    const double length = fit->at.part[END] - fit->at.part[START];
+    double f_sum = 0, ff = 0, d_sum[TRACE_PARTS] = {0}, df[TRACE_PARTS] = {0};
+    for (size_t k = from; k <= to; k++) {
+        f_sum += f[k];
+        ff += f[k] * f[k];
+    }
+    for (int p = 0; p < TRACE_PARTS; p++) {
+        const double step = 1e-5 * (p == DECAY ? 1 : length);
+        TracePoint point = fit->at;
+        point.part[p] += step;
+        if (!pulse(window, &point, first, last, above, &from, &to))
+            return false;
+        point.part[p] -= 2 * step;
+        if (!pulse(window, &point, first, last, d[p], &from, &to))
+            return false;
+        for (size_t k = from; k <= to; k++) {
+            d[p][k] = A * (above[k] - d[p][k]) / (2 * step);
+            d_sum[p] += d[p][k];
+            df[p] += d[p][k] * f[k];
+        }
+    }
+    ff -= f_sum * f_sum / n;
+    for (int p = 0; p < TRACE_PARTS; p++) {
+        fit->slope[p] = 0;
+        // x - A f - b sums to 0 and is orthogonal to f: no projection is needed.
+        for (size_t k = from; k <= to; k++)
+            fit->slope[p] -= m * d[p][k] * (window->mean[k] - A * f[k] - b);
+        df[p] -= d_sum[p] * f_sum / n;
+        for (int q = 0; q <= p; q++) {
+            double sum = -d_sum[p] * d_sum[q] / n - df[p] * df[q] / ff;
+            for (size_t k = from; k <= to; k++)
+                sum += d[p][k] * d[q][k];
+            fit->curvature[p][q] = fit->curvature[q][p] = m * sum;
+        }
+    }
+    return true;
+}
+
+// (curvature + damping diagonal) step = -slope over the free parts, by elimination.
+static bool solve(const TraceFit *fit, const bool *is_free, double damping, double *step) {
+    double a[TRACE_PARTS][TRACE_PARTS + 1];
+    int at[TRACE_PARTS], n = 0;
+    for (int p = 0; p < TRACE_PARTS; p++) {
+        step[p] = 0;
+        if (is_free[p])
+            at[n++] = p;
+    }
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++)
+            a[i][j] = fit->curvature[at[i]][at[j]] * (i == j ? 1 + damping : 1);
+        a[i][n] = -fit->slope[at[i]];
+    }
+    for (int i = 0; i < n; i++) {
+        if (!(a[i][i] > 0))
+            return false;
+        for (int j = i + 1; j < n; j++) {
+            const double factor = a[j][i] / a[i][i];
+            for (int k = i; k <= n; k++)
+                a[j][k] -= factor * a[i][k];
+        }
+    }
+    for (int i = n; i-- > 0;) {
+        double value = a[i][n];
+        for (int j = i + 1; j < n; j++)
+            value -= a[i][j] * step[at[j]];
+        step[at[i]] = value / a[i][i];
+    }
+    return true;
+}
+
+void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
+    for (int p = 0; p < TRACE_PARTS; p++)
+        fit->at.part[p] = fmin(fmax(fit->at.part[p], box->least[p]), box->most[p]);
+    fit->residue = residue_at(window, &fit->at, box);
+    double damping = 1e-3;
+    bool is_derived = false;
+    for (int round = 0; round < 60 && isfinite(fit->residue.sum); round++) {
+        if (!is_derived && !derive(window, box, fit))
+            return;
+        is_derived = true;
+        // What stands at a wall and wants through it stays there.
+        bool is_free[TRACE_PARTS];
+        for (int p = 0; p < TRACE_PARTS; p++)
+            is_free[p] = !(fit->at.part[p] <= box->least[p] && fit->slope[p] > 0) &&
+                         !(fit->at.part[p] >= box->most[p] && fit->slope[p] < 0);
+        double step[TRACE_PARTS];
+        if (!solve(fit, is_free, damping, step)) {
+            damping = 10 * damping + 1e-9;
+            if (damping > 1e9)
+                return;
+            continue;
+        }
+        TraceFit next = *fit;
+        double gain = 0, size = 0;
+        for (int p = 0; p < TRACE_PARTS; p++) {
+            next.at.part[p] = fmin(fmax(fit->at.part[p] + step[p], box->least[p]), box->most[p]);
+            gain -= step[p] * fit->slope[p];
+            size = fmax(size, fabs(next.at.part[p] - fit->at.part[p]));
+        }
+        next.residue = residue_at(window, &next.at, box);
+        if (next.residue.sum < fit->residue.sum) {
+            const bool is_done = fit->residue.sum - next.residue.sum <
+                                 1e-7 * trace_variance(window, next.residue.sum);
+            *fit = next;
+            is_derived = false;
+            damping /= 10;
+            if (is_done)
+                break;
+        } else {
+            damping = 10 * damping + 1e-9;
+            if (damping > 1e9 || size < 1e-12 ||
+                gain < 1e-9 * trace_variance(window, fit->residue.sum))
+                break;
+        }
+    }
+    if (!is_derived)
+        derive(window, box, fit);
+    members(window, &fit->at, box, &fit->first, &fit->last);
+}
+
+double trace_variance(const TraceWindow *window, double sum) {
+    const double n = (double)window->blocks + window->noise_freedom;
+    // Rounding of the data and of the model is noise as well.
+    return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-16;
+}
+
+double trace_likelihood(const TraceWindow *window, double sum) {
+    const double n = (double)window->blocks + window->noise_freedom;
+    return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-16);
+}
+
+// Coarsely over starts and ends, for one L.
+static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
+    enum { PLACES = 7 };
+    const long lead = window->first - window->least_start, tail = window->most_end - window->last;
+    const long lead_step = lead / PLACES + 1, tail_step = tail / PLACES + 1;
+    fit->residue.sum = (double)INFINITY;
+    for (long first = window->first; first >= window->least_start; first -= lead_step)
+        for (long last = window->last; last <= window->most_end; last += tail_step) {
+            const TraceBox box = trace_box(first, last, 1);
+            const TracePoint point = {{(double)first - 0.5, (double)last + 0.5, decay}};
+            const TraceResidue left = residue_at(window, &point, &box);
+            if (left.sum < fit->residue.sum) {
+                fit->at = point;
+                fit->residue = left;
+            }
+        }
+    return isfinite(fit->residue.sum);
+}
+
+// From gap to gap as long as it gets better.
+static void climb(const TraceWindow *window, TraceFit *fit) {
+    static const int moves[8][2] = {{0, 1}, {0, -1},  {1, 0},  {-1, 0},
+                                    {1, 1}, {-1, -1}, {-1, 1}, {1, -1}};
+    long stride = 1;
+    for (int way = 0, failed = 0; failed < 8; way = (way + 1) % 8) {
+        const long from = fit->first + stride * moves[way][0];
+        const long to = fit->last + stride * moves[way][1];
+        TraceFit other = *fit;
+        other.residue.sum = (double)INFINITY;
+        if (from >= window->least_start && from <= window->first && to >= window->last &&
+            to <= window->most_end) {
+            const TraceBox box = trace_box(from, to, 1);
+            trace_fit_box(window, &box, &other);
+        }
+        if (other.residue.sum < fit->residue.sum * (1 - 1e-9)) {
+            *fit = other;
+            failed = 0;
+            way--; // once more the same way, twice as far
+            stride *= 2;
+        } else if (stride > 1) {
+            stride = 1;
+            way--;
+        } else {
+            failed++;
+        }
+    }
+}
+
+static bool is_known(const TraceFit *fits, size_t count, const TraceFit *fit) {
+    for (size_t i = 0; i < count; i++)
+        if (fit->first == fits[i].first && fit->last == fits[i].last)
+            return true;
+    return false;
+}
+
+static size_t insert(TraceFit *fits, size_t count, const TraceFit *fit) {
+    size_t at = count;
+    for (; at > 0 && fits[at - 1].residue.sum > fit->residue.sum; at--)
+        fits[at] = fits[at - 1];
+    fits[at] = *fit;
+    return count + 1;
+}
+
+size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]) {
+    static const double decays[TRACE_FITS_MOST] = {0.02, 0.3, 0.7, 1.3, 2, 3};
+    const TraceBox wide = {
+        .least = {(double)window->least_start - 1, (double)window->last, least_decay},
+        .most = {(double)window->first, (double)window->most_end + 1, most_decay},
+        .first = window->least_start,
+        .last = window->most_end,
+    };
+    TraceFit seeds[TRACE_FITS_MOST];
+    size_t seeded = 0, count = 0;
+    for (size_t i = 0; i < TRACE_FITS_MOST; i++) {
+        TraceFit fit;
+        if (!seek(window, decays[i], &fit))
+            continue;
+        // As if there were no jumps.
+        trace_fit_box(window, &wide, &fit);
+        const TraceBox box = trace_box(fit.first, fit.last, 1);
+        trace_fit_box(window, &box, &fit);
+        if (isfinite(fit.residue.sum) && !is_known(seeds, seeded, &fit))
+            seeded = insert(seeds, seeded, &fit);
+    }
+    for (size_t i = 0; i < seeded; i++) {
+        // Hopelessly worse than the best: no climbing mends that.
+        if (i > 0 && trace_likelihood(window, seeds[i].residue.sum) <
+                         trace_likelihood(window, fits[0].residue.sum) - 40)
+            break;
+        climb(window, &seeds[i]);
+        if (!is_known(fits, count, &seeds[i]))
+            count = insert(fits, count, &seeds[i]);
+    }
+    return count;
+}
+
+void trace_refit(const TraceWindow *window, TraceFit *fit) {
+    const TraceBox box = trace_box(fit->first, fit->last, 1);
+    trace_fit_box(window, &box, fit);
+    if (isfinite(fit->residue.sum))
+        climb(window, fit);
+}

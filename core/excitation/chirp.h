@@ -1,0 +1,16 @@
+// A sweep of the base's acceleration from one frequency to another, as the scene gives it.
+// Not the motion itself (base.h). Used by chirp.c and by tests; everyone else sees an Excitation.
+#ifndef CORE_EXCITATION_CHIRP_H
+#define CORE_EXCITATION_CHIRP_H
+
+#include "core/excitation/excitation.h"
+
+typedef struct ExcitationChirp {
+    Excitation excitation;
+    double start_frequency, end_frequency; // [Hz]
+    double amplitude;                      // [m/s^2]
+    double sweep_time;                     // [s]
+    double rate;                           // [Hz]
+} ExcitationChirp;
+
+#endif

@@ -1,0 +1,241 @@
+// Windowed blocks of a spectrum. Block m is a sum over the bins k inside the band,
+//
+//   y_m[i] = rms / sqrt(bins) * sum_k a_mk cos(2 pi k i / B) - b_mk sin(2 pi k i / B),  0 <= i < B,
+//
+// with independent standard normal a_mk, b_mk, which the counter-based generator has at
+// (seed, stream m, index k). Blocks overlap by half and are faded by w[i] = sin(pi (i + 1/2) / B):
+//
+//   block 0     block 1     block 2
+//     \           / \         /        x[h B/2 + i] = w[B/2 + i] y_h[B/2 + i] + w[i] y_(h+1)[i]
+//       \       /     \     /
+//         \   /         \ /            for hop h and 0 <= i < B/2
+//     |   hop 0   |   hop 1   |
+//
+// As w^2[i] + w^2[i + B/2] = 1, the variance is rms^2 at every sample; and a sample depends on
+// seed, band, rate and its index only, so that a longer run begins with the same bits.
+//
+// The fade smears the band's edges: d bins outside, the density is 0.0085 / d^3 of that inside
+// (20 bins: -60 dB). A block has at least 256 bins in the band or, where B meets its limit, 8.
+// Bins 0 and B/2 are left out: no mean, and no bin with half the variance.
+#include "core/excitation/random.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/philox.h"
+#include "core/math/cosine_table.h"
+#include "core/math/sparse_spectrum_synthesis.h"
+
+#define PI 3.14159265358979323846264338328
+#define RATE_LEAST 1e-9 // [Hz]
+
+enum {
+    BLOCK_LEAST = 1 << 12,
+    BLOCK_MOST = 1 << 22,
+    BINS_WANTED = 256,
+    BINS_LEAST = 8,
+    SAMPLES_MOST = 1 << 25,
+    PART = 1 << 10, // of a block, read at once
+};
+
+// clang-format off
+static const Field random_fields[] = {
+    FIELD_BASE(ExcitationRandom, start, excitation_fields),
+    //          struct            member  unit     range                   default   meaning
+    FIELD_REALS(ExcitationRandom, band,   "Hz",    AT_LEAST(0), 2, PRESENCE_REQUIRED,
+                "[f0, f1]: the one-sided density is rms^2 / (f1 - f0) between them and none outside"),
+    FIELD_REAL(ExcitationRandom,  rms,    "m/s^2", WITHIN(0, 1e9),         REQUIRED, "rms of the base's acceleration, as a process"),
+    FIELD_COUNT(ExcitationRandom, seed,   NULL,    WITHIN(0, 0x1p53 - 1),  0,        "which of the many motions"),
+    FIELD_REAL(ExcitationRandom,  rate,   "Hz",    AT_LEAST(RATE_LEAST),   OPTIONAL, "samples of the base's acceleration per second, linear between them; sample_rate if absent"),
+    FIELD_END
+};
+// clang-format on
+
+static const ExcitationRandom *random_of(const Excitation *excitation) {
+    return (const ExcitationRandom *)(const void *)excitation;
+}
+
+RandomBlocks random_blocks(const ExcitationRandom *random) {
+    const double f0 = random->band.at[0] / random->rate, f1 = random->band.at[1] / random->rate;
+    RandomBlocks blocks = {.length = BLOCK_LEAST};
+    while (blocks.length < BLOCK_MOST && (f1 - f0) * (double)blocks.length < BINS_WANTED)
+        blocks.length *= 2;
+    const double length = (double)blocks.length;
+    const double first = fmax(ceil(f0 * length), 1);
+    const double last = fmin(floor(f1 * length), length / 2 - 1);
+    blocks.first_bin = (size_t)first;
+    blocks.bins = last < first ? 1 : (size_t)(last - first) + 1;
+    return blocks;
+}
+
+// Samples at 0 ... count - 1 reach the end of the run, which may lie a rounding beyond duration *
+// rate, and one more.
+static double sample_count(const ExcitationRandom *random, const Span *span) {
+    return floor(span->duration * random->rate * (1 + 1e-12)) + 2;
+}
+
+// Whether the rate is one to judge the band by; says so where the base would have too many samples.
+static bool check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
+                       Problem *problem) {
+    if (!(random->rate >= RATE_LEAST) || !isfinite(random->rate))
+        return false; // the row's fault, or the sample rate's
+    const size_t most = span->most != 0 && span->most < SAMPLES_MOST ? span->most : SAMPLES_MOST;
+    // The one sample past the end is not counted: a run of just the samples allowed has its base.
+    if (!isfinite(span->duration) || sample_count(random, span) - 1 <= (double)most)
+        return true;
+    char place[256], rate[32], limit[32];
+    pointer_join(place, sizeof place, pointer, "rate");
+    problem_add_real(problem, STATUS_INVALID, place, random->rate, "Hz",
+                     "must be at most %s Hz, which makes %zu samples of the base in this duration, "
+                     "is %s",
+                     text_real(limit, ((double)most - 1) / span->duration), most,
+                     text_real(rate, random->rate));
+    return false;
+}
+
+static Status random_complete(Excitation *excitation, const Span *span, const char *pointer,
+                              Problem *problem) {
+    ExcitationRandom *random = (ExcitationRandom *)(void *)excitation;
+    Status status = STATUS_OK;
+    char band[256], highest[256], limit[32], number[32];
+    pointer_join(band, sizeof band, pointer, "band");
+    pointer_index(highest, sizeof highest, band, 1);
+    if (isnan(random->rate))
+        random->rate = span->sample_rate;
+    const bool has_rate = check_rate(random, span, pointer, problem);
+    if (!has_rate)
+        status = STATUS_INVALID;
+
+    if (random->band.count != 2)
+        return problem_add(problem, STATUS_INVALID, band,
+                           "must have two entries, the lowest and the highest frequency in Hz, "
+                           "has %zu",
+                           random->band.count);
+    const double f0 = random->band.at[0], f1 = random->band.at[1];
+    if (!(f0 >= 0) || !isfinite(f0) || !isfinite(f1))
+        return STATUS_INVALID; // the row has said so
+    const double narrowest = random->rate * BINS_LEAST / BLOCK_MOST;
+    if (!(f0 < f1))
+        status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
+                                  "must be above the lowest frequency, %s Hz, is %s",
+                                  text_real(limit, f0), text_real(number, f1));
+    else if (has_rate && f1 > random->rate / 2)
+        status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
+                                  "must be at most half the rate of the base's samples, %s Hz, "
+                                  "is %s",
+                                  text_real(limit, random->rate / 2), text_real(number, f1));
+    else if (has_rate && f1 - f0 < narrowest)
+        status = problem_add_real(problem, STATUS_INVALID, band, f1 - f0, "Hz",
+                                  "must be at least %s Hz wide at this rate, is %s; a lower rate "
+                                  "allows a narrower band",
+                                  text_real(limit, narrowest), text_real(number, f1 - f0));
+    return status;
+}
+
+// Of y_m.
+static void make_block(const ExcitationRandom *random, const RandomBlocks *blocks, uint64_t m,
+                       Synthesis *synthesis) {
+    double *bin = synthesis_bins(synthesis);
+    // Half, because the transform of a real sequence adds bin k and its mirror.
+    const double scale = random->rms / sqrt((double)blocks->bins) / 2;
+    memset(bin, 0, 2 * blocks->first_bin * sizeof *bin);
+    double *inside = bin + 2 * blocks->first_bin;
+    noise_normal_pairs(random->seed, m, blocks->first_bin, blocks->bins, inside);
+    for (size_t k = 0; k < 2 * blocks->bins; k++)
+        inside[k] *= scale;
+    synthesis_run(synthesis);
+}
+
+// Fade out onto a fresh hop only after fading in onto the one before it: so many samples of either,
+// no more of the block being made than they need.
+static void fade_in(const Synthesis *synthesis, const double *fade, size_t count, double *x) {
+    double y[PART];
+    for (size_t from = 0; from < count; from += PART) {
+        const size_t many = count - from < PART ? count - from : PART;
+        synthesis_read(synthesis, from, PART, y);
+        for (size_t i = 0; i < many; i++)
+            x[from + i] += fade[from + i] * y[i];
+    }
+}
+
+static void fade_out(const Synthesis *synthesis, const double *fade, size_t hop, size_t count,
+                     double *x) {
+    double y[PART];
+    for (size_t from = 0; from < count; from += PART) {
+        const size_t many = count - from < PART ? count - from : PART;
+        synthesis_read(synthesis, hop + from, PART, y);
+        for (size_t i = 0; i < many; i++)
+            x[from + i] = fade[hop - 1 - from - i] * y[i];
+    }
+}
+
+static Status make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
+                           Synthesis *synthesis, const double *fade, const Watch *watch, Base *base,
+                           Problem *problem) {
+    const size_t hop = blocks->length / 2;
+    const size_t hops = (base->count + hop - 1) / hop;
+    for (size_t m = 0; m <= hops; m++) {
+        if (!watch_advance(watch, (double)m / (double)(hops + 1)))
+            return problem_set(problem, STATUS_CANCELLED,
+                               "stopped while the base's motion was made");
+        make_block(random, blocks, m, synthesis);
+        if (m > 0)
+            fade_in(synthesis, fade, m == hops ? base->count - (m - 1) * hop : hop,
+                    base->values + (m - 1) * hop);
+        if (m < hops)
+            fade_out(synthesis, fade, hop, m == hops - 1 ? base->count - m * hop : hop,
+                     base->values + m * hop);
+    }
+    return STATUS_OK;
+}
+
+static Status random_make(const Excitation *excitation, const Span *span, const Watch *watch,
+                          Base *base, Problem *problem) {
+    const ExcitationRandom *random = random_of(excitation);
+    *base = (Base){0};
+    if (random->rms == 0)
+        return STATUS_OK; // still
+    const double wanted = sample_count(random, span);
+    if (!(wanted >= 2 && wanted <= SAMPLES_MOST + 1))
+        return problem_set(problem, STATUS_LIMIT, "the base may have at most %d samples, not %.0f",
+                           SAMPLES_MOST, wanted);
+    const RandomBlocks blocks = random_blocks(random);
+    const size_t hop = blocks.length / 2;
+    Synthesis *synthesis =
+        synthesis_new(blocks.length, blocks.first_bin + blocks.bins, span->transforms);
+    double *fade = malloc(hop * sizeof *fade);
+    base->count = (size_t)wanted;
+    base->values = malloc(base->count * sizeof *base->values);
+    Status status;
+    if (synthesis == NULL || fade == NULL || base->values == NULL) {
+        status = problem_set(problem, STATUS_NO_MEMORY,
+                             "no memory for %zu samples of the base's motion", base->count);
+    } else {
+        base->form = BASE_SAMPLED;
+        base->interval = 1 / random->rate;
+        const double step = PI / (double)blocks.length;
+        circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
+        status = make_samples(random, &blocks, synthesis, fade, watch, base, problem);
+    }
+    free(fade);
+    synthesis_free(synthesis, span->transforms);
+    if (status != STATUS_OK)
+        base_clear(base);
+    return status;
+}
+
+static double random_interval(const Excitation *excitation) {
+    return 1 / ((const ExcitationRandom *)(const void *)excitation)->rate;
+}
+
+const ExcitationKind excitation_random = {
+    .kind = {.name = "random",
+             .doc = "band-limited Gaussian acceleration of the base, the same for the same seed",
+             .fields = random_fields,
+             .size = sizeof(ExcitationRandom)},
+    .complete = random_complete,
+    .interval = random_interval,
+    .effort = 0.06,
+    .make = random_make,
+};

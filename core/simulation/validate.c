@@ -1,0 +1,262 @@
+// What was asked, judged and completed. Three steps: the rows, what rows cannot see, and only then
+// warnings.
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/accuracy_target.h"
+#include "core/simulation/input_warnings.h"
+#include "core/simulation/channel_names.h"
+#include "core/simulation/simulation.h"
+#include "core/solve/solvers.h"
+
+enum { LABELS = 32, TITLE_BYTES = 200, SEGMENT = 4096 };
+
+// Every channel of 200 storeys and 64 dampers once, and the usual ones.
+enum { CHANNELS = 4 * STRUCTURE_STOREYS + 4 * SCENE_DAMPERS + 2 };
+
+static const char *const usual[] = {CHANNEL_USUAL, NULL};
+
+// clang-format off
+static const Field psd_fields[] = {
+    FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels of which a spectrum is wanted; usual: mean_acceleration of the top storey"),
+    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_LEAST(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
+    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_LEAST(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
+    FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
+    FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "what is taken off each segment"),
+    FIELD_END
+};
+
+static const Field output_fields[] = {
+    FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels that are sampled; with several storeys or dampers each with its number from 1, displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
+    FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
+    FIELD_FLAG(Output, impacts, true, "whether the ledger of impacts is kept; false: they are counted, and their peaks and energies summed, but not listed"),
+    FIELD_RARE_FLAG(Output, reduction, "whether the summary tells by how much the dampers lower peaks and rms; the scene without them is run beside it"),
+    FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
+    FIELD_END
+};
+
+const Field simulation_fields[] = {
+    FIELD_BASE(Simulation, scene, scene_fields),
+    FIELD_VARIANT(Simulation, accuracy, &solver_kinds, PRESENCE_DEFAULT, "how it is solved"),
+    FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "what is wanted of it"),
+    FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; changes nothing"),
+    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE | FIELD_PAIRS, "for people; change nothing"),
+    FIELD_END
+};
+
+const Field summary_fields[] = {
+    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
+    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
+    FIELD_COUNT(Summary, impacts, NULL, AT_LEAST(0), OPTIONAL, "number of impacts"),
+    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
+    FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
+    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
+    FIELD_END
+};
+
+const Field reduction_fields[] = {
+    FIELD_REAL(Reduction, peak_displacement_reduction, NULL, ANY, OPTIONAL, "1 - peak_displacement over that without dampers"),
+    FIELD_REAL(Reduction, rms_displacement_reduction, NULL, ANY, OPTIONAL, "1 - rms_displacement over that without dampers"),
+    FIELD_REAL(Reduction, peak_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - peak_acceleration over that without dampers"),
+    FIELD_REAL(Reduction, rms_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - rms_acceleration over that without dampers"),
+    FIELD_END
+};
+// clang-format on
+
+void simulation_clear(Simulation *simulation) {
+    fields_clear(simulation_fields, simulation);
+}
+
+static Status check_overlap(const SpectrumRequest *psd, Problem *problem) {
+    if (psd->segment == COUNT_ABSENT || psd->segment == 0 || psd->overlap == COUNT_ABSENT ||
+        psd->overlap < psd->segment)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/output/psd/overlap", (double)psd->overlap,
+                            "samples", "must be less than the segment, %llu samples, is %llu",
+                            (unsigned long long)psd->segment, (unsigned long long)psd->overlap);
+}
+
+// `count` is 0 where the number of samples is not known because of another fault.
+static Status complete_psd(SpectrumRequest *psd, size_t count, Warnings *warnings,
+                           Problem *problem) {
+    if (psd->channels.count == 0) {
+        psd->segment = psd->overlap = COUNT_ABSENT;
+        psd->window = psd->detrend = CHOICE_ABSENT;
+        return STATUS_OK;
+    }
+    if (psd->window == CHOICE_ABSENT)
+        psd->window = WINDOW_HANN;
+    if (psd->detrend == CHOICE_ABSENT)
+        psd->detrend = DETREND_CONSTANT;
+    TRY(check_overlap(psd, problem));
+    if (count == 0)
+        return STATUS_OK;
+    if (psd->segment == COUNT_ABSENT)
+        psd->segment = count < SEGMENT ? count : SEGMENT;
+    if (psd->segment > count) {
+        const bool is_overlap_cut = psd->overlap != COUNT_ABSENT && psd->overlap >= count;
+        TRY(warnings_add(warnings, "/output/psd/segment",
+                         "is %llu samples, more than there are: cut to %zu%s",
+                         (unsigned long long)psd->segment, count,
+                         is_overlap_cut ? ", and its overlap to half of that" : ""));
+        psd->segment = count;
+        if (is_overlap_cut)
+            psd->overlap = COUNT_ABSENT;
+    }
+    if (psd->overlap == COUNT_ABSENT)
+        psd->overlap = psd->segment / 2;
+    return check_overlap(psd, problem);
+}
+
+static Status complete_output(Simulation *simulation, size_t count, Warnings *warnings,
+                              Problem *problem) {
+    const Scene *scene = &simulation->scene;
+    Output *output = &simulation->output;
+    const Status faults[] = {
+        request_channels(scene, &output->channels, false, "/output/channels", problem),
+        request_channels(scene, &output->psd.channels, true, "/output/psd/channels", problem),
+    };
+    Status status = faults[0] != STATUS_OK ? faults[0] : faults[1];
+    // Statistics need a sample at least.
+    const double last = count > 0 ? (double)(count - 1) / scene->sample_rate : scene->duration;
+    if (scene->duration > 0 && output->statistics_from > last &&
+        isfinite(output->statistics_from)) {
+        char until[32], is[32];
+        status = problem_add_real(problem, STATUS_INVALID, "/output/statistics_from",
+                                  output->statistics_from, "s",
+                                  "must not be behind the last sample, within [0, %s] s, is %s",
+                                  text_real(until, last), text_real(is, output->statistics_from));
+    }
+    const Status psd = complete_psd(&output->psd, count, warnings, problem);
+    return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
+}
+
+// What the solver has no use for is left out.
+static Status complete_solver(Simulation *simulation, Problem *problem) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    const bool has_power_law = scene->dampers.count > 0 && law->form == CONTACT_POWER;
+    if (solver->forget_unused != NULL)
+        solver->forget_unused((Accuracy *)(void *)simulation->accuracy, has_power_law);
+    if (!solver->is_linear_only || !has_power_law)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/accuracy/solver",
+                       "%s serves linear contact and impulses, not the power law of %s: take "
+                       "exact, rk4, newmark or adaptive",
+                       solver->kind.name, law->kind.name);
+}
+
+// All modes are as many as storeys, which is what none asked for means.
+static Status complete_modes(const Simulation *simulation, Problem *problem) {
+    Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    if (accuracy->modes == COUNT_ABSENT)
+        return STATUS_OK;
+    if (accuracy->modes > storeys)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes", (double)accuracy->modes,
+                                NULL,
+                                "must be at most %zu, the structure has one mode per storey, is "
+                                "%llu",
+                                storeys, (unsigned long long)accuracy->modes);
+    if (accuracy->modes == storeys)
+        accuracy->modes = COUNT_ABSENT;
+    return STATUS_OK;
+}
+
+static Status complete_accuracy(Simulation *simulation, Problem *problem) {
+    TRY(complete_modes(simulation, problem));
+    if (aim_is_asked(simulation))
+        return aim_complete(simulation, problem);
+    // Without a target it says nothing.
+    if (simulation->accuracy->kind == &solvers[0]->kind)
+        ((AccuracyAuto *)(void *)simulation->accuracy)->metric = CHOICE_ABSENT;
+    return STATUS_OK;
+}
+
+static Status refuse_time(const Simulation *simulation, const Cost *cost,
+                          const SimulationLimits *limits, Problem *problem) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    const double most = limits->steps * SOLVER_STEP;
+    static const char told[] = "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
+    if (2 * cost->spectra > cost->steps)
+        return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
+                           ", most of it for spectra", "", most,
+                           "ask for fewer channels or less overlap");
+    if (2 * cost->base > cost->steps)
+        return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
+                           ", most of it to make the base's motion", "", most,
+                           "take fewer samples of it, or a shorter duration");
+    if (solver->cost != NULL)
+        return problem_add(problem, STATUS_INVALID, "/accuracy", told, cost->cpu_seconds, " by ",
+                           solver->kind.name, most,
+                           "take longer steps or a larger tolerance, or the solver exact");
+    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
+                            told, cost->cpu_seconds, "", "", most,
+                            cost->is_fast ? "take a shorter one; the structure or the base moves "
+                                            "many times within a sample interval"
+                                          : "take a shorter one, or fewer samples");
+}
+
+// A scene that can be told beforehand to take too much is refused at once.
+static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
+                         Problem *problem) {
+    if (limits == NULL)
+        return STATUS_OK;
+    const Cost cost = simulation_cost(simulation);
+    if (limits->steps > 0 && !(cost.steps <= limits->steps))
+        return refuse_time(simulation, &cost, limits, problem);
+    if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))
+        return problem_add_real(problem, STATUS_INVALID, "/output/channels",
+                                (double)simulation->output.channels.count, NULL,
+                                "would take about %.3g MB of memory, at most %.4g MB are allowed: "
+                                "ask for fewer channels or samples",
+                                1e-6 * cost.bytes, 1e-6 * limits->bytes);
+    return STATUS_OK;
+}
+
+// Many channels may be more than one scene's share, though each of them has few samples.
+static Status check_values(const Simulation *simulation, const SimulationLimits *limits,
+                           Problem *problem) {
+    const Output *output = &simulation->output;
+    const double samples = (double)scene_sample_count(&simulation->scene);
+    const double columns = (double)(output->channels.count + output->psd.channels.count);
+    if (limits == NULL || limits->samples == 0 ||
+        samples * columns <= (double)limits->samples * (CHANNEL_COUNT + 1))
+        return STATUS_OK;
+    return problem_add_real(
+        problem, STATUS_INVALID, "/output/channels", (double)output->channels.count, NULL,
+        "%.0f channels of %.0f samples are %.3g values, must be at most %.3g: "
+        "ask for fewer channels or samples",
+        columns, samples, samples * columns, (double)limits->samples * (CHANNEL_COUNT + 1));
+}
+
+Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
+                           Warnings *warnings, Problem *problem) {
+    const size_t most_samples = limits != NULL ? limits->samples : 0;
+    const Status rows = fields_check(simulation_fields, simulation, "", problem);
+    const Status scene = scene_complete(&simulation->scene, most_samples, problem);
+    // Faults that the caller met before are among those of the problem.
+    const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
+    const size_t count = is_sound ? scene_sample_count(&simulation->scene) : 0;
+    Status status = complete_output(simulation, count, warnings, problem);
+    TRY(rows);
+    TRY(scene);
+    if (problem_concerns(problem, ""))
+        return problem->status;
+    if (status == STATUS_OK)
+        status = check_values(simulation, limits, problem);
+    if (status == STATUS_OK)
+        status = complete_solver(simulation, problem);
+    if (status == STATUS_OK)
+        status = complete_accuracy(simulation, problem);
+    if (status == STATUS_OK)
+        status = check_cost(simulation, limits, problem);
+    if (status == STATUS_OK && warnings != NULL)
+        status = plausible_warn(simulation, warnings);
+    return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for warnings")
+                                      : status;
+}

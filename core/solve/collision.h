@@ -1,0 +1,14 @@
+// Impulses between masses that stops keep apart: what collisions do to all speeds at once. Not when
+// they happen nor what follows (frame_events.c). Used by frame_events.c.
+#ifndef CORE_SOLVE_COLLISION_H
+#define CORE_SOLVE_COLLISION_H
+
+#include "core/solve/modal_state.h"
+
+// Of all dampers with is_met, each at its `side`: finds `pressed` and changes all speeds, p and w.
+void frame_collide(Frame *frame);
+
+// N's impulses [N s], one per damper, change all speeds.
+void frame_push(Frame *frame, const double *impulses);
+
+#endif

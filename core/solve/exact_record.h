@@ -1,0 +1,30 @@
+// Writes samples into the wanted columns and sums what statistics need, sample by sample.
+// Used by the solvers.
+#ifndef CORE_SOLVE_EXACT_RECORD_H
+#define CORE_SOLVE_EXACT_RECORD_H
+
+#include "core/solve/impact_log.h"
+#include "core/solve/solver.h"
+
+typedef struct Recorder {
+    double *columns[CHANNEL_COUNT];
+    double sample_rate;
+    size_t statistics_start; // the first sample that counts
+    double base_speed;       // integral of a_g since the last sample [m/s]
+    double last_velocity;
+    double sum_displacement, sum_acceleration; // of squares
+    size_t count;
+} Recorder;
+
+void recorder_start(Recorder *recorder, const Run *run, Response *response);
+void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double base_acceleration);
+// The sums over `count` more samples, all of them where statistics count.
+void recorder_sums(Recorder *recorder, size_t count, double displacement, double acceleration);
+void recorder_finish(const Recorder *recorder, Response *response);
+
+// The base's velocity gained over a stretch [m/s].
+static inline void recorder_base(Recorder *recorder, double speed) {
+    recorder->base_speed += speed;
+}
+
+#endif

@@ -1,0 +1,382 @@
+// Small errors y = (x, v, r, w) go along with the motion. Over a stretch they follow its
+// homogeneous system; where the motion jumps or its equations change they change by what the
+// shifted event makes of them (saltation). Each stretch adds about one rounding of what it held,
+// each time with other signs that are the same in every run.
+//
+// In contact  x' = v, v' = -s + share n, r' = w, w' = s - n,  n = c w + k r.  The force jumps by c
+// w at touch and exit, and an event that comes dt = -dr / w late leaves dw - c dr behind: that is
+// what V = v - share c r, W = w + c r are, which go through touch and exit unchanged:
+//   x' = v, V' = -s + share k r, r' = W - c r, W' = s - k r,  v = V + share c r.
+// So a contact's map is exp(A T) in these, and the state does not enter.
+//
+// exp(A T) y: exp(A D) to the power of the whole number next to T / D, looked up, and for the rest,
+// at most D / 2, a short series. In contact it must be a good one: r hardly matters to the speed
+// that is left, and what the series misses of it is multiplied by the contact's rate.
+#include "core/solve/rounding_growth.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/solve/wide.h"
+
+enum { X, V, R, W, SIZE };
+
+// D times the system's rate.
+static const double SWING_STEP = 0.2, CONTACT_STEP = 0.1;
+static const double ROUNDING = DBL_EPSILON;
+
+// n steps of D and what is left.
+INLINE uint64_t divide(double length, double frequency, double step, double *rest) {
+    const double most = 4294967295; // TRUST_NEAR << TRUST_LEVELS, less 1
+    const double count = length * frequency + 0.5;
+    if (!(count < most)) {
+        *rest = 0;
+        return (uint64_t)most;
+    }
+    const int64_t n = count > 0 ? (int64_t)count : 0;
+    *rest = length - (double)n * step;
+    return (uint64_t)n;
+}
+
+static void swing_multiply(double p[2][2], double q[2][2], double out[2][2]) {
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            out[i][j] = p[i][0] * q[0][j] + p[i][1] * q[1][j];
+}
+
+// All powers up to n.
+static __attribute__((noinline)) void swing_make(TrustSwing *swing, uint64_t n) {
+    double(*const near)[2][2] = swing->near;
+    if (swing->known == 0) {
+        // A Taylor series of exp(A D): |A D| is below 0.2 in the units of the rate.
+        const double h = swing->step;
+        for (int column = 0; column < 2; column++) {
+            double x = column == 0, v = column == 1, term_x = x, term_v = v;
+            near[0][0][column] = x;
+            near[0][1][column] = v;
+            for (int i = 1; i < 12; i++) {
+                const double next = -swing->omega2 * term_x - swing->damping * term_v;
+                term_x = h / i * term_v;
+                term_v = h / i * next;
+                x += term_x;
+                v += term_v;
+            }
+            near[1][0][column] = x;
+            near[1][1][column] = v;
+        }
+        swing->known = 2;
+    }
+    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    for (; swing->known < wanted; swing->known++)
+        swing_multiply(near[swing->known - 1], near[1], near[swing->known]);
+    for (; n >> swing->levels >= TRUST_NEAR; swing->levels++) {
+        const bool is_first = swing->levels == 0;
+        double(*const last)[2] = is_first ? near[TRUST_NEAR / 2] : swing->power[swing->levels - 1];
+        swing_multiply(last, last, swing->power[swing->levels]);
+    }
+}
+
+// The structure's errors; the free mass's are the caller's.
+INLINE void swing_go(TrustSwing *swing, Four *at_x, Four *at_v, double length) {
+    double h;
+    const uint64_t n = divide(length, swing->frequency, swing->step, &h);
+    if ((int)(n % TRUST_NEAR) >= swing->known || n >> swing->levels >= TRUST_NEAR)
+        swing_make(swing, n);
+    const double half = h * h / 2;
+    Four x = *at_x, v = *at_v;
+    const Four a = -swing->omega2 * x - swing->damping * v;
+    const Four b = -swing->omega2 * v - swing->damping * a;
+    x += h * v + half * a;
+    v += h * a + half * b;
+    double(*p)[2] = swing->near[n % TRUST_NEAR];
+    *at_x = p[0][0] * x + p[0][1] * v;
+    *at_v = p[1][0] * x + p[1][1] * v;
+    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1) {
+        if ((left & 1) == 0)
+            continue;
+        p = swing->power[level];
+        x = *at_x;
+        v = *at_v;
+        *at_x = p[0][0] * x + p[0][1] * v;
+        *at_v = p[1][0] * x + p[1][1] * v;
+    }
+}
+
+typedef struct Errors {
+    Four x, v, r, w;
+} Errors;
+
+// A y in the coordinates (x, V, r, W).
+INLINE void contact_slope(const Motion *m, const Errors *y, Errors *slope) {
+    const Four v = y->v + m->share * m->contact_damping * y->r;
+    const Four push = m->omega2 * y->x + m->damping * v, spring = m->contact_omega2 * y->r;
+    slope->x = v;
+    slope->v = m->share * spring - push;
+    slope->r = y->w - m->contact_damping * y->r;
+    slope->w = push - spring;
+}
+
+static void contact_multiply(double p[4][4], double q[4][4], double out[4][4]) {
+    for (int i = 0; i < SIZE; i++)
+        for (int j = 0; j < SIZE; j++)
+            out[i][j] =
+                p[i][0] * q[0][j] + p[i][1] * q[1][j] + p[i][2] * q[2][j] + p[i][3] * q[3][j];
+}
+
+// All powers up to n.
+static __attribute__((noinline)) void contact_make(TrustContact *contact, uint64_t n) {
+    double(*const near)[4][4] = contact->near;
+    if (contact->known == 0) {
+        // A Taylor series, each lane a column.
+        _Static_assert((int)TRUST_LANES == (int)SIZE, "a lane for each column");
+        Errors term = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, slope;
+        memcpy(near[0], &term, sizeof near[0]);
+        Errors sum = term;
+        for (int i = 1; i < 12; i++) {
+            const double share = contact->step / i;
+            contact_slope(&contact->motion, &term, &slope);
+            term = (Errors){share * slope.x, share * slope.v, share * slope.r, share * slope.w};
+            sum = (Errors){sum.x + term.x, sum.v + term.v, sum.r + term.r, sum.w + term.w};
+        }
+        memcpy(near[1], &sum, sizeof near[1]);
+        contact->known = 2;
+    }
+    const int wanted = n < TRUST_NEAR ? (int)n + 1 : TRUST_NEAR;
+    for (; contact->known < wanted; contact->known++)
+        contact_multiply(near[contact->known - 1], near[1], near[contact->known]);
+    for (; n >> contact->levels >= TRUST_NEAR; contact->levels++) {
+        const bool is_first = contact->levels == 0;
+        double(*const last)[4] =
+            (is_first ? near[TRUST_NEAR / 2] : contact->power[contact->levels - 1]);
+        contact_multiply(last, last, contact->power[contact->levels]);
+    }
+}
+
+INLINE void contact_map(double p[4][4], Errors *y) {
+    const Errors from = *y;
+    y->x = (p[0][0] * from.x + p[0][1] * from.v) + (p[0][2] * from.r + p[0][3] * from.w);
+    y->v = (p[1][0] * from.x + p[1][1] * from.v) + (p[1][2] * from.r + p[1][3] * from.w);
+    y->r = (p[2][0] * from.x + p[2][1] * from.v) + (p[2][2] * from.r + p[2][3] * from.w);
+    y->w = (p[3][0] * from.x + p[3][1] * from.v) + (p[3][2] * from.r + p[3][3] * from.w);
+}
+
+INLINE void contact_go(TrustContact *contact, double (*at)[TRUST_LANES], double length) {
+    double h;
+    const uint64_t n = divide(length, contact->frequency, contact->step, &h);
+    if ((int)(n % TRUST_NEAR) >= contact->known || n >> contact->levels >= TRUST_NEAR)
+        contact_make(contact, n);
+    const double half = h * h / 2, sixth = half * h * (1.0 / 3), last = half * half * (1.0 / 6);
+    const Motion *m = &contact->motion;
+    Errors y = {FOUR(at[X]), FOUR(at[V]), FOUR(at[R]), FOUR(at[W])}, a, b, c, d;
+    contact_slope(m, &y, &a);
+    contact_slope(m, &a, &b);
+    contact_slope(m, &b, &c);
+    contact_slope(m, &c, &d);
+    y.x += (h * a.x + half * b.x) + (sixth * c.x + last * d.x);
+    y.v += (h * a.v + half * b.v) + (sixth * c.v + last * d.v);
+    y.r += (h * a.r + half * b.r) + (sixth * c.r + last * d.r);
+    y.w += (h * a.w + half * b.w) + (sixth * c.w + last * d.w);
+    contact_map(contact->near[n % TRUST_NEAR], &y);
+    for (uint64_t level = 0, left = n / TRUST_NEAR; left > 0; level++, left >>= 1)
+        if ((left & 1) != 0)
+            contact_map(contact->power[level], &y);
+    PUT_FOUR(at[X], y.x);
+    PUT_FOUR(at[V], y.v);
+    PUT_FOUR(at[R], y.r);
+    PUT_FOUR(at[W], y.w);
+}
+
+// Adds `size` to each lane, with signs of its own.
+INLINE void scatter(Trust *trust, int row, double size) {
+    static const double signs[16][TRUST_LANES] = {
+        {-1, -1, -1, -1}, {-1, -1, -1, 1}, {-1, -1, 1, -1}, {-1, -1, 1, 1},
+        {-1, 1, -1, -1},  {-1, 1, -1, 1},  {-1, 1, 1, -1},  {-1, 1, 1, 1},
+        {1, -1, -1, -1},  {1, -1, -1, 1},  {1, -1, 1, -1},  {1, -1, 1, 1},
+        {1, 1, -1, -1},   {1, 1, -1, 1},   {1, 1, 1, -1},   {1, 1, 1, 1}};
+    const double *sign = signs[trust->signs >> (60 - row * TRUST_LANES) & 15];
+    PUT_FOUR(trust->y[row], FOUR(trust->y[row]) + FOUR(sign) * size);
+}
+
+// One rounding of what a stretch of this length held, `speed` being the relative one.
+INLINE void round_off(Trust *trust, double length, const State *state) {
+    const double reach = trust->reach;
+    const double speed = fabs(state->w), own_speed = fabs(state->v);
+    const double size = fabs(state->x) + reach * own_speed;
+    // Systematic ones, of the structure's own numbers, grow for as long as it remembers.
+    const double lasting = length < trust->memory ? length : trust->memory;
+    const double own = ROUNDING * (size + lasting * trust->rate * size);
+    trust->signs = trust->signs * 6364136223846793005U + 1442695040888963407U;
+    scatter(trust, X, own);
+    scatter(trust, V, own * trust->rate);
+    scatter(trust, R, ROUNDING * speed * length);
+    scatter(trust, W,
+            ROUNDING * (speed + (trust->flying.omega2 * size + trust->flying.damping * own_speed) *
+                                    length));
+}
+
+// The end of a stretch: what it adds, and how far the estimate is now.
+INLINE void judge(Trust *trust, double time, const State *state, double largest) {
+    const double length = time - trust->time;
+    round_off(trust, length, state);
+    const double here = fabs(state->x), known = here > largest ? here : largest;
+    if (known > trust->largest)
+        trust->largest = known;
+    const Four x = FOUR(trust->y[X]), v = trust->reach * FOUR(trust->y[V]);
+    const Four square = x * x + v * v;
+    // What is not a number counts as the most.
+    const double one = square[0] <= square[1] ? square[1] : square[0];
+    const double other = square[2] <= square[3] ? square[3] : square[2];
+    const double most = one <= other ? other : one;
+    trust->worst = most <= trust->worst ? trust->worst : most;
+    const double parting = RESPONSE_PARTING * trust->largest;
+    if (isnan(trust->horizon) && !(trust->worst <= parting * parting))
+        trust->horizon = trust->time;
+    trust->is_spent = !(trust->worst < trust->largest * trust->largest) && trust->largest > 0;
+    trust->time = time;
+}
+
+void trust_start(Trust *trust, const Motion *flying, const Motion *touching, const Motion *resting,
+                 const State *state, double size, bool is_driven, double duration) {
+    const double rate = fmax(fmax(sqrt(flying->omega2), flying->damping), 1 / duration);
+    TrustSwing *const swings[2] = {&trust->flying, &trust->resting};
+    // What an earlier run of the same system has made is still right.
+    for (int i = 0; i < 2; i++) {
+        TrustSwing *swing = swings[i];
+        const double free = i == 0 ? 1 : 1 - resting->share; // M / (M + m) while the mass rests
+        const double omega2 = free * flying->omega2, damping = free * flying->damping;
+        if (swing->omega2 == omega2 && swing->damping == damping && swing->rate == rate)
+            continue;
+        swing->omega2 = omega2;
+        swing->damping = damping;
+        swing->rate = rate;
+        swing->step = SWING_STEP / rate;
+        swing->frequency = rate / SWING_STEP;
+        swing->known = swing->levels = 0;
+    }
+    for (int side = 0; side < 2; side++) {
+        const Motion *now = &touching[side], *then = &trust->touching[side].motion;
+        const double most = fmax(now->rate, rate);
+        if (then->omega2 == now->omega2 && then->damping == now->damping &&
+            then->share == now->share && then->contact_omega2 == now->contact_omega2 &&
+            then->contact_damping == now->contact_damping && then->rate == most)
+            continue;
+        trust->touching[side].motion = *now;
+        trust->touching[side].motion.rate = most;
+        trust->touching[side].step = CONTACT_STEP / most;
+        trust->touching[side].frequency = most / CONTACT_STEP;
+        trust->touching[side].known = trust->touching[side].levels = 0;
+    }
+    trust->is_wide = wide_is_at_hand();
+    trust->is_spent = false;
+    trust->time = 0;
+    trust->share = flying->share;
+    trust->rate = rate;
+    trust->reach = 1 / rate;
+    trust->memory = flying->damping > 0 ? 2 / flying->damping : duration;
+    trust->phase = is_driven ? flying->rate : rate;
+    trust->lasting = is_driven ? duration : fmin(duration, trust->memory);
+    trust->largest = fabs(state->x);
+    trust->worst = 0;
+    trust->horizon = NAN;
+    trust->signs = 0x9e3779b97f4a7c15U;
+    memset(trust->y, 0, sizeof trust->y);
+    scatter(trust, R, ROUNDING * size);
+    round_off(trust, 0, state);
+}
+
+INLINE void fly(Trust *trust, double time, const State *state, double largest) {
+    const double length = time - trust->time;
+    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
+    // The free mass goes straight on.
+    const Four speed = v + FOUR(trust->y[W]), z = x + FOUR(trust->y[R]) + length * speed;
+    swing_go(&trust->flying, &x, &v, length);
+    PUT_FOUR(trust->y[X], x);
+    PUT_FOUR(trust->y[V], v);
+    PUT_FOUR(trust->y[R], z - x);
+    PUT_FOUR(trust->y[W], speed - v);
+    judge(trust, time, state, largest);
+}
+
+INLINE void press(Trust *trust, Side side, double time, const State *state, double largest) {
+    contact_go(&trust->touching[side], trust->y, time - trust->time);
+    judge(trust, time, state, largest);
+}
+
+WIDE static void fly_wide(Trust *trust, double time, const State *state, double largest) {
+    fly(trust, time, state, largest);
+}
+
+WIDE static void press_wide(Trust *trust, Side side, double time, const State *state,
+                            double largest) {
+    press(trust, side, time, state, largest);
+}
+
+void trust_fly(Trust *trust, double time, const State *state, double largest) {
+    if (trust->is_spent)
+        return;
+    if (trust->is_wide)
+        fly_wide(trust, time, state, largest);
+    else
+        fly(trust, time, state, largest);
+}
+
+void trust_press(Trust *trust, Side side, double time, const State *state, double largest) {
+    if (trust->is_spent)
+        return;
+    if (trust->is_wide)
+        press_wide(trust, side, time, state, largest);
+    else
+        press(trust, side, time, state, largest);
+}
+
+void trust_rest(Trust *trust, double time, const State *state, double largest) {
+    if (trust->is_spent)
+        return;
+    Four x = FOUR(trust->y[X]), v = FOUR(trust->y[V]);
+    swing_go(&trust->resting, &x, &v, time - trust->time);
+    PUT_FOUR(trust->y[X], x);
+    PUT_FOUR(trust->y[V], v);
+    judge(trust, time, state, largest);
+    for (int i = 0; i < TRUST_LANES; i++)
+        trust->y[R][i] = trust->y[W][i] = 0;
+}
+
+void trust_bounce(Trust *trust, double restitution, double w, double push) {
+    if (trust->is_spent)
+        return;
+    const double gain = trust->share * (1 + restitution);
+    // s itself jumps, by what the structure's damper feels.
+    const double kick = trust->flying.damping * gain * w;
+    for (int i = 0; i < TRUST_LANES; i++) {
+        const double r = trust->y[R][i];
+        const double late = w != 0 ? -r / w : 0;
+        const double arriving = trust->y[W][i] + push * late;
+        trust->y[X][i] += gain * r;
+        trust->y[V][i] += gain * arriving + kick * late;
+        trust->y[R][i] = -restitution * r;
+        trust->y[W][i] = -restitution * arriving - (push + kick) * late;
+    }
+}
+
+void trust_stick(Trust *trust) {
+    for (int i = 0; i < TRUST_LANES; i++) {
+        trust->y[V][i] += trust->share * trust->y[W][i];
+        trust->y[R][i] = trust->y[W][i] = 0;
+    }
+}
+
+void trust_tell(const Trust *trust, Response *response) {
+    const double size = fmax(trust->largest, response->peaks.displacement);
+    double error = size > 0 ? sqrt(trust->worst) / size : trust->worst == 0 ? 0 : 1;
+    response->trust_horizon = trust->horizon;
+    // Without any event a rounded frequency still turns the phase.
+    const double drift = size > 0 ? ROUNDING * (1 + trust->phase * trust->lasting) : 0;
+    const double adrift = (RESPONSE_PARTING / ROUNDING - 1) / trust->phase;
+    if (drift > RESPONSE_PARTING && !(trust->horizon <= adrift))
+        response->trust_horizon = adrift;
+    if (drift > error)
+        error = drift;
+    response->error_estimate = error < 1 ? error : 1;
+    response->has_trust = true;
+}

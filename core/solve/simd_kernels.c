@@ -1,0 +1,46 @@
+// Products and sums are of one lane each and none are contracted, and what is summed over lanes is
+// summed in one order, so every width of vector gives the same bytes.
+#include "core/solve/simd_kernels.h"
+
+#include <stdint.h>
+
+#include "core/solve/lanes.h"
+
+enum { LARGE = 4096 };
+_Static_assert((int)LANES == (int)FRAME_LANES, "one width for both");
+
+static inline double total(const double s[LANES]) {
+    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
+// clang-format off
+#define KIND(name)                                                                                 \
+    {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
+     .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
+     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
+// clang-format on
+
+#define WIDTH 2
+#define NAME(name) name##_plain
+#define TARGET
+#include "core/solve/simd_kernels.inc"
+
+#ifdef __x86_64__
+#define WIDTH 4
+#define NAME(name) name##_avx2
+#define TARGET __attribute__((target("avx2")))
+#include "core/solve/simd_kernels.inc"
+
+#define WIDTH 8
+#define NAME(name) name##_avx512
+#define TARGET __attribute__((target("avx512f,avx512dq")))
+#include "core/solve/simd_kernels.inc"
+
+const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(avx2), KIND(avx512)};
+#else
+const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(plain), KIND(plain)};
+#endif
+
+size_t frame_lanes_widest(void) {
+    return (size_t)lanes_widest();
+}

@@ -1,0 +1,298 @@
+// Solvers tell by their own rows what they trade: a row "step" or "tolerance" makes points of them,
+// whatever the solver is called.
+#include "core/study/candidate_settings.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/simulation/impulse_variant.h"
+#include "core/solve/solvers.h"
+
+enum {
+    DECADES = 8,        // of steps at most, from the sample interval down
+    SEGMENT_LEAST = 16, // samples of a segment
+    RATES = 3,
+    SHARES = 2,
+    STOREYS_LEAST = 4, // of a structure whose modes are worth leaving out
+};
+// The finest step wanted: this part of the shortest contact, or of a radian of the fastest mode.
+static const double contact_part = 3e-3, radian_part = 1e-3;
+static const double tolerance_most = 1e-3, tolerance_least = 1e-14, tolerance_factor = 1e-2;
+static const double rate_divisors[RATES] = {2, 4, 8}; // powers of 2, so that samples coincide
+static const uint64_t spectrum_divisors[SHARES] = {4, 16};
+static const double duration_divisors[SHARES] = {2, 4};
+
+const Kind *ladder_reference(void) {
+    size_t i = 0;
+    while (solvers[i]->run == NULL)
+        i++;
+    return &solvers[i]->kind;
+}
+
+static const Field *row_of(const Kind *solver, const char *name, size_t *offset) {
+    return fields_find(solver->fields, name, offset);
+}
+
+// A point with nothing but its solver and name; NULL without memory.
+static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char *format, ...) {
+    TradeoffPoint *at = realloc(points->at, (points->count + 1) * sizeof *at);
+    if (at == NULL)
+        return NULL;
+    points->at = at;
+    TradeoffPoint *point = &at[points->count++];
+    char name[96];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(name, sizeof name, format, arguments);
+    va_end(arguments);
+    (void)fields_default(tradeoff_point_fields, point); // absent and 0: nothing to allocate
+    point->name = strdup(name);
+    point->solver = strdup(solver->name);
+    return point->name == NULL || point->solver == NULL ? NULL : point;
+}
+
+static const double pi = 3.14159265358979324;
+
+// The shortest contact that a buffer's numbers tell, about, for a free mass [s]; NAN: none.
+static double contact_time(const Buffer *buffer, double mass) {
+    double shortest = buffer->contact_time;
+    if (isnan(shortest) && buffer->stiffness > 0)
+        shortest = pi * sqrt(mass / buffer->stiffness);
+    for (size_t i = 0; i < buffer->table.count; i++)
+        shortest = fmin(shortest, buffer->table.at[i].contact_time);
+    return shortest;
+}
+
+// What the finest step is to resolve [s].
+static Status finest_step(const Simulation *simulation, double *finest) {
+    StructureRates rates;
+    TRY(structure_rates(scene_structure(&simulation->scene), &rates));
+    *finest = rates.fastest > 0 ? radian_part / rates.fastest : (double)INFINITY;
+    for (size_t i = 0; i < simulation->scene.dampers.count; i++) {
+        const Damper *damper = &simulation->scene.dampers.at[i];
+        for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
+            const Buffer *buffer = damper_buffer(damper, (Side)side);
+            *finest = fmin(*finest, contact_part * contact_time(buffer, damper->mass));
+        }
+    }
+    return STATUS_OK;
+}
+
+static bool add_steps(TradeoffPoints *points, const Kind *solver, const Simulation *simulation,
+                      double finest) {
+    double step = 1 / simulation->scene.sample_rate;
+    for (int i = 0; i < DECADES; i++, step /= 10) {
+        TradeoffPoint *point = add(points, solver, "%s, step %.4g s", solver->name, step);
+        if (point == NULL)
+            return false;
+        point->step = step;
+        if (step <= finest)
+            break;
+    }
+    return true;
+}
+
+static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Range *range) {
+    for (double tolerance = fmin(tolerance_most, range->most);
+         tolerance >= fmax(range->least, tolerance_least) * (1 - 1e-9);
+         tolerance *= tolerance_factor) {
+        TradeoffPoint *point = add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
+        if (point == NULL)
+            return false;
+        point->tolerance = tolerance;
+    }
+    return true;
+}
+
+// What may be given up without giving up exactness.
+static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const SpectrumRequest *psd = &simulation->output.psd;
+    TradeoffPoint *point;
+    for (size_t i = 0; i < RATES; i++) {
+        const double rate = scene->sample_rate / rate_divisors[i];
+        if (rate * scene->duration < SEGMENT_LEAST)
+            break;
+        if ((point = add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate)) == NULL)
+            return false;
+        point->sample_rate = rate;
+    }
+    for (size_t i = 0; i < SHARES && psd->channels.count > 0; i++) {
+        const uint64_t segment = psd->segment / spectrum_divisors[i];
+        if (segment < SEGMENT_LEAST)
+            break;
+        if ((point = add(points, solver, "%s, segments of %llu", solver->name,
+                         (unsigned long long)segment)) == NULL)
+            return false;
+        point->segment = segment;
+    }
+    for (size_t i = 0; i < SHARES && psd->channels.count > 0; i++) {
+        const double duration = scene->duration / duration_divisors[i];
+        if (duration * scene->sample_rate < (double)psd->segment)
+            break;
+        if ((point = add(points, solver, "%s, %.6g s long", solver->name, duration)) == NULL)
+            return false;
+        point->duration = duration;
+    }
+    return true;
+}
+
+// Half the modes, and half of these, down to one.
+static bool add_modes(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
+    const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
+    for (size_t modes = storeys / 2; storeys >= STOREYS_LEAST && modes > 0; modes /= 2) {
+        TradeoffPoint *point =
+            add(points, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s");
+        if (point == NULL)
+            return false;
+        point->modes = modes;
+    }
+    return true;
+}
+
+static bool has_power_law(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    return scene->dampers.count > 0 && law->form == CONTACT_POWER;
+}
+
+static bool is_asked(const TradeoffStudy *study, const char *name) {
+    bool is_named = study->solvers.count == 0;
+    for (size_t i = 0; i < study->solvers.count; i++)
+        is_named = is_named || strcmp(study->solvers.at[i], name) == 0;
+    return is_named;
+}
+
+// Whether the solver's settings change anything of this scene.
+static bool is_of_use(const Kind *kind, const Simulation *simulation) {
+    const Solver *solver = (const Solver *)(const void *)kind;
+    return solver->forget_unused == NULL || has_power_law(simulation);
+}
+
+static bool add_solver(TradeoffPoints *points, const Kind *solver, const Simulation *simulation,
+                       double finest) {
+    const Field *tolerance =
+        is_of_use(solver, simulation) ? row_of(solver, "tolerance", NULL) : NULL;
+    if (row_of(solver, "step", NULL) != NULL)
+        return add_steps(points, solver, simulation, finest);
+    if (tolerance != NULL && !add_tolerances(points, solver, &tolerance->range))
+        return false;
+    // A tolerance that may be left out is none then.
+    if (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL)
+        return true;
+    return add(points, solver, "%s", solver->name) != NULL;
+}
+
+static bool add_reference(TradeoffPoints *points, const Kind *solver,
+                          const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    if (scene->dampers.count > 0 && law->form == CONTACT_LINEAR) {
+        const char *model = contact_impulse.kind.name;
+        TradeoffPoint *point = add(points, solver, "%s, contact %s", solver->name, model);
+        if (point == NULL || (point->contact_model = strdup(model)) == NULL)
+            return false;
+    }
+    return add_modes(points, solver, simulation) && add_output(points, solver, simulation);
+}
+
+Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
+                   Problem *problem) {
+    double finest;
+    *points = (TradeoffPoints){NULL, 0};
+    bool is_whole = finest_step(simulation, &finest) == STATUS_OK;
+    for (size_t i = 0; solvers[i] != NULL && is_whole; i++)
+        if (solvers[i]->run != NULL && is_asked(study, solvers[i]->kind.name))
+            is_whole = add_solver(points, &solvers[i]->kind, simulation, finest);
+    if (is_whole && is_asked(study, ladder_reference()->name))
+        is_whole = add_reference(points, ladder_reference(), simulation);
+    return is_whole ? STATUS_OK
+                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
+}
+
+static void set_real(Variant *variant, const char *name, double value) {
+    size_t offset = 0;
+    const Field *row = row_of(variant->kind, name, &offset);
+    if (row != NULL && !isnan(value))
+        *(double *)(void *)((char *)variant + offset + row->offset) = value;
+}
+
+static void set_count(Variant *variant, const char *name, uint64_t value) {
+    size_t offset = 0;
+    const Field *row = row_of(variant->kind, name, &offset);
+    if (row != NULL && value != COUNT_ABSENT)
+        *(uint64_t *)(void *)((char *)variant + offset + row->offset) = value;
+}
+
+static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
+    const Kind *kind = kind_find(&solver_kinds, point->solver);
+    Variant *accuracy = variant_new(kind);
+    if (accuracy == NULL)
+        return STATUS_NO_MEMORY;
+    variant_free(target->accuracy);
+    target->accuracy = accuracy;
+    set_real(accuracy, "step", point->step);
+    set_real(accuracy, "tolerance", point->tolerance);
+    set_count(accuracy, "modes", point->modes);
+    return STATUS_OK;
+}
+
+// A coarser spectrum keeps its share of overlap.
+static void apply_output(const TradeoffPoint *point, Simulation *target) {
+    SpectrumRequest *psd = &target->output.psd;
+    double share = 1;
+    if (!isnan(point->sample_rate)) {
+        share = point->sample_rate / target->scene.sample_rate;
+        target->scene.sample_rate = point->sample_rate;
+    }
+    if (!isnan(point->duration))
+        target->scene.duration = point->duration;
+    if (point->segment != COUNT_ABSENT && psd->channels.count > 0)
+        share = (double)point->segment / (double)psd->segment;
+    if (psd->channels.count > 0 && share != 1) {
+        psd->segment = (uint64_t)fmax(1, floor((double)psd->segment * share));
+        psd->overlap = (uint64_t)floor((double)psd->overlap * share);
+        if (psd->overlap >= psd->segment)
+            psd->overlap = psd->segment - 1;
+    }
+    target->output.impacts = true; // errors are counted from ledgers
+    const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
+                        target->scene.sample_rate;
+    target->output.statistics_from = fmin(target->output.statistics_from, last);
+}
+
+Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
+                    const SimulationLimits *limits, Simulation *target, Problem *problem) {
+    Status status = fields_copy(simulation_fields, simulation, target);
+    if (status == STATUS_OK)
+        status = apply_solver(point, target);
+    if (status == STATUS_OK && point->contact_model != NULL)
+        status = impulses_take(target, problem);
+    if (status == STATUS_NO_MEMORY)
+        return problem_set(problem, status, "no memory for a point of the study");
+    TRY(status);
+    apply_output(point, target);
+    return simulation_complete(target, limits, NULL, problem);
+}
+
+bool ladder_has_force(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    return scene->dampers.count > 0 &&
+           dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
+}
+
+double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
+    Simulation view = *simulation; // borrows all but what the point changes
+    view.accuracy = NULL;
+    if (apply_solver(point, &view) != STATUS_OK)
+        return 0; // a guess without memory: the run will tell
+    apply_output(point, &view);
+    const double steps = simulation_cost(&view).steps;
+    variant_free(view.accuracy);
+    return steps;
+}

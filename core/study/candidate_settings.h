@@ -1,0 +1,27 @@
+// The ways that a tradeoff study tries: every solver of the table by its own step or tolerance, and
+// what else may be traded for speed. Not the runs. Used by tradeoff.c.
+#ifndef CORE_STUDY_CANDIDATE_SETTINGS_H
+#define CORE_STUDY_CANDIDATE_SETTINGS_H
+
+#include "core/study/tradeoff.h"
+
+// The solver that the others are compared with: the first of the table that runs.
+const Kind *ladder_reference(void);
+
+// The points of a completed study of a completed simulation, without numbers. Cleared by
+// fields_clear; STATUS_NO_MEMORY leaves what there is.
+Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
+                   Problem *problem);
+
+// The simulation as a point runs it, completed under `limits`. A point that cannot be is refused
+// with its faults. Cleared by simulation_clear in any case.
+Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
+                    const SimulationLimits *limits, Simulation *target, Problem *problem);
+
+// Whether contacts of the simulation have a force.
+bool ladder_has_force(const Simulation *simulation);
+
+// What a point is foretold to take, in solver steps.
+double ladder_cost(const Simulation *simulation, const TradeoffPoint *point);
+
+#endif

@@ -1,0 +1,90 @@
+// The study "compare": one scene under several contact models and separation rules. What is asked,
+// and what each came to beside the scene's own. Not how: compare_run.c makes the runs,
+// compare_variants.h lists them, result/distance.h and result/likeness.h measure. Not the metrics
+// of accuracy: those are simulation/compare.h. Used by whoever shows a table or a chart.
+#ifndef CORE_STUDY_MODEL_COMPARISON_H
+#define CORE_STUDY_MODEL_COMPARISON_H
+
+#include "core/result/spectrum_distance.h"
+#include "core/result/signal_comparison.h"
+#include "core/study/study.h"
+
+// What is asked.
+typedef struct CompareStudy {
+    Study study;
+    Texts models;      // none: the scene's own where separations are named, else all
+    Texts separations; // likewise
+    double part;       // of the reference's largest displacement, by which motions have parted
+    Reals band;        // of the spectra [Hz]; none: 99.9 % of the reference's power
+    uint64_t storey;   // that is looked at; COUNT_ABSENT until completed: the first damper's
+} CompareStudy;
+
+typedef enum CompareStatus { COMPARE_RUN, COMPARE_REFUSED, COMPARE_FAILED } CompareStatus;
+extern const char *const compare_status_names[];
+
+// What the ledger says as a whole; NAN where nothing tells it.
+typedef struct CompareContacts {
+    uint64_t resting; // intervals of persistent contact
+    double mean_duration, mean_approach_speed, largest_approach_speed, mean_restitution;
+    double energy_lost; // in all contacts [J]
+} CompareContacts;
+
+// Relative to the reference's number: 0.1 is a tenth more.
+typedef struct CompareDifferences {
+    double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
+    double impacts; // how many more
+    double peak_contact_force;
+} CompareDifferences;
+
+// When the displacements part, and whether that is the contact model's doing.
+typedef struct CompareDivergence {
+    double time;     // NAN: not within the run
+    double horizon;  // the earlier one of both; NAN: both can be trusted to the end
+    bool is_trusted; // the time is within it
+    char *why;
+} CompareDivergence;
+
+// Displacement over time, the least and the largest of each bucket of samples.
+typedef struct CompareTrace {
+    Reals minimum, maximum;
+} CompareTrace;
+
+// One variant of the scene.
+typedef struct CompareEntry {
+    char *name; // "spring_damper, zero_force"
+    char *contact_model;
+    int separation; // CHOICE_ABSENT where the model has none
+    int status;     // CompareStatus
+    char *why;      // of one that was not run to its end
+    double steps;
+    DerivedList derived;
+    Summary summary;
+    CompareContacts contacts;
+    CompareDifferences differences;
+    Distance psd;
+    Likeness displacement;
+    CompareDivergence divergence;
+    Reals density;
+    CompareTrace trace;
+} CompareEntry;
+
+typedef struct CompareEntries {
+    CompareEntry *at;
+    size_t count;
+} CompareEntries;
+
+// The answer. The first entry is the reference: the scene as it is.
+typedef struct Comparison {
+    Variant variant;
+    uint64_t storey;
+    double part;
+    char *channel, *unit;   // of the densities
+    Reals frequency;        // [Hz]
+    double trace_rate;      // buckets a second
+    uint64_t trace_samples; // in each bucket
+    CompareEntries entries;
+} Comparison;
+
+extern const Field compare_entry_fields[], compare_contacts_fields[], compare_differences_fields[];
+
+#endif

@@ -1,0 +1,99 @@
+// Tables over approach speed, other pairs of masses, and what stays the same for all impacts.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "core/contact/contact_parameters.h"
+#include "core/contact/identification.h"
+#include "core/contact/power_law.h"
+
+static ContactRow rows[] = {{0.1, 0.8, 0.03}, {0.5, 0.6, 0.02}, {2, 0.5, 0.01}};
+static const ContactNumbers table = {NAN, NAN, NAN, NAN, 1.5, {rows, 3}};
+static const ContactNumbers measured = {0.6, 0.02, NAN, NAN, 1.5, {NULL, 0}};
+
+static void assert_near(double is, double should) {
+    if (!(fabs(is - should) <= 1e-14 * fabs(should)))
+        fail_msg("%.17g should be %.17g", is, should);
+}
+
+static void a_table_is_linear_between_its_rows_and_constant_beyond(void **state) {
+    (void)state;
+    const ContactRows *at = &table.rows;
+    assert_true(contact_row(at, 0).restitution == 0.8);
+    assert_true(contact_row(at, 0.1).contact_time == 0.03);
+    assert_near(contact_row(at, 0.3).restitution, 0.7);
+    assert_near(contact_row(at, 0.3).contact_time, 0.025);
+    assert_true(contact_row(at, 0.5).restitution == 0.6);
+    assert_near(contact_row(at, 1.25).contact_time, 0.015);
+    assert_true(contact_row(at, 2).restitution == 0.5);
+    assert_true(contact_row(at, 1e9).contact_time == 0.01);
+    assert_true(contact_row(at, (double)NAN).restitution == 0.8);
+}
+
+static void a_linear_impact_takes_the_tables_values_at_its_speed(void **state) {
+    (void)state;
+    for (int rule = 0; rule < 2; rule++) {
+        const ContactStop stop = contact_prepare(&contact_spring_damper, rule, 0.1, 0.1, &table);
+        for (double speed = 0; speed < 3; speed += 0.1) {
+            const ContactRow row = contact_row(&table.rows, speed);
+            const Identified found =
+                identify_measured(0.1, row.restitution, row.contact_time, (Separation)rule);
+            const ContactParameters frozen = contact_freeze(&stop, speed);
+            assert_true(frozen.stiffness == found.stiffness && frozen.damping == found.damping);
+        }
+    }
+    const ContactStop stop = contact_prepare(&contact_impulse, 0, 0.1, 0.1, &table);
+    assert_near(contact_freeze(&stop, 0.3).restitution, 0.7);
+}
+
+static void without_a_table_all_impacts_are_alike(void **state) {
+    (void)state;
+    const ContactStop stop = contact_prepare(&contact_spring_damper, 0, 0.1, 0.1, &measured);
+    const ContactParameters slow = contact_freeze(&stop, 1e-9), fast = contact_freeze(&stop, 10);
+    assert_true(slow.stiffness == fast.stiffness && slow.damping == fast.damping);
+}
+
+// T_c = h (m / k)^(1/(n+1)) v0^(2/(n+1) - 1)
+static void a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed(void **state) {
+    (void)state;
+    const ContactStop stop = contact_prepare(&contact_hunt_crossley, 0, 0.1, 0.1, &measured);
+    const double h = power_duration(power_factor(0.6), 1.5);
+    for (double speed = 1e-6; speed < 100; speed *= 10) {
+        const ContactParameters frozen = contact_freeze(&stop, speed);
+        assert_near(h * pow(0.1 / frozen.stiffness, 0.4) * pow(speed, -0.2), 0.02);
+        assert_true(frozen.speed == speed);
+    }
+    assert_true(contact_freeze(&stop, 0).speed == CONTACT_SPEED_LEAST);
+    ContactNumbers known = measured;
+    known.contact_time = NAN;
+    known.stiffness = 1e5;
+    const ContactStop given = contact_prepare(&contact_flores, 0, 0.1, 0.1, &known);
+    assert_true(contact_freeze(&given, 0.1).stiffness == 1e5);
+    assert_true(contact_freeze(&given, 3).stiffness == 1e5);
+}
+
+static void a_rigs_parameters_are_carried_over_to_other_masses(void **state) {
+    (void)state;
+    const ContactStop stop = contact_prepare(&contact_spring_damper, 0, 0.5, 0.1, &measured);
+    const Identified there = identify_measured(0.5, 0.6, 0.02, SEPARATION_ZERO_PENETRATION);
+    const ContactParameters frozen = contact_freeze(&stop, 0.3);
+    assert_true(frozen.stiffness == there.stiffness && frozen.damping == there.damping);
+    const ContactStop hertz = contact_prepare(&contact_hertz, 0, 0.5, 0.1, &measured);
+    const ContactParameters power = contact_freeze(&hertz, 0.3);
+    assert_near(power_duration(0, 1.5) * pow(0.5 / power.stiffness, 0.4) * pow(0.3, -0.2), 0.02);
+    assert_true(power.mass == 0.1);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_table_is_linear_between_its_rows_and_constant_beyond),
+        cmocka_unit_test(a_linear_impact_takes_the_tables_values_at_its_speed),
+        cmocka_unit_test(without_a_table_all_impacts_are_alike),
+        cmocka_unit_test(a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed),
+        cmocka_unit_test(a_rigs_parameters_are_carried_over_to_other_masses),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,135 @@
+// Parts of long periods against the slow sum of their bins.
+#include "core/math/sparse_spectrum_synthesis.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/base/philox.h"
+
+typedef struct Case {
+    size_t length, bins;
+} Case;
+
+// By one transform; by a short one and sums over 8, 16, 64 and 1024 phases; and at the edges of
+// each.
+static const Case cases[] = {
+    {1 << 12, 1 << 11}, {1 << 12, 65},  {1 << 12, 64}, {1 << 15, 492},     {1 << 15, 512},
+    {1 << 15, 513},     {1 << 16, 500}, {1 << 18, 17}, {1 << 22, 40},      {1 << 22, 1},
+    {1 << 15, 256},     {1 << 15, 257}, {1 << 13, 2},  {1 << 22, 1 << 19},
+};
+
+// Of an rms of 1; the first `empty` bins are 0.
+static double *bins_of(const Case *of, size_t empty) {
+    double *bins = calloc(2 * of->bins, sizeof *bins);
+    assert_non_null(bins);
+    for (size_t k = empty; k < of->bins; k++) {
+        double normal[2];
+        noise_normal_pair(5, of->length, k, normal);
+        bins[2 * k] = normal[0] / (2 * sqrt((double)of->bins));
+        bins[2 * k + 1] = normal[1] / (2 * sqrt((double)of->bins));
+    }
+    return bins;
+}
+
+static Synthesis *synthesis_of(const Case *of, const double *bins, FourierStock *stock) {
+    Synthesis *synthesis = synthesis_new(of->length, of->bins, stock);
+    assert_non_null(synthesis);
+    memcpy(synthesis_bins(synthesis), bins, 2 * of->bins * sizeof *bins);
+    synthesis_run(synthesis);
+    return synthesis;
+}
+
+static double slow(const Case *of, const double *bins, size_t i) {
+    long double sum = 0;
+    const long double turn = 2 * acosl(-1) / (long double)of->length;
+    for (size_t k = 0; k < of->bins; k++) {
+        const long double angle = turn * (long double)(k * i % of->length);
+        sum += bins[2 * k] * cosl(angle) - bins[2 * k + 1] * sinl(angle);
+    }
+    return (double)(2 * sum);
+}
+
+static void samples_are_the_sum_of_their_bins(void **state) {
+    (void)state;
+    double *values = malloc((1 << 22) * sizeof *values);
+    assert_non_null(values);
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const Case *of = &cases[c];
+        double *bins = bins_of(of, of->bins / 3 + (of->bins > 1));
+        if (of->bins == 1)
+            bins[0] = 0.4;
+        Synthesis *synthesis = synthesis_of(of, bins, NULL);
+        synthesis_read(synthesis, 0, of->length, values);
+        const size_t looks = of->bins > 10000 ? 5 : 60;
+        for (size_t i = 0; i < looks; i++) {
+            // From both ends on, and all over.
+            const size_t at = i < 4 ? i : i < 8 ? of->length - (i - 3) : i * 7919 % of->length;
+            // k = 0 has no mirror.
+            const double wanted = slow(of, bins, at) - bins[0];
+            if (!(fabs(values[at] - wanted) < 1e-14))
+                fail_msg("%zu of %zu, %zu bins: %.17g, not %.17g", at, of->length, of->bins,
+                         values[at], wanted);
+        }
+        synthesis_free(synthesis, NULL);
+        free(bins);
+    }
+    free(values);
+}
+
+static void a_part_has_the_bits_of_the_whole(void **state) {
+    (void)state;
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const Case *of = &cases[c];
+        double *bins = bins_of(of, 0), *values = malloc(of->length * sizeof *values);
+        double part[SYNTHESIS_PART];
+        assert_non_null(values);
+        Synthesis *synthesis = synthesis_of(of, bins, NULL);
+        synthesis_read(synthesis, 0, of->length, values);
+        for (size_t from = 0; from < of->length; from += 3 * SYNTHESIS_PART) {
+            synthesis_read(synthesis, from, SYNTHESIS_PART, part);
+            assert_memory_equal(part, values + from, sizeof part);
+        }
+        synthesis_free(synthesis, NULL);
+        free(values);
+        free(bins);
+    }
+}
+
+static void a_stock_and_what_was_there_before_leave_no_trace(void **state) {
+    (void)state;
+    FourierStock stock = {0};
+    double first[SYNTHESIS_PART], again[SYNTHESIS_PART];
+    const Case *of = &cases[3];
+    double *bins = bins_of(of, 1);
+    for (int i = 0; i < 3; i++) {
+        Synthesis *synthesis = synthesis_of(of, bins, &stock);
+        synthesis_read(synthesis, 2 * SYNTHESIS_PART, SYNTHESIS_PART, i == 0 ? first : again);
+        if (i > 0)
+            assert_memory_equal(first, again, sizeof first);
+        // The bins are spoilt now; what is above them must not matter either.
+        double *spoilt = synthesis_bins(synthesis);
+        for (size_t k = 0; k < 2 * of->bins; k++)
+            spoilt[k] = 1e300;
+        synthesis_free(synthesis, &stock);
+    }
+    assert_non_null(stock.at[0]);
+    fourier_stock_clear(&stock);
+    free(bins);
+}
+
+int main(void) {
+    fourier_start();
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(samples_are_the_sum_of_their_bins),
+        cmocka_unit_test(a_part_has_the_bits_of_the_whole),
+        cmocka_unit_test(a_stock_and_what_was_there_before_leave_no_trace),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

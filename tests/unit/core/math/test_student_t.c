@@ -1,0 +1,61 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+
+#include "core/base/status.h"
+#include "core/math/student_t.h"
+
+static void assert_near(double is, double should, double most) {
+    if (!(fabs(is / should - 1) <= most))
+        fail_msg("is %.17g, should be %.17g", is, should);
+}
+
+static void quantiles_of_one_and_two_degrees_are_their_closed_forms(void **state) {
+    (void)state;
+    static const double shares[] = {1e-6, 0.1, 0.5, 0.95, 0.99, 0.9999};
+    for (size_t i = 0; i < COUNT(shares); i++) {
+        const double p = shares[i];
+        assert_near(student_quantile(p, 1), tan(3.14159265358979323846 * p / 2), 1e-11);
+        assert_near(student_quantile(p, 2), p * sqrt(2 / (1 - p * p)), 1e-11);
+    }
+}
+
+static void quantiles_are_those_of_scipy(void **state) {
+    (void)state;
+    // By scipy.special.betaincinv; scipy.stats.t.ppf misses some of them by 1e-9.
+    static const struct {
+        double share;
+        size_t freedom;
+        double quantile;
+    } known[] = {
+        {0.99, 7, 3.4994832973504932},    {0.95, 63, 1.9983405425207417},
+        {0.99, 1000, 2.5807546980658573}, {0.5, 3, 0.7648923284043452},
+        {0.999, 4, 8.610301581379272},    {0.95, 9999, 1.9602012636208985},
+        {0.99, 0, 2.5758293035489004},
+    };
+    for (size_t i = 0; i < COUNT(known); i++)
+        assert_near(student_quantile(known[i].share, known[i].freedom), known[i].quantile, 1e-12);
+}
+
+static void quantiles_are_where_the_share_is(void **state) {
+    (void)state;
+    for (size_t n = 0; n < 200; n++)
+        for (double p = 0.05; p < 1; p += 0.05)
+            assert_true(fabs(student_share(student_quantile(p, n), n) - p) < 1e-14);
+    assert_true(student_share(0, 5) == 0);
+    assert_true(student_share(1e300, 6) == 1);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(quantiles_of_one_and_two_degrees_are_their_closed_forms),
+        cmocka_unit_test(quantiles_are_those_of_scipy),
+        cmocka_unit_test(quantiles_are_where_the_share_is),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

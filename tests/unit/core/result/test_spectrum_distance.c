@@ -1,0 +1,90 @@
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "core/result/spectrum_distance.h"
+
+enum { ROWS = 101 };
+static double frequency[ROWS], wanted[ROWS], other[ROWS], half_frequency[ROWS];
+
+static Spectrum spectrum_of(double *f) {
+    return (Spectrum){.frequency = f, .densities = {.rows = ROWS}};
+}
+
+static void assert_near(double is, double should) {
+    if (!(fabs(is - should) <= 1e-12 * fmax(1, fabs(should))))
+        fail_msg("%.17g should be %.17g", is, should);
+}
+
+static void fill(void) {
+    for (size_t k = 0; k < ROWS; k++) {
+        frequency[k] = (double)k;
+        half_frequency[k] = 0.5 * (double)k;
+        wanted[k] = 1;
+        other[k] = 2;
+    }
+}
+
+static void twice_the_density_is_three_decibels_off(void **state) {
+    (void)state;
+    fill();
+    const Spectrum a = spectrum_of(frequency);
+    const Distance told = distance_measure(&a, wanted, &a, other, 10, 20);
+    assert_true(told.from == 10 && told.to == 20);
+    assert_near(told.level, 10 * log10(2));
+    assert_near(told.difference, 1);
+    assert_near(told.power, 1);
+    const Distance back = distance_measure(&a, other, &a, wanted, 10, 20);
+    assert_near(back.power, -0.5);
+    assert_near(back.level, told.level);
+}
+
+static void without_a_band_it_is_where_the_power_is(void **state) {
+    (void)state;
+    fill();
+    for (size_t k = 31; k < ROWS; k++)
+        wanted[k] = 1e-9;
+    wanted[0] = 1e9; // the mean does not count
+    const Spectrum a = spectrum_of(frequency);
+    const Distance told = distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN);
+    assert_true(told.from == 1 && told.to == 30);
+    assert_true(distance_band_end(wanted, ROWS) == 31);
+}
+
+static void a_band_ends_where_the_other_has_no_bins(void **state) {
+    (void)state;
+    fill();
+    const Spectrum a = spectrum_of(frequency), b = spectrum_of(half_frequency);
+    const Distance told = distance_measure(&a, wanted, &b, other, 40, 90);
+    assert_true(told.from == 40 && told.to == 50);
+    assert_near(told.level, 10 * log10(2));
+    assert_true(isnan(distance_measure(&a, wanted, &b, other, 60, 90).level));
+    assert_true(isnan(distance_level(&a, wanted, &b, other, 1, ROWS)));
+}
+
+static void what_has_no_power_has_no_distance(void **state) {
+    (void)state;
+    fill();
+    for (size_t k = 0; k < ROWS; k++)
+        wanted[k] = 0;
+    const Spectrum a = spectrum_of(frequency);
+    assert_true(isnan(distance_measure(&a, wanted, &a, other, (double)NAN, (double)NAN).level));
+    const Distance told = distance_measure(&a, wanted, &a, other, 1, 5);
+    assert_true(isnan(told.level) && isnan(told.power) && told.to == 5);
+    const Spectrum empty = {0};
+    assert_true(isnan(distance_measure(&empty, wanted, &a, other, 1, 5).from));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(twice_the_density_is_three_decibels_off),
+        cmocka_unit_test(without_a_band_it_is_where_the_power_is),
+        cmocka_unit_test(a_band_ends_where_the_other_has_no_bins),
+        cmocka_unit_test(what_has_no_power_has_no_distance),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

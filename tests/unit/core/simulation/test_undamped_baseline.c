@@ -1,0 +1,128 @@
+// What dampers save: the summary's numbers of two runs, one without dampers, told by one.
+#include "core/simulation/undamped_baseline.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/support/scenes.h"
+
+static Outcome *run(Simulation *simulation) {
+    Outcome *outcome = NULL;
+    Problem problem;
+    problem_clear(&problem);
+    const Status status = simulation_complete(simulation, NULL, NULL, &problem);
+    if (status != STATUS_OK)
+        print_error("%s %s\n", problem.faults[0].pointer, problem.faults[0].detail);
+    assert_int_equal(status, STATUS_OK);
+    assert_int_equal(simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem), STATUS_OK);
+    return outcome;
+}
+
+static void a_reduction_is_that_of_two_runs(void **state) {
+    (void)state;
+    Simulation with, without;
+    scene_with_damper(&with, 0.61, 0.025);
+    scene_without_damper(&without);
+    with.output.reduction = true;
+    Outcome *a = run(&with), *b = run(&without);
+    assert_true(a->has_reduction && !b->has_reduction);
+    const Reduction *reduction = &a->reduction;
+    assert_true(reduction->peak_displacement_reduction ==
+                1 - a->summary.peak_displacement / b->summary.peak_displacement);
+    assert_true(fabs(reduction->rms_displacement_reduction -
+                     (1 - a->summary.rms_displacement / b->summary.rms_displacement)) < 1e-12);
+    assert_true(reduction->rms_displacement_reduction > 0.3);
+    assert_true(fabs(reduction->rms_acceleration_reduction -
+                     (1 - a->summary.rms_acceleration / b->summary.rms_acceleration)) < 1e-12);
+    assert_true(fabs(reduction->peak_acceleration_reduction -
+                     (1 - a->summary.peak_acceleration / b->summary.peak_acceleration)) < 1e-12);
+    outcome_drop(a);
+    outcome_drop(b);
+    simulation_clear(&with);
+    simulation_clear(&without);
+}
+
+static void the_rest_is_as_without_it_and_its_cost_is_foretold(void **state) {
+    (void)state;
+    Simulation asked, plain;
+    scene_with_damper(&asked, 0.61, 0.025);
+    scene_with_damper(&plain, 0.61, 0.025);
+    asked.output.reduction = true;
+    Outcome *a = run(&asked), *b = run(&plain);
+    assert_memory_equal(a->response.series.block, b->response.series.block,
+                        a->response.series.count * a->response.series.rows * sizeof(double));
+    assert_true(a->steps > b->steps);
+    const Cost dear = simulation_cost(&asked), cheap = simulation_cost(&plain),
+               bare = bare_cost(&asked);
+    assert_true(bare.steps > 0 && dear.steps == cheap.steps + bare.steps);
+    outcome_drop(a);
+    outcome_drop(b);
+    simulation_clear(&asked);
+    simulation_clear(&plain);
+}
+
+static void where_nothing_moves_nothing_is_known(void **state) {
+    (void)state;
+    Simulation still;
+    scene_with_damper(&still, 0.61, 0.025);
+    scene_start(&still, 0, 0);
+    still.output.reduction = true;
+    Outcome *outcome = run(&still);
+    assert_true(outcome->has_reduction);
+    assert_true(isnan(outcome->reduction.peak_displacement_reduction));
+    outcome_drop(outcome);
+    simulation_clear(&still);
+}
+
+static void every_law_and_a_target_have_one(void **state) {
+    (void)state;
+    for (size_t i = 0; contacts[i] != NULL; i++) {
+        Simulation simulation;
+        // Hertz's gives all energy back.
+        scene_with_damper(&simulation, contacts[i] == &contact_hertz ? 1 : 0.61, 0.025);
+        scene_choose(&simulation.scene.contact, &contact_kinds, contacts[i]->kind.name);
+        simulation.output.reduction = true;
+        if (i == 0)
+            ((AccuracyAuto *)(void *)simulation.accuracy)->target = 1e-4;
+        Outcome *outcome = run(&simulation);
+        assert_true(outcome->has_reduction &&
+                    fabs(outcome->reduction.rms_displacement_reduction) < 1);
+        outcome_drop(outcome);
+        simulation_clear(&simulation);
+    }
+}
+
+static bool never(void *context, double fraction) {
+    (void)context;
+    return fraction < 0.8;
+}
+
+static void it_can_be_stopped(void **state) {
+    (void)state;
+    Simulation simulation;
+    Outcome *outcome = NULL;
+    const Watch watch = {NULL, never};
+    scene_with_damper(&simulation, 0.61, 0.025);
+    simulation.output.reduction = true;
+    assert_int_equal(simulation_complete(&simulation, NULL, NULL, NULL), STATUS_OK);
+    assert_int_equal(simulation_run(&simulation, NULL, &watch, NULL, &outcome, NULL),
+                     STATUS_CANCELLED);
+    assert_null(outcome);
+    simulation_clear(&simulation);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_reduction_is_that_of_two_runs),
+        cmocka_unit_test(the_rest_is_as_without_it_and_its_cost_is_foretold),
+        cmocka_unit_test(where_nothing_moves_nothing_is_known),
+        cmocka_unit_test(every_law_and_a_target_have_one),
+        cmocka_unit_test(it_can_be_stopped),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,247 @@
+// Collisions of many masses at one instant: who is pressed, who parts, and what stays the same.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "core/solve/collision.h"
+#include "tests/support/frames.h"
+
+static const Base still = {.form = BASE_STILL};
+
+typedef struct Bench {
+    Plan *plan;
+    Run run;
+    Frame frame;
+} Bench;
+
+// Two storeys of 4 and 6 kg and three masses of 1, 2 and 3 kg, the last on the first storey.
+static Bench make(double coupling) {
+    const double mass[] = {4, 6}, stiffness[] = {100, 200}, damping[] = {0, 0};
+    Bench bench = {.plan = frames_new(2, 3, 1, 100)};
+    frames_shear(bench.plan, mass, stiffness, damping);
+    bench.plan->mass[1] = bench.plan->mass[2] = coupling;
+    for (size_t d = 0; d < 3; d++)
+        frames_damper(bench.plan, d, d == 2 ? 0 : 1, 1 + (double)d, 0.1, 0.5, NAN);
+    return bench;
+}
+
+static void start(Bench *bench) {
+    bench->run = (Run){.plan = bench->plan, .base = &still};
+    assert_int_equal(frame_make(&bench->frame, &bench->run, NULL), STATUS_OK);
+}
+
+static void clear(Bench *bench) {
+    frame_clear(&bench->frame);
+    plan_free(bench->plan);
+}
+
+// Absolute momentum and kinetic energy of everything.
+static void measure(Frame *frame, double *momentum, double *energy) {
+    *momentum = 0;
+    for (size_t i = 0; i < 2; i++)
+        for (size_t j = 0; j < 2; j++)
+            *momentum += frame->plan->mass[i * 2 + j] * frame_velocity(frame, j);
+    for (size_t d = 0; d < 3; d++)
+        *momentum += frame->damper[d].plan->mass *
+                     (frame_velocity(frame, frame->damper[d].plan->storey) + frame->damper[d].w);
+    *energy = frame_energy(frame).kinetic;
+}
+
+static void hit(Frame *frame, size_t d, Side side, double speed, double restitution) {
+    FrameDamper *damper = &frame->damper[d];
+    damper->is_met = true;
+    damper->side = side;
+    damper->w = side == SIDE_RIGHT ? speed : -speed;
+    damper->closing = speed;
+    damper->parting = restitution * speed;
+}
+
+static void one_mass_takes_its_effective_mass(void **state) {
+    (void)state;
+    Bench bench = make(0);
+    start(&bench);
+    double before, after, kinetic, left;
+    hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
+    measure(&bench.frame, &before, &kinetic);
+    frame_collide(&bench.frame);
+    measure(&bench.frame, &after, &left);
+    const double m = 2 * 6 / (2 + 6.0);
+    assert_true(fabs(bench.frame.damper[1].pressed - m * 4.5) < 1e-14);
+    assert_true(fabs(bench.frame.damper[1].w + 1.5) < 1e-15);
+    assert_true(fabs(after - before) < 1e-14);
+    assert_true(fabs(kinetic - left - 0.5 * m * (9 - 2.25)) < 1e-13);
+    clear(&bench);
+}
+
+// The mass of 1 kg rests at the right stop; one of 2 kg comes from the left onto the same storey's
+// right stop: a hit to the right draws the stop away from the resting mass.
+static void a_resting_mass_is_left_behind_by_a_hit_away_from_it(void **state) {
+    (void)state;
+    Bench bench = make(0);
+    start(&bench);
+    bench.frame.damper[0].is_met = true;
+    bench.frame.damper[0].side = SIDE_RIGHT;
+    hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
+    frame_collide(&bench.frame);
+    assert_true(bench.frame.damper[0].pressed == 0);
+    assert_true(bench.frame.damper[0].w < 0); // away from its stop
+    assert_true(fabs(bench.frame.damper[1].pressed - 2 * 6 / 8.0 * 4.5) < 1e-14);
+    clear(&bench);
+}
+
+// At the left stop it is pushed along, and both bodies together take the hit.
+static void a_resting_mass_is_pushed_along_by_a_hit_towards_it(void **state) {
+    (void)state;
+    Bench bench = make(0);
+    start(&bench);
+    bench.frame.damper[0].is_met = true;
+    bench.frame.damper[0].side = SIDE_LEFT;
+    hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
+    frame_collide(&bench.frame);
+    const double m = 2 * 7 / (2 + 7.0); // of 2 kg and 6 + 1 kg
+    assert_true(fabs(bench.frame.damper[1].pressed - m * 4.5) < 1e-14);
+    assert_true(fabs(bench.frame.damper[0].pressed - m * 4.5 / 7) < 1e-14);
+    assert_true(bench.frame.damper[0].w == 0);
+    clear(&bench);
+}
+
+// Where M couples the storeys a hit on one is felt at once on the other.
+static void a_hit_is_felt_on_other_storeys_through_the_mass_matrix(void **state) {
+    (void)state;
+    Bench apart = make(0), coupled = make(1);
+    for (int i = 0; i < 2; i++) {
+        Bench *bench = i == 0 ? &apart : &coupled;
+        start(bench);
+        bench->frame.damper[2].is_met = true;
+        bench->frame.damper[2].side = SIDE_RIGHT; // at rest on the other storey
+        hit(&bench->frame, 1, SIDE_RIGHT, 3, 0.5);
+        frame_collide(&bench->frame);
+    }
+    assert_true(apart.frame.damper[2].pressed == 0 && apart.frame.damper[2].w == 0);
+    // (M^-1)_12 is negative: the other storey goes left, into its mass.
+    assert_true(coupled.frame.damper[2].pressed > 0.01 && coupled.frame.damper[2].w == 0);
+    clear(&apart);
+    clear(&coupled);
+}
+
+static uint64_t seed = 7;
+static double uniform(double a, double b) {
+    seed = seed * 6364136223846793005U + 1442695040888963407U;
+    return a + (b - a) * (double)(seed >> 11) * 0x1p-53;
+}
+
+// Pressed or parting fast enough, one of them equal; momentum kept and no energy gained.
+static void random_collisions_meet_their_conditions(void **state) {
+    (void)state;
+    for (int i = 0; i < 2000; i++) {
+        Bench bench = make(uniform(-3, 3));
+        start(&bench);
+        double before, after, kinetic, left, taken = 0, closing[3], parting[3];
+        for (size_t d = 0; d < 3; d++) {
+            const double speed = uniform(0, 1) < 0.4 ? 0 : uniform(0, 5);
+            hit(&bench.frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT, speed,
+                uniform(0, 1));
+            closing[d] = bench.frame.damper[d].closing;
+            parting[d] = bench.frame.damper[d].parting;
+        }
+        bench.frame.p[0] = uniform(-1, 1);
+        measure(&bench.frame, &before, &kinetic);
+        frame_collide(&bench.frame);
+        measure(&bench.frame, &after, &left);
+        for (size_t d = 0; d < 3; d++) {
+            const FrameDamper *damper = &bench.frame.damper[d];
+            const double away = -frame_sign(damper->side) * damper->w;
+            assert_true(damper->pressed >= 0);
+            assert_true(away >= parting[d] - 1e-13);
+            if (damper->pressed > 0)
+                assert_true(fabs(away - parting[d]) < 1e-13);
+            taken += damper->pressed * (closing[d] - parting[d]) / 2;
+        }
+        assert_true(fabs(after - before) < 1e-12);
+        assert_true(fabs(kinetic - left - taken) < 1e-11);
+        assert_true(taken >= 0);
+        clear(&bench);
+    }
+}
+
+// Masses far heavier than their storeys hardly feel a push that throws these to and fro: the
+// impulses of all are far larger than what any of them lacks.
+static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
+    (void)state;
+    for (int i = 0; i < 500; i++) {
+        Bench bench = make(0);
+        for (size_t d = 0; d < 3; d++) {
+            bench.plan->dampers[d].mass = pow(10, uniform(3, 7));
+            bench.plan->dampers[d].storey = 0;
+        }
+        start(&bench);
+        double before, after, kinetic, left, taken = 0, closing[3], size = 0;
+        for (size_t d = 0; d < 3; d++) {
+            const double speed = d > 0 && uniform(0, 1) < 0.4 ? 0 : uniform(1, 5);
+            hit(&bench.frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT, speed,
+                uniform(0, 1));
+            closing[d] = speed;
+            size += speed * bench.plan->dampers[d].mass;
+        }
+        measure(&bench.frame, &before, &kinetic);
+        frame_collide(&bench.frame);
+        measure(&bench.frame, &after, &left);
+        for (size_t d = 0; d < 3; d++)
+            taken +=
+                bench.frame.damper[d].pressed * (closing[d] - bench.frame.damper[d].parting) / 2;
+        assert_true(fabs(after - before) < 1e-8 * size);
+        assert_true(fabs(kinetic - left - taken) < 1e-8 * kinetic);
+        clear(&bench);
+    }
+}
+
+// Where all masses are heavy beside what they stand on, each impulse acts on every other one.
+static void many_heavy_masses_on_one_storey_meet_their_conditions(void **state) {
+    (void)state;
+    enum { MANY = 64 };
+    const double mass = 1, stiffness = 100, damping = 0;
+    for (int i = 0; i < 100; i++) {
+        Bench bench = {.plan = frames_new(1, MANY, 1, 100)};
+        frames_shear(bench.plan, &mass, &stiffness, &damping);
+        for (size_t d = 0; d < MANY; d++)
+            frames_damper(bench.plan, d, 0, uniform(0.5, 1) * pow(10, i % 5), 0.1, 0.5, NAN);
+        start(&bench);
+        Frame *frame = &bench.frame;
+        for (size_t d = 0; d < MANY; d++)
+            hit(frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT,
+                uniform(0, 1) < 0.4 ? 0 : uniform(0, 5), uniform(0, 1));
+        frame_collide(frame);
+        size_t pressed = 0;
+        double impulse = 0, size = 0;
+        for (size_t d = 0; d < MANY; d++) {
+            const FrameDamper *damper = &frame->damper[d];
+            assert_true(damper->pressed >= 0);
+            assert_true(-frame_sign(damper->side) * damper->w >= damper->parting - 1e-8);
+            pressed += damper->pressed > 0;
+            impulse += frame_sign(damper->side) * damper->pressed;
+            size += damper->pressed;
+        }
+        assert_true(pressed > 0 && pressed < MANY);
+        // All that the storey gets.
+        assert_true(fabs(frame->p[0] * frame->damper[0].shape[0] - impulse) < 1e-12 * size);
+        clear(&bench);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(one_mass_takes_its_effective_mass),
+        cmocka_unit_test(a_resting_mass_is_left_behind_by_a_hit_away_from_it),
+        cmocka_unit_test(a_resting_mass_is_pushed_along_by_a_hit_towards_it),
+        cmocka_unit_test(a_hit_is_felt_on_other_storeys_through_the_mass_matrix),
+        cmocka_unit_test(random_collisions_meet_their_conditions),
+        cmocka_unit_test(masses_heavier_than_their_storeys_are_no_worse),
+        cmocka_unit_test(many_heavy_masses_on_one_storey_meet_their_conditions),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,78 @@
+// The energy balance as a judge: what was gained from nowhere fails the run, what was lost does
+// not.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/solve/impact_log.h"
+
+static Problem problem;
+
+// A run that starts with 2 J and ends with `end`, of which the base gave `input`.
+static Status balance(double end, double input, double gain_most) {
+    Response response = {0};
+    Ledger ledger;
+    const EnergyState first = {1.5, 0.5}, last = {end, 0};
+    problem_clear(&problem);
+    ledger_start(&ledger, &response, 0, &first);
+    ledger.gain_most = gain_most;
+    ledger_work(&ledger, input, 0);
+    const Status status = ledger_finish(&ledger, NULL, 0, &last, &problem);
+    response_clear(&response);
+    return status;
+}
+
+static void a_gain_that_nothing_explains_fails_with_both_numbers(void **state) {
+    (void)state;
+    assert_int_equal(balance(2.5, 0, 1e-6), STATUS_UNSTABLE);
+    assert_non_null(strstr(problem.detail, "gained 0.5 J"));
+    assert_non_null(strstr(problem.detail, "largest energy, 2.5 J"));
+    assert_int_equal(balance(2 + 1e-5, 0, 1e-6), STATUS_UNSTABLE);
+}
+
+static void a_gain_from_the_base_is_explained(void **state) {
+    (void)state;
+    assert_int_equal(balance(2.5, 0.5, 1e-6), STATUS_OK);
+}
+
+static void a_loss_and_rounding_do_not_fail(void **state) {
+    (void)state;
+    assert_int_equal(balance(1, 0, 1e-6), STATUS_OK);
+    assert_int_equal(balance(2 + 1e-7, 0, 1e-6), STATUS_OK);
+}
+
+static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
+    (void)state;
+    Response response = {0};
+    Ledger ledger;
+    const EnergyState first = {2, 0}, middle = {3, 0};
+    problem_clear(&problem);
+    ledger_start(&ledger, &response, 0, &first);
+    ledger.gain_most = 1e-6;
+    assert_int_equal(ledger_status(&ledger, &problem), STATUS_OK);
+    ledger_balance(&ledger, &middle);
+    assert_int_equal(ledger_status(&ledger, &problem), STATUS_UNSTABLE);
+    assert_int_equal(ledger_finish(&ledger, NULL, 0, &first, &problem), STATUS_UNSTABLE);
+    response_clear(&response);
+}
+
+static void a_solver_that_does_not_ask_is_not_judged(void **state) {
+    (void)state;
+    assert_int_equal(balance(20, 0, 0), STATUS_OK);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_gain_that_nothing_explains_fails_with_both_numbers),
+        cmocka_unit_test(a_gain_from_the_base_is_explained),
+        cmocka_unit_test(a_loss_and_rounding_do_not_fail),
+        cmocka_unit_test(a_gain_on_the_way_fails_even_if_it_is_lost_again),
+        cmocka_unit_test(a_solver_that_does_not_ask_is_not_judged),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

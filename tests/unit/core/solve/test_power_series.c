@@ -1,0 +1,284 @@
+// The series of a contact: whose coefficients they are, how fast they fall, and how steps of them
+// end a contact of two free bodies, over the tolerance.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/solve/power_contact.h"
+#include "tests/support/frames.h"
+
+static Problem problem;
+
+// Two free bodies of 1 kg and 1 kg: m_e = 0.5 kg; k = 1, v0 = 1.
+typedef struct Pair {
+    Plan *plan;
+    Base base;
+    Run run;
+    Response response;
+    Frame frame;
+    FrameOde ode;
+} Pair;
+
+static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double factor,
+                      double tolerance) {
+    memset(pair, 0, sizeof *pair);
+    pair->plan = frames_new(1, 1, 100, 1);
+    const double mass = 1, none = 0;
+    frames_shear(pair->plan, &mass, &none, &none);
+    frames_damper(pair->plan, 0, 0, 1, 1, 0.5, NAN);
+    pair->plan->law = law;
+    pair->plan->form = CONTACT_POWER;
+    pair->run = (Run){.plan = pair->plan, .base = &pair->base};
+    assert_int_equal(frame_make(&pair->frame, &pair->run, &problem), STATUS_OK);
+    const EnergyState still = {0};
+    ledger_start(&pair->frame.ledger, &pair->response, 0, &still);
+    assert_int_equal(frame_ode_make(&pair->ode, &pair->frame, tolerance, &problem), STATUS_OK);
+    FrameDamper *damper = &pair->frame.damper[0];
+    damper->phase = FRAME_CONTACT;
+    damper->side = SIDE_RIGHT;
+    damper->origin = FRAME_FROM_RIGHT;
+    damper->r = 0;
+    damper->w = 1;
+    damper->contact = (ContactParameters){
+        .stiffness = 1, .exponent = exponent, .factor = factor, .speed = 1, .mass = 0.5};
+    ledger_open(&damper->row, IMPACT_IMPACT, 0, 0, SIDE_RIGHT, 1);
+}
+
+static void pair_clear(Pair *pair) {
+    frame_ode_clear(&pair->ode);
+    frame_clear(&pair->frame);
+    response_clear(&pair->response);
+    plan_free(pair->plan);
+}
+
+// To the contact's end; returns how many steps that took, *time how long it lasted.
+static int pair_part(Pair *pair, double *time) {
+    const Slice still = {0, 0, 0};
+    FrameOdeStep step = {0};
+    int count = 0;
+    *time = 0;
+    do {
+        frame_ode_step(&pair->ode, &still, 1e3, &step);
+        *time += step.length;
+    } while (++count < 10000 && !step.is_event);
+    assert_true(step.is_event && pair->frame.damper[0].r == 0);
+    return count;
+}
+
+// In units of the contact: two halves of 1 kg, so that lengths are larger by (1/2)^(1/(n+1)).
+static double unit_of(double exponent) {
+    return pow(0.5, 1 / (exponent + 1));
+}
+
+static void roots_make_exponents_whole(void **state) {
+    (void)state;
+    static const struct {
+        double exponent, viscous;
+        int root;
+        bool is_whole;
+    } cases[] = {{1, 1, 1, true},
+                 {2, 2, 1, true},
+                 {1.5, 1.5, 2, true},
+                 {2.5, 2.5, 2, true},
+                 {4.0 / 3, 4.0 / 3, 3, true},
+                 {1.5, 0.25, 4, true},
+                 {3, 1, 1, true},
+                 {1.37, 1.37, 4, false},
+                 {1.37, 0.185, 4, false},
+                 {9.7, 9.7, 1, false},
+                 {1.25, 1.25, 4, true}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        const ContactTerms terms = {
+            .exponent = cases[i].exponent, .viscous = 1, .viscous_exponent = cases[i].viscous};
+        SeriesLaw law;
+        series_law_make(&law, &terms);
+        assert_int_equal(law.root, cases[i].root);
+        assert_int_equal(law.is_whole, cases[i].is_whole);
+        assert_int_equal(law.power[law.pace], law.root - 1);
+        for (int k = 2; k < law.count; k++)
+            assert_int_equal(law.power[k], law.power[law.left[k]] + law.power[law.right[k]]);
+        if (law.is_whole)
+            assert_true(fabs(law.power[law.spring] - law.root * terms.exponent) < 1e-9);
+    }
+}
+
+// From the touch on, where N ~ t^(3/2) has no third derivative in time, coefficients fall as those
+// of an analytic function do: all the way at the same rate.
+static void the_motion_is_smooth_at_the_touch(void **state) {
+    (void)state;
+    Pair pair;
+    pair_make(&pair, &contact_hertz, 1.5, 0, FRAME_ODE_TOLERANCE);
+    const Slice still = {0, 0, 0};
+    FrameOdeStep step;
+    frame_ode_step(&pair.ode, &still, 1e3, &step);
+    const FrameSeries *series = &pair.ode.series;
+    const double *Y = frame_series_root(series);
+    assert_int_equal(series->root, 2);
+    // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
+    for (size_t k = 0; k <= series->degree; k++)
+        assert_true(k % 5 == 1 ? Y[k] != 0 : fabs(Y[k]) < 1e-30);
+    const double rate = Y[6] / Y[1], last = Y[21] / Y[16];
+    assert_true(fabs(last) < 2 * fabs(rate) && fabs(last) > 0.2 * fabs(rate));
+    assert_true(fabs(Y[21]) < 1e-15 * Y[1]);
+    // The exact second term: Y = tau - (2 / (5 6)) (2 / 1) tau^6 with m_e = 1/2.
+    const double tau = series->length;
+    assert_true(fabs(Y[1] / tau - 1) < 1e-15);
+    assert_true(fabs(Y[6] / (-4.0 / 30 * pow(tau, 6)) - 1) < 1e-13);
+    pair_clear(&pair);
+}
+
+static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
+    (void)state;
+    static const double exponents[] = {1, 4.0 / 3, 1.37, 1.5, 2, 2.5, 3};
+    for (size_t l = 0; contacts[l] != NULL; l++)
+        for (size_t i = 0; i < COUNT(exponents) && contacts[l]->form == CONTACT_POWER; i++) {
+            const double n = exponents[i];
+            const double factor = contacts[l]->factor != NULL ? contacts[l]->factor(0.6) : 0;
+            Pair pair;
+            double time;
+            pair_make(&pair, contacts[l], n, factor, FRAME_ODE_TOLERANCE);
+            const int steps = pair_part(&pair, &time);
+            const double e = contacts[l]->reached(factor, n),
+                         T = contacts[l]->duration(factor, n) * unit_of(n);
+            assert_true(fabs(-pair.frame.damper[0].w - e) < 3e-14);
+            assert_true(fabs(time / T - 1) < 3e-14);
+            assert_true(steps <= 45);
+            if (n == 1.5)
+                assert_true(steps <= 22);
+            pair_clear(&pair);
+        }
+}
+
+// What a contact ends with is wrong by no more than the tolerance, and looser ones are cheaper.
+static void a_contact_keeps_its_tolerance(void **state) {
+    (void)state;
+    static const double exponents[] = {1, 1.37, 1.5, 2, 3};
+    double worst = 0;
+    for (size_t l = 0; contacts[l] != NULL; l++)
+        for (size_t i = 0; i < COUNT(exponents) && contacts[l]->form == CONTACT_POWER; i++) {
+            const double n = exponents[i];
+            const double factor = contacts[l]->factor != NULL ? contacts[l]->factor(0.6) : 0;
+            const double e = contacts[l]->reached(factor, n),
+                         T = contacts[l]->duration(factor, n) * unit_of(n);
+            int last = 10000;
+            for (double tolerance = 1e-13; tolerance < 0.2; tolerance *= 100) {
+                Pair pair;
+                double time;
+                pair_make(&pair, contacts[l], n, factor, tolerance);
+                const int steps = pair_part(&pair, &time);
+                const double error = fmax(fabs(-pair.frame.damper[0].w - e), fabs(time / T - 1));
+                worst = fmax(worst, error / tolerance);
+                assert_true(error <= tolerance);
+                assert_true(steps <= last + 2);
+                last = steps;
+                pair_clear(&pair);
+            }
+            assert_true(last <= 12);
+        }
+    print_message("worst error over tolerance %.2f\n", worst);
+}
+
+// Steps of one order: halving them all takes 2^order off the error of a contact, as of any smooth
+// motion, though it begins and ends where N is not.
+static void the_order_is_whole_over_a_whole_contact(void **state) {
+    (void)state;
+    static const size_t orders[] = {8, 12};
+    for (size_t i = 0; i < COUNT(orders); i++) {
+        double error[2];
+        for (int half = 0; half < 2; half++) {
+            Pair pair;
+            double time = 0;
+            pair_make(&pair, &contact_hertz, 1.5, 0, FRAME_ODE_TOLERANCE);
+            FrameSeries *series = &pair.ode.series;
+            // By hand: equal steps in tau, each cut where Y falls to 0.
+            SeriesLaw law;
+            const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
+            const double one[1] = {1}, length = half ? 0.1 : 0.2;
+            const SeriesScale scale = {.error = 1e-300,
+                                       .per_root = 1,
+                                       .per_time = 1,
+                                       .per_speed = one,
+                                       .per_modal = one,
+                                       .order = orders[i]};
+            const Slice still = {0, 0, 0};
+            series_law_make(&law, &terms);
+            series->contacts = 1;
+            series->root = 2;
+            series->contact[0] = (SeriesContact){
+                .sign = 1, .terms = terms, .law = &law, .is_felt = true, .is_damped = true};
+            double Y = 0, s = 0;
+            for (int step = 0; step < 100 && !(s > 0); step++) {
+                double row[8];
+                (void)frame_series_make(series, &pair.frame, &still, Y, length, &scale);
+                if (root_first_crossing(frame_series_root(series), series->degree, &s))
+                    frame_series_cut(series, s);
+                frame_series_end(series, row);
+                Y = root_value(frame_series_root(series), series->degree, 1);
+                time += row[series->at_t];
+                pair.frame.damper[0].w = row[0];
+                pair.frame.q[0] = row[series->at_q];
+                pair.frame.p[0] = row[series->at_p];
+            }
+            const double T = contact_hertz.duration(0, 1.5) * unit_of(1.5);
+            error[half] = fmax(fabs(pair.frame.damper[0].w + 1), fabs(time / T - 1));
+            pair_clear(&pair);
+        }
+        const double order = log2(error[0] / error[1]);
+        print_message("order %zu: errors %.1e and %.1e, observed %.1f\n", orders[i], error[0],
+                      error[1], order);
+        assert_true(order > (double)orders[i] - 2.5);
+    }
+}
+
+// Pressed by a push that the springs of the structure stand for, from no speed at all.
+static void a_mass_without_speed_is_pressed_in(void **state) {
+    (void)state;
+    static const double exponents[] = {1, 1.37, 1.5, 2.2};
+    for (size_t i = 0; i < COUNT(exponents); i++) {
+        Pair pair;
+        pair_make(&pair, &contact_hertz, exponents[i], 0, FRAME_ODE_TOLERANCE);
+        FrameDamper *damper = &pair.frame.damper[0];
+        damper->w = 0;
+        damper->row.impact.approach_speed = 0;
+        damper->contact.speed = 1e-6;
+        damper->lean = 1e-3; // r'' = 1e-3 a_g, with a_g = 1
+        pair.frame.ground = 1;
+        const Slice push = {1, 0, 0};
+        FrameOdeStep step;
+        double time = 0, deepest = 0;
+        for (int k = 0; k < 1000 && time < 100; k++) {
+            frame_ode_step(&pair.ode, &push, 100 - time, &step);
+            assert_false(step.is_event && damper->r != 0);
+            if (step.is_event)
+                break;
+            time += step.length;
+            deepest = fmax(deepest, damper->r);
+            // It swings about where k p^n / m_e is the push: energy is kept.
+            const double p = damper->r, n = exponents[i];
+            const double held = damper->w * damper->w / 2 + 2 * pow(p, n + 1) / (n + 1);
+            const double most = 1e-3 * pow(1e-3 / 2 * (n + 1), 1 / n);
+            assert_true(fabs(held - 1e-3 * p) < 1e-13 * held + 1e-14 * most);
+        }
+        const double n = exponents[i];
+        assert_true(deepest > 0.5 * pow(1e-3 / 2 * (n + 1), 1 / n));
+        pair_clear(&pair);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(roots_make_exponents_whole),
+        cmocka_unit_test(the_motion_is_smooth_at_the_touch),
+        cmocka_unit_test(a_contact_takes_few_steps_and_ends_as_it_should),
+        cmocka_unit_test(a_contact_keeps_its_tolerance),
+        cmocka_unit_test(the_order_is_whole_over_a_whole_contact),
+        cmocka_unit_test(a_mass_without_speed_is_pressed_in),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,125 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <string.h>
+
+#include "core/study/spectrum_accumulator.h"
+
+static Problem problem;
+
+enum { RUNS = 4, ROWS = 4 };
+static const double densities[RUNS][ROWS] = {
+    {1, 2, 4, 0}, {2, 2, 1, 0}, {1.5, 5, 1, 0}, {3, 3, 3, 0}};
+static double frequency[ROWS] = {0, 1, 2, 3};
+
+static void assert_near(double is, double should) {
+    if (!(fabs(is - should) <= 1e-10 * fabs(should)))
+        fail_msg("is %.17g, should be %.17g", is, should);
+}
+
+// Two channels: the densities, and twice the mean of the four without any spread.
+static void spectrum_of(size_t run, Spectrum *spectrum) {
+    *spectrum = (Spectrum){.frequency = frequency};
+    assert_int_equal(columns_make(&spectrum->densities, 2, ROWS, 0, &problem), STATUS_OK);
+    columns_name(&spectrum->densities, 0, "displacement", "m^2/Hz");
+    columns_name(&spectrum->densities, 1, "velocity", "(m/s)^2/Hz");
+    for (size_t k = 0; k < ROWS; k++) {
+        spectrum->densities.at[0].values[k] = densities[run][k];
+        spectrum->densities.at[1].values[k] = 7;
+    }
+}
+
+static SpectraFold fold_of(size_t runs) {
+    SpectraFold fold = {0};
+    for (size_t run = 0; run < runs; run++) {
+        Spectrum spectrum;
+        spectrum_of(run, &spectrum);
+        assert_int_equal(spectra_add(&fold, &spectrum, true, &problem), STATUS_OK);
+        columns_clear(&spectrum.densities);
+    }
+    return fold;
+}
+
+static Ensemble *tell(const SpectraFold *fold) {
+    Spectrum like;
+    spectrum_of(0, &like);
+    Ensemble *answer = (Ensemble *)(void *)variant_new(study_ensemble.answer);
+    assert_non_null(answer);
+    assert_int_equal(spectra_tell(fold, &like, answer, &problem), STATUS_OK);
+    columns_clear(&like.densities);
+    return answer;
+}
+
+static void means_and_bands_are_numpys(void **state) {
+    (void)state;
+    static const double mean[] = {1.875, 3, 2.25, 0},
+                        deviation[] = {0.8539125638299665, 1.4142135623730951, 1.5, 0},
+                        low[] = {0.9084038387497005, 1.4169440865902474, 0.7788901798292007, 0},
+                        high[] = {3.8701124434247216, 6.3516973500752, 6.499632594045714, 0};
+    SpectraFold fold = fold_of(RUNS);
+    Ensemble *answer = tell(&fold);
+    assert_int_equal(answer->spectra.count, 2);
+    const EnsembleSpectrum *spectrum = &answer->spectra.at[0];
+    assert_string_equal(spectrum->channel, "displacement");
+    assert_string_equal(spectrum->unit, "m^2/Hz");
+    for (size_t k = 0; k < ROWS; k++) {
+        assert_true(answer->frequency.at[k] == frequency[k]);
+        assert_near(spectrum->mean.at[k], mean[k]);
+        assert_near(spectrum->standard_deviation.at[k], deviation[k]);
+        assert_near(spectrum->low.at[k], low[k]);
+        assert_near(spectrum->high.at[k], high[k]);
+        assert_true(answer->spectra.at[1].mean.at[k] == 7 && answer->spectra.at[1].low.at[k] == 7);
+    }
+    variant_free(&answer->variant);
+    spectra_clear(&fold);
+}
+
+static void one_run_has_a_mean_and_no_band_and_none_has_nothing(void **state) {
+    (void)state;
+    SpectraFold fold = fold_of(1);
+    Ensemble *answer = tell(&fold);
+    assert_int_equal(answer->spectra.at[0].mean.count, ROWS);
+    assert_int_equal(answer->spectra.at[0].low.count, 0);
+    variant_free(&answer->variant);
+    spectra_clear(&fold);
+    answer = tell(&fold);
+    assert_int_equal(answer->spectra.count, 0);
+    assert_int_equal(answer->frequency.count, 0);
+    variant_free(&answer->variant);
+}
+
+static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
+    (void)state;
+    SpectraFold fold = fold_of(RUNS);
+    // The second channel does not differ at all: of it nothing is known, which is the farthest.
+    assert_true(isinf(spectra_spread(&fold, 100).relative));
+    SpectraFold alone = {0};
+    for (size_t run = 0; run < RUNS; run++) {
+        Spectrum spectrum;
+        spectrum_of(run, &spectrum);
+        spectrum.densities.count = 1;
+        assert_int_equal(spectra_add(&alone, &spectrum, true, &problem), STATUS_OK);
+        spectrum.densities.count = 2;
+        columns_clear(&spectrum.densities);
+    }
+    const Spread spread = spectra_spread(&alone, 100);
+    assert_int_equal(spread.count, RUNS);
+    assert_near(spread.relative, 0.5322210623972516);
+    assert_near(spread.freedom, 2.1325742019787195);
+    spectra_clear(&alone);
+    spectra_clear(&fold);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(means_and_bands_are_numpys),
+        cmocka_unit_test(one_run_has_a_mean_and_no_band_and_none_has_nothing),
+        cmocka_unit_test(the_spread_is_that_of_the_channel_farthest_off),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
