@@ -6,37 +6,38 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-typedef struct Watch {
+typedef struct Progress {
     void *context;
     // Called every few 10,000 steps with the fraction done, 0 to 1. False asks the run to stop.
     bool (*advance)(void *context, double fraction);
-} Watch;
+} Progress;
 
-static inline bool watch_advance(const Watch *watch, double fraction) {
-    return watch == NULL || watch->advance == NULL || watch->advance(watch->context, fraction);
+static inline bool progress_advance(const Progress *progress, double fraction) {
+    return progress == NULL || progress->advance == NULL ||
+           progress->advance(progress->context, fraction);
 }
 
 // A part of a journey tells its own 0 to 1; whoever watches the whole sees the whole's, which never
 // goes back: two that go side by side may tell in turn.
-typedef struct Stage {
-    const Watch *whole;
+typedef struct ProgressRange {
+    const Progress *whole;
     double from, share;
     double furthest; // of the part, so far
-} Stage;
+} ProgressRange;
 
-static inline Stage stage_of(const Watch *whole, double from, double share) {
-    return (Stage){whole, from, share, 0};
+static inline ProgressRange progress_range(const Progress *whole, double from, double share) {
+    return (ProgressRange){whole, from, share, 0};
 }
 
-static inline bool stage_advance(void *context, double fraction) {
-    Stage *stage = context;
-    if (fraction > stage->furthest)
-        stage->furthest = fraction;
-    return watch_advance(stage->whole, stage->from + stage->share * stage->furthest);
+static inline bool progress_range_advance(void *context, double fraction) {
+    ProgressRange *range = context;
+    if (fraction > range->furthest)
+        range->furthest = fraction;
+    return progress_advance(range->whole, range->from + range->share * range->furthest);
 }
 
-static inline Watch stage_watch(Stage *stage) {
-    return (Watch){stage, stage_advance};
+static inline Progress progress_range_view(ProgressRange *range) {
+    return (Progress){range, progress_range_advance};
 }
 
 #endif

@@ -2,9 +2,9 @@
 
 #include <stdlib.h>
 
-#include "core/drop_test/readings.h"
-#include "core/drop_test/reading_statistics.h"
 #include "core/drop_test/evaluation_warnings.h"
+#include "core/drop_test/reading_statistics.h"
+#include "core/drop_test/readings.h"
 
 const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
 const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
@@ -66,23 +66,23 @@ static const Field trend_fields[] = {
     FIELD_END
 };
 
-static const Field quantity_fields[] = {
-    FIELD_COUNT(Quantity, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
-    FIELD_REAL(Quantity, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
-    FIELD_REAL(Quantity, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
-    FIELD_REAL(Quantity, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
-    FIELD_REAL(Quantity, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
-    FIELD_REAL(Quantity, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
-    FIELD_REAL(Quantity, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
-    FIELD_REAL(Quantity, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
-    FIELD_REAL(Quantity, high, NULL, ANY, OPTIONAL, "likewise"),
-    FIELD_REAL(Quantity, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
-    FIELD_REAL(Quantity, median, NULL, ANY, OPTIONAL, "the middle one"),
-    FIELD_REAL(Quantity, maximum, NULL, ANY, OPTIONAL, "the largest one"),
-    FIELD_COUNT(Quantity, outliers, NULL, AT_LEAST(0), OPTIONAL, "readings that lie far off; they are in the mean"),
-    FIELD_REAL(Quantity, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
-    FIELD_TEXT(Quantity, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
-    FIELD_ITEM(Quantity, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
+static const Field statistic_fields[] = {
+    FIELD_COUNT(Statistic, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
+    FIELD_REAL(Statistic, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
+    FIELD_REAL(Statistic, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
+    FIELD_REAL(Statistic, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
+    FIELD_REAL(Statistic, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
+    FIELD_REAL(Statistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
+    FIELD_REAL(Statistic, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
+    FIELD_REAL(Statistic, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
+    FIELD_REAL(Statistic, high, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
+    FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "the middle one"),
+    FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "the largest one"),
+    FIELD_COUNT(Statistic, outliers, NULL, AT_LEAST(0), OPTIONAL, "readings that lie far off; they are in the mean"),
+    FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
+    FIELD_TEXT(Statistic, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
+    FIELD_ITEM(Statistic, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
     FIELD_END
 };
 
@@ -90,8 +90,8 @@ const Field evaluation_fields[] = {
     FIELD_CHOICE(Evaluation, separation, separation_names, OPTIONAL, "the rule by which traces were read and gravity was taken out"),
     FIELD_REAL(Evaluation, confidence, NULL, ANY, OPTIONAL, "of the intervals"),
     FIELD_BASE(Evaluation, ranges, ranges_fields),
-    FIELD_ITEM(Evaluation, restitution, quantity_fields, NULL, PRESENCE_DEFAULT, "e [-]"),
-    FIELD_ITEM(Evaluation, contact_time, quantity_fields, NULL, PRESENCE_DEFAULT, "T_c [s]"),
+    FIELD_ITEM(Evaluation, restitution, statistic_fields, NULL, PRESENCE_DEFAULT, "e [-]"),
+    FIELD_ITEM(Evaluation, contact_time, statistic_fields, NULL, PRESENCE_DEFAULT, "T_c [s]"),
     FIELD_LIST(Evaluation, rows, row_fields, 0, PRESENCE_DEFAULT, "every reading"),
     FIELD_END
 };
@@ -139,7 +139,7 @@ static Status make_restitution(Reading *readings, Evaluation *evaluation, Proble
                                           .uncertainty = rows[i].restitution_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "restitution", "", &evaluation->restitution, problem));
+    TRY(statistic_make(readings, count, "restitution", "", &evaluation->restitution, problem));
     for (size_t i = 0; i < count; i++) {
         rows[readings[i].row].restitution_score = readings[i].score;
         rows[readings[i].row].restitution_is_outlier = readings[i].is_outlier;
@@ -156,9 +156,9 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
                                           .uncertainty = rows[i].contact_time_uncertainty,
                                           .speed = rows[i].approach_speed,
                                           .row = i};
-    TRY(quantity_make(readings, count, "contact time", " s", &evaluation->contact_time, problem));
+    TRY(statistic_make(readings, count, "contact time", " s", &evaluation->contact_time, problem));
     // The fit of a single pulse knows its interval better than two deviations tell it.
-    Quantity *of = &evaluation->contact_time;
+    Statistic *of = &evaluation->contact_time;
     const EvaluationRow *only = count == 1 ? &rows[readings[0].row] : NULL;
     if (only != NULL && only->contact_time_by == CONTACT_TIME_BY_PULSE &&
         !isnan(only->least_contact_time) && !isnan(only->most_contact_time)) {
@@ -190,14 +190,14 @@ static Status check_size(const Measurement *tests, size_t count, Problem *proble
 }
 
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       const Watch *watch, Evaluation *evaluation, Problem *problem) {
+                       const Progress *progress, Evaluation *evaluation, Problem *problem) {
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
                                .ranges = ranges_unknown};
     TRY(check_size(tests, count, problem));
     for (size_t i = 0; i < count; i++)
-        TRY(rows_add(&tests[i], i, watch, evaluation, problem));
-    TRY(rows_unpull(tests, count, watch, evaluation, problem));
+        TRY(rows_add(&tests[i], i, progress, evaluation, problem));
+    TRY(rows_unpull(tests, count, progress, evaluation, problem));
     choose_restitutions(evaluation);
     for (size_t i = 0; i < evaluation->rows.count; i++)
         if (row_counts(&evaluation->rows.at[i]))

@@ -73,7 +73,7 @@ typedef struct Trend {
 } Trend;
 
 // e or T_c over all readings that count.
-typedef struct Quantity {
+typedef struct Statistic {
     uint64_t count;
     double mean;            // weighted where the readings state their uncertainties
     double unweighted_mean; // of the readings as they are
@@ -88,7 +88,7 @@ typedef struct Quantity {
     double mean_without_outliers; // NAN: there are none
     char *why;                    // how the interval was made, or why there is none
     Trend trend;
-} Quantity;
+} Statistic;
 
 // Over which rows that count something was measured; NAN: not known.
 typedef struct Ranges {
@@ -99,7 +99,7 @@ typedef struct Ranges {
 typedef struct Evaluation {
     int separation; // Separation: the rule by which traces were read
     double confidence;
-    Quantity restitution, contact_time;
+    Statistic restitution, contact_time;
     EvaluationRows rows;
     Ranges ranges;     // of all rows that count
     Warnings warnings; // pointers lead into the tests: "/drops/2"
@@ -111,11 +111,11 @@ extern const Field evaluation_fields[]; // without the warnings
 size_t evaluation_samples(const Measurement *tests, size_t count);
 
 // `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
-// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `watch` (NULL: nobody), asked
+// STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `progress` (NULL: nobody), asked
 // before each contact and each drop that gravity is taken out of, says so. Cleared by
 // evaluation_clear in any case.
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       const Watch *watch, Evaluation *evaluation, Problem *problem);
+                       const Progress *progress, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
 
 bool row_counts(const EvaluationRow *row); // at least one of e and T_c

@@ -1,8 +1,8 @@
 // The line has the weights of the mean. Its slope over its standard error is Student's t.
 #include "core/drop_test/evaluation_trend.h"
 
-#include "core/math/student_t.h"
 #include "core/base/text_format.h"
+#include "core/math/student_t.h"
 
 static const double significance = 0.05;
 static const double speeds_alike = 0.1; // of their mean: a span that shows no trend
@@ -65,7 +65,7 @@ static bool say_trend(const char *name, const char *unit, double mean, Trend *tr
 }
 
 bool trend_make(const Reading *readings, size_t count, const char *name, const char *unit,
-                Quantity *quantity) {
+                Statistic *quantity) {
     const Line line = line_fit(readings, count);
     Trend *trend = &quantity->trend;
     trend->count = line.count;

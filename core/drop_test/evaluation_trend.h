@@ -21,6 +21,6 @@ Line line_fit(const Reading *readings, size_t count);
 // Fills the trend of a quantity whose mean is known, of readings that have their weights. False
 // without memory.
 bool trend_make(const Reading *readings, size_t count, const char *name, const char *unit,
-                Quantity *quantity);
+                Statistic *quantity);
 
 #endif

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/drop_test/readings.h"
 #include "core/drop_test/evaluation_same.h"
 #include "core/drop_test/gravity_correction.h"
+#include "core/drop_test/readings.h"
 
 enum { OUTLIERS_TOLD = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
@@ -166,7 +166,7 @@ static Status warn_of_doubt(Evaluation *evaluation) {
 }
 
 static Status warn_of_outlier(const EvaluationRow *row, const char *name, double value,
-                              double score, const Quantity *of, Evaluation *evaluation) {
+                              double score, const Statistic *of, Evaluation *evaluation) {
     char pointer[POINTER_SIZE];
     row_pointer(row, pointer, sizeof pointer);
     return warnings_add(&evaluation->warnings, pointer,

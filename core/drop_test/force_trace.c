@@ -384,7 +384,7 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK) {
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
-            if (!watch_advance(way->watch, (double)i / (double)found.count)) {
+            if (!progress_advance(way->progress, (double)i / (double)found.count)) {
                 status = STATUS_CANCELLED;
                 break;
             }

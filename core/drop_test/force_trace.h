@@ -21,7 +21,7 @@ typedef struct TraceWay {
     double effective_mass;
     const double *approach_speeds;
     size_t approach_speed_count;
-    const Watch *watch; // asked before each contact whether to go on; NULL: nobody watches
+    const Progress *progress; // asked before each contact whether to go on; NULL: nobody watches
 } TraceWay;
 
 // Where a contact is in its trace, as it is shown and drawn. What is not known is NAN.

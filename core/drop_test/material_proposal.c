@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/reading_statistics.h"
 #include "core/base/text_format.h"
+#include "core/drop_test/reading_statistics.h"
 
 const char *const proposal_form_names[] = {"constant", "table", NULL};
 
@@ -135,7 +135,7 @@ static bool is_by_pulse(const Behind *behind) {
 
 static Status take_constant(Evaluation *evaluation, Behind *behind, Proposal *proposal) {
     Material *material = &proposal->material;
-    const Quantity *e = &evaluation->restitution, *T = &evaluation->contact_time;
+    const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
         return sentence(&proposal->why,
                         "no reading that counts tells the restitution: a revision needs one; take "
@@ -228,11 +228,11 @@ static Status fold(const Behind *behind, const Bin *bin, bool is_time, Reading *
                 .speed = row->approach_speed,
             };
     }
-    Quantity quantity;
-    const Status status = quantity_make(readings, count, "reading", "", &quantity, NULL);
+    Statistic quantity;
+    const Status status = statistic_make(readings, count, "reading", "", &quantity, NULL);
     *mean = quantity.mean;
     *deviation = quantity.spread;
-    quantity_clear(&quantity);
+    statistic_clear(&quantity);
     return status;
 }
 

@@ -13,9 +13,9 @@
 
 #include <stdlib.h>
 
-#include "core/math/student_t.h"
-#include "core/drop_test/evaluation_trend.h"
 #include "core/base/text_format.h"
+#include "core/drop_test/evaluation_trend.h"
+#include "core/math/student_t.h"
 
 static const double rounding = 1e-12;    // of a mean: no spread at all
 static const double implausible = 0.001; // the chance of so little spread
@@ -84,7 +84,7 @@ static double weigh(Reading *readings, size_t count, double scatter) {
 }
 
 // Fills the weights where there are any.
-static void make_weights(Reading *readings, size_t count, Quantity *quantity) {
+static void make_weights(Reading *readings, size_t count, Statistic *quantity) {
     bool is_weighted = count >= WEIGHTED_LEAST;
     for (size_t i = 0; i < count; i++)
         is_weighted = is_weighted && readings[i].uncertainty > 0;
@@ -135,7 +135,7 @@ static double stated_error(const Reading *readings, size_t count) {
     return sqrt(squares) / sum > 0 ? sqrt(squares) / sum : (double)NAN;
 }
 
-static bool make_interval(const Reading *readings, size_t count, Quantity *quantity) {
+static bool make_interval(const Reading *readings, size_t count, Statistic *quantity) {
     const double stated = stated_error(readings, count);
     const double mean = quantity->mean;
     double t = student_quantile(EVALUATION_CONFIDENCE, 0), sum = 0;
@@ -181,7 +181,7 @@ static bool make_interval(const Reading *readings, size_t count, Quantity *quant
 }
 
 // Distances from the median, or where a trend is shown from its line.
-static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
+static bool find_outliers(Reading *readings, size_t count, Statistic *quantity) {
     double *values = calloc(2 * count, sizeof *values);
     if (values == NULL)
         return false;
@@ -216,7 +216,7 @@ static bool find_outliers(Reading *readings, size_t count, Quantity *quantity) {
     return true;
 }
 
-static bool make_spread(const Reading *readings, size_t count, Quantity *quantity) {
+static bool make_spread(const Reading *readings, size_t count, Statistic *quantity) {
     double *sorted = calloc(count, sizeof *sorted), squares = 0;
     if (sorted == NULL)
         return false;
@@ -234,16 +234,16 @@ static bool make_spread(const Reading *readings, size_t count, Quantity *quantit
     return true;
 }
 
-void quantity_clear(Quantity *quantity) {
+void statistic_clear(Statistic *quantity) {
     free(quantity->why);
     free(quantity->trend.detail);
-    *quantity = (Quantity){.why = NULL};
+    *quantity = (Statistic){.why = NULL};
 }
 
-Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
-                     Quantity *quantity, Problem *problem) {
+Status statistic_make(Reading *readings, size_t count, const char *name, const char *unit,
+                      Statistic *quantity, Problem *problem) {
     const double none = (double)NAN;
-    *quantity = (Quantity){
+    *quantity = (Statistic){
         .count = count,
         .mean = none,
         .unweighted_mean = none,

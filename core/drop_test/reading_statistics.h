@@ -15,9 +15,9 @@ typedef struct Reading {
 
 // Fills `quantity`, which may be uninitialised, and weighs, scores and marks the readings. `name`
 // and `unit` stand in sentences ("contact time", " s"). STATUS_NO_MEMORY.
-Status quantity_make(Reading *readings, size_t count, const char *name, const char *unit,
-                     Quantity *quantity, Problem *problem);
+Status statistic_make(Reading *readings, size_t count, const char *name, const char *unit,
+                      Statistic *quantity, Problem *problem);
 
-void quantity_clear(Quantity *quantity);
+void statistic_clear(Statistic *quantity);
 
 #endif

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/gravity_correction.h"
 #include "core/base/text_format.h"
+#include "core/drop_test/gravity_correction.h"
 #include "core/scene/material.h"
 
 static bool has(double value) {
@@ -170,7 +170,7 @@ static Status add_silent(const Measurement *of, size_t index, size_t i, const ch
                : no_memory(problem);
 }
 
-static Status add_trace(const Measurement *of, size_t index, size_t i, const Watch *watch,
+static Status add_trace(const Measurement *of, size_t index, size_t i, const Progress *progress,
                         Evaluation *evaluation, Problem *problem) {
     const DropTest *test = of->test;
     const Trace *trace = &test->traces.at[i];
@@ -181,7 +181,7 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, const Wat
         .gravity = test->gravity > 0 ? test->gravity : 0,
         .approach_speeds = trace->approach_speed.at,
         .approach_speed_count = trace->approach_speed.count,
-        .watch = watch,
+        .progress = progress,
     };
     char place[sizeof((Fault){0}.pointer)], pointer[sizeof((Fault){0}.pointer)];
     row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i}, place,
@@ -201,12 +201,12 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, const Wat
     return status;
 }
 
-Status rows_add(const Measurement *of, size_t index, const Watch *watch, Evaluation *evaluation,
-                Problem *problem) {
+Status rows_add(const Measurement *of, size_t index, const Progress *progress,
+                Evaluation *evaluation, Problem *problem) {
     for (size_t i = 0; i < of->test->drops.count; i++)
         TRY(add_drop(of, index, i, evaluation, problem));
     for (size_t i = 0; i < of->test->traces.count; i++)
-        TRY(add_trace(of, index, i, watch, evaluation, problem));
+        TRY(add_trace(of, index, i, progress, evaluation, problem));
     return STATUS_OK;
 }
 
@@ -291,13 +291,13 @@ static Status unpull_one(const Pull *pull, double restitution, double contact_ti
     return STATUS_OK;
 }
 
-Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
+Status rows_unpull(const Measurement *tests, size_t count, const Progress *progress,
                    Evaluation *evaluation, Problem *problem) {
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         EvaluationRow *row = &evaluation->rows.at[i];
         if (!is_pulled(tests, row) || !has(row->restitution) || !has(row->contact_time))
             continue;
-        if (!watch_advance(watch, 1))
+        if (!progress_advance(progress, 1))
             return STATUS_CANCELLED;
         const Pull pull = pull_of(tests, row, evaluation->separation);
         TRY(unpull(&pull, row, problem));
@@ -310,7 +310,7 @@ Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
             if (row->test != test || !is_pulled(tests, row) ||
                 (has(row->restitution) && has(row->contact_time)))
                 continue;
-            if (!watch_advance(watch, 1))
+            if (!progress_advance(progress, 1))
                 return STATUS_CANCELLED;
             const Pull pull = pull_of(tests, row, evaluation->separation);
             TRY(unpull_one(&pull, restitution, contact_time, row, problem));

@@ -7,13 +7,13 @@
 #include "core/drop_test/evaluation.h"
 
 // Appends the rows of test `index` of those given. Ends as evaluation_make does.
-Status rows_add(const Measurement *of, size_t index, const Watch *watch, Evaluation *evaluation,
-                Problem *problem);
+Status rows_add(const Measurement *of, size_t index, const Progress *progress,
+                Evaluation *evaluation, Problem *problem);
 
 // Takes gravity out of all drops whose test says what pulls; traces have had it taken out by their
 // fit. A drop that tells only one of e and T_c borrows the mean of the other from the readings of
 // its test that are free of gravity.
-Status rows_unpull(const Measurement *tests, size_t count, const Watch *watch,
+Status rows_unpull(const Measurement *tests, size_t count, const Progress *progress,
                    Evaluation *evaluation, Problem *problem);
 
 // The place of a row in what was given: "/drops/2", or "/measurements/3/traces/0".

@@ -86,7 +86,7 @@ static double chirp_lasts(const Excitation *excitation) {
     return chirp_of(excitation)->sweep_time;
 }
 
-static Status chirp_make(const Excitation *excitation, const Span *span, const Watch *watch,
+static Status chirp_make(const Excitation *excitation, const Span *span, const Progress *progress,
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
     *base = (Base){0};
@@ -103,7 +103,7 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const W
     const long double climb = (f1 - f0) / chirp->sweep_time;
     const double bend = (double)(2 * PI * climb), share = interval * interval / 12;
     for (size_t i = 0; i < count; i++) {
-        if (i % KNOTS_WATCHED == 0 && !watch_advance(watch, (double)i / (double)count)) {
+        if (i % KNOTS_WATCHED == 0 && !progress_advance(progress, (double)i / (double)count)) {
             free(values);
             return problem_set(problem, STATUS_CANCELLED,
                                "stopped while the base's motion was made");

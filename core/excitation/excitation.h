@@ -41,9 +41,9 @@ typedef struct ExcitationKind {
     double (*lasts)(const Excitation *excitation);
     double effort; // of making one of them, in solver steps
     // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
-    // `watch` says so.
-    Status (*make)(const Excitation *excitation, const Span *span, const Watch *watch, Base *base,
-                   Problem *problem);
+    // `progress` says so.
+    Status (*make)(const Excitation *excitation, const Span *span, const Progress *progress,
+                   Base *base, Problem *problem);
     // Adds what is allowed but hardly meant to `doubts`, below `pointer`. NULL: nothing to doubt.
     void (*doubt)(const Excitation *excitation, const Span *span, const char *pointer,
                   Problem *doubts);

@@ -3,11 +3,11 @@
 
 #include "core/excitation/excitation.h"
 
-static Status free_make(const Excitation *excitation, const Span *span, const Watch *watch,
+static Status free_make(const Excitation *excitation, const Span *span, const Progress *progress,
                         Base *base, Problem *problem) {
     (void)excitation;
     (void)span;
-    (void)watch;
+    (void)progress;
     (void)problem;
     memset(base, 0, sizeof *base);
     return STATUS_OK;

@@ -1,10 +1,10 @@
 // A half-sine pulse of the base: a_g = amplitude * sin(pi (t - start) / length) while it lasts.
 #include "core/excitation/pulse_common.h"
 
-static Status half_sine_make(const Excitation *excitation, const Span *span, const Watch *watch,
-                             Base *base, Problem *problem) {
+static Status half_sine_make(const Excitation *excitation, const Span *span,
+                             const Progress *progress, Base *base, Problem *problem) {
     (void)span;
-    (void)watch;
+    (void)progress;
     (void)problem;
     const ExcitationPulse *pulse = pulse_of(excitation);
     *base = (Base){.form = BASE_PIECES,

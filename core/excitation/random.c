@@ -171,12 +171,12 @@ static void fade_out(const Synthesis *synthesis, const double *fade, size_t hop,
 }
 
 static Status make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
-                           Synthesis *synthesis, const double *fade, const Watch *watch, Base *base,
-                           Problem *problem) {
+                           Synthesis *synthesis, const double *fade, const Progress *progress,
+                           Base *base, Problem *problem) {
     const size_t hop = blocks->length / 2;
     const size_t hops = (base->count + hop - 1) / hop;
     for (size_t m = 0; m <= hops; m++) {
-        if (!watch_advance(watch, (double)m / (double)(hops + 1)))
+        if (!progress_advance(progress, (double)m / (double)(hops + 1)))
             return problem_set(problem, STATUS_CANCELLED,
                                "stopped while the base's motion was made");
         make_block(random, blocks, m, synthesis);
@@ -190,7 +190,7 @@ static Status make_samples(const ExcitationRandom *random, const RandomBlocks *b
     return STATUS_OK;
 }
 
-static Status random_make(const Excitation *excitation, const Span *span, const Watch *watch,
+static Status random_make(const Excitation *excitation, const Span *span, const Progress *progress,
                           Base *base, Problem *problem) {
     const ExcitationRandom *random = random_of(excitation);
     *base = (Base){0};
@@ -216,7 +216,7 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
         base->interval = 1 / random->rate;
         const double step = PI / (double)blocks.length;
         circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
-        status = make_samples(random, &blocks, synthesis, fade, watch, base, problem);
+        status = make_samples(random, &blocks, synthesis, fade, progress, base, problem);
     }
     free(fade);
     synthesis_free(synthesis, span->transforms);

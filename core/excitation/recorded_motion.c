@@ -124,10 +124,10 @@ static Status record_complete(Excitation *excitation, const Span *span, const ch
     return STATUS_OK;
 }
 
-static Status record_make(const Excitation *excitation, const Span *span, const Watch *watch,
+static Status record_make(const Excitation *excitation, const Span *span, const Progress *progress,
                           Base *base, Problem *problem) {
     (void)span;
-    (void)watch;
+    (void)progress;
     const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
     const Reals *samples = record_samples(record);
     memset(base, 0, sizeof *base);

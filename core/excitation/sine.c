@@ -4,7 +4,7 @@
 
 #include "core/excitation/sine.h"
 
-static const char *const quantity_names[] = {
+static const char *const statistic_names[] = {
     [SINE_ACCELERATION] = "acceleration", [SINE_DISPLACEMENT] = "displacement", NULL};
 
 // clang-format off
@@ -12,7 +12,7 @@ static const Field sine_fields[] = {
     FIELD_BASE(ExcitationSine, excitation, excitation_fields),
     FIELD_REAL(ExcitationSine, frequency, "Hz", ABOVE(0), REQUIRED, "frequency of the base's motion"),
     FIELD_REAL(ExcitationSine, amplitude, "m/s^2 or m", ANY, REQUIRED, "amplitude of the quantity"),
-    FIELD_CHOICE(ExcitationSine, quantity, quantity_names, SINE_ACCELERATION, "of the base, what the amplitude is of"),
+    FIELD_CHOICE(ExcitationSine, quantity, statistic_names, SINE_ACCELERATION, "of the base, what the amplitude is of"),
     FIELD_END
 };
 // clang-format on
@@ -48,10 +48,10 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
     return STATUS_OK;
 }
 
-static Status sine_make(const Excitation *excitation, const Span *span, const Watch *watch,
+static Status sine_make(const Excitation *excitation, const Span *span, const Progress *progress,
                         Base *base, Problem *problem) {
     (void)span;
-    (void)watch;
+    (void)progress;
     (void)problem;
     const ExcitationSine *sine = (const ExcitationSine *)(const void *)excitation;
     memset(base, 0, sizeof *base);

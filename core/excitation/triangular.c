@@ -1,10 +1,10 @@
 // A triangular pulse of the base: a_g rises evenly to the amplitude at the middle and falls back.
 #include "core/excitation/pulse_common.h"
 
-static Status triangular_make(const Excitation *excitation, const Span *span, const Watch *watch,
-                              Base *base, Problem *problem) {
+static Status triangular_make(const Excitation *excitation, const Span *span,
+                              const Progress *progress, Base *base, Problem *problem) {
     (void)span;
-    (void)watch;
+    (void)progress;
     (void)problem;
     const ExcitationPulse *pulse = pulse_of(excitation);
     const double slope = 2 * pulse->amplitude / pulse->length;

@@ -148,12 +148,12 @@ void exponential_form_double(size_t n, const long double *increment, long double
         form[i] += second[i];
 }
 
-// Multiplications, about, between looks at the watch.
+// Multiplications, about, between looks at the progress.
 static const size_t WATCH_WORK = 1000000;
 
 // Who may stop it, and what has been done since the last look.
 typedef struct Patience {
-    const Watch *watch;
+    const Progress *progress;
     double fraction;
     size_t work;
 } Patience;
@@ -172,16 +172,16 @@ static bool product(const double *left, const double *right, size_t n, double *r
         if ((patience->work += n * n) < WATCH_WORK)
             continue;
         patience->work = 0;
-        if (!watch_advance(patience->watch, patience->fraction))
+        if (!progress_advance(patience->progress, patience->fraction))
             return false;
     }
     return true;
 }
 
 bool exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
-                           const Watch *watch, double fraction) {
+                           const Progress *progress, double fraction) {
     enum { PAPER = 20, MOST = 1000 };
-    Patience patience = {watch, fraction, 0};
+    Patience patience = {progress, fraction, 0};
     double norm = 0, *small = scratch, *next = scratch + n * n;
     for (size_t i = 0; i < n; i++) {
         double sum = 0;

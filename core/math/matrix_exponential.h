@@ -29,8 +29,8 @@ void exponential_form_double(size_t n, const long double *increment, long double
 
 // exp(A h) - I of any size in double: A h / 2^N, N >= 20, by four terms of the Taylor series, then
 // N doublings as above, as the paper has it. `out` may not be A; `scratch` holds 2 n * n. False:
-// `watch`, which is told of `fraction` now and then, said stop.
+// `progress`, which is told of `fraction` now and then, said stop.
 bool exponential_doublings(const double *A, size_t n, double h, double *out, double *scratch,
-                           const Watch *watch, double fraction);
+                           const Progress *progress, double fraction);
 
 #endif

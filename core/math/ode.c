@@ -168,7 +168,7 @@ Status ode_start(Ode *ode, const double *y, const double *scale, double step, Pr
         data(ode->scale)[i] = system->tolerance * fmax(scale[i], 1e-290);
     ode->t = 0;
     ode->step = step;
-    system->watch(system->context, 0, data(ode->y), ode->value, ode->slope);
+    system->progress(system->context, 0, data(ode->y), ode->value, ode->slope);
     // The stepper keeps a copy of the tolerances.
     return place(ode, 0, ode->y, step) &&
                    ERKStepSVtolerances(ode->stepper, ode->system.tolerance, ode->scale) == 0
@@ -181,7 +181,7 @@ static bool look(Ode *ode, double t) {
     const OdeSystem *system = &ode->system;
     if (ERKStepGetDky(ode->stepper, t, 0, ode->within) != 0)
         return false;
-    system->watch(system->context, t, data(ode->within), ode->probe, ode->rise);
+    system->progress(system->context, t, data(ode->within), ode->probe, ode->rise);
     return true;
 }
 
@@ -230,7 +230,7 @@ static bool settle(Ode *ode, size_t i, double t0, double t1, double guess) {
              ERKStepEvolve(ode->stepper, t, ode->y, &reached, ARK_NORMAL) < 0))
             return false;
         ode->t = t;
-        system->watch(system->context, t, data(ode->y), ode->value, ode->slope);
+        system->progress(system->context, t, data(ode->y), ode->value, ode->slope);
         const double slope =
             isnan(ode->slope[i]) ? (ode->value[i] - value) / (t - other) : ode->slope[i];
         const double off = ode->value[i] / slope;
@@ -274,7 +274,7 @@ Status ode_step(Ode *ode, double until, double *t, double *y, int *root, Problem
     if (ERKStepSetStopTime(ode->stepper, until) != 0 ||
         ERKStepEvolve(ode->stepper, until, ode->y, &t1, ARK_ONE_STEP) < 0 || !(t1 > t0))
         return failed(t0, problem);
-    system->watch(system->context, t1, data(ode->y), ode->ahead, ode->incline);
+    system->progress(system->context, t1, data(ode->y), ode->ahead, ode->incline);
     for (size_t i = 0; i < system->roots; i++) {
         double at;
         if (falls(ode, i, t0, t1, &at) && (*root == ODE_NO_ROOT || at < first)) {
@@ -289,7 +289,7 @@ Status ode_step(Ode *ode, double until, double *t, double *y, int *root, Problem
     } else {
         if (!settle(ode, (size_t)*root, t0, t1, first))
             return failed(first, problem);
-        system->watch(system->context, ode->t, data(ode->y), ode->value, ode->slope);
+        system->progress(system->context, ode->t, data(ode->y), ode->value, ode->slope);
         // It has fallen, whichever side of zero rounding left it on.
         ode->value[*root] = fmin(ode->value[*root], 0);
         if (!place(ode, ode->t, ode->y, t1 - t0))

@@ -18,7 +18,7 @@ typedef struct OdeSystem {
     void (*rate)(const void *context, double t, const double *y, double *rate);
     // Functions of the state, and their time derivatives; a slope of NAN is not known, then the
     // function's minimum inside a step is not looked for.
-    void (*watch)(const void *context, double t, const double *y, double *value, double *slope);
+    void (*progress)(const void *context, double t, const double *y, double *value, double *slope);
     double tolerance; // 0: ODE_TOLERANCE
 } OdeSystem;
 

@@ -23,7 +23,7 @@ const Field likeness_fields[] = {
 };
 // clang-format on
 
-enum { WATCH_SAMPLES = 1 << 16 }; // compared between two looks at the watch
+enum { WATCH_SAMPLES = 1 << 16 }; // compared between two looks at the progress
 
 // A time within this part of a sample interval of a sample is that sample's.
 static const double snap = 1e-6;
@@ -70,12 +70,12 @@ static double time_of(const Grid *grid, size_t i) {
 }
 
 // Before sample i.
-static bool goes_on(const Watch *watch, size_t i) {
-    return i % WATCH_SAMPLES != 0 || watch_advance(watch, 1);
+static bool goes_on(const Progress *progress, size_t i) {
+    return i % WATCH_SAMPLES != 0 || progress_advance(progress, 1);
 }
 
 Likeness likeness_measure(const Signal *reference, const Signal *other, double part,
-                          const Watch *watch) {
+                          const Progress *progress) {
     const Grid grid = grid_of(reference, other);
     const double none = (double)NAN;
     Likeness told = {none, none, grid.count, none, none, none, none, none, none, none, none, none};
@@ -83,7 +83,7 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
         return told;
     double sx = 0, sy = 0, sxx = 0, syy = 0, sdd = 0, most_x = 0, most_y = 0, most_d = 0;
     for (size_t i = 0; i < grid.count; i++) {
-        if (!goes_on(watch, i))
+        if (!goes_on(progress, i))
             return told;
         const double t = time_of(&grid, i), x = value_at(reference, t), y = value_at(other, t);
         sx += x;
@@ -98,7 +98,7 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
     const double n = (double)grid.count, mean_x = sx / n, mean_y = sy / n;
     double vxx = 0, vyy = 0, vxy = 0;
     for (size_t i = 0; i < grid.count; i++) {
-        if (!goes_on(watch, i))
+        if (!goes_on(progress, i))
             return told;
         const double t = time_of(&grid, i);
         const double x = value_at(reference, t), y = value_at(other, t);

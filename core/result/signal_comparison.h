@@ -28,9 +28,10 @@ typedef struct Likeness {
 } Likeness;
 extern const Field likeness_fields[];
 
-// `part` is of the reference's peak within the span. Where the watch stops it, its numbers are NAN.
+// `part` is of the reference's peak within the span. Where the progress stops it, its numbers are
+// NAN.
 Likeness likeness_measure(const Signal *reference, const Signal *other, double part,
-                          const Watch *watch);
+                          const Progress *progress);
 
 // Both on one grid as two columns of `rate`. STATUS_LIMIT where fewer than `least` samples are
 // common.

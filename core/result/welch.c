@@ -15,7 +15,7 @@
 
 #define PI 3.14159265358979323846264338328
 
-enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the watch
+enum { WATCH_SAMPLES = 1 << 16 }; // transformed between two looks at the progress
 
 const char *const spectrum_window_names[] = {"hann", "boxcar", "hamming", "blackman", NULL};
 const char *const spectrum_detrend_names[] = {"constant", "linear", "none", NULL};
@@ -100,7 +100,7 @@ static void add_segment(Welch *welch, const double *x) {
         sum_add(&welch->power[k], bin[2 * k] * bin[2 * k] + bin[2 * k + 1] * bin[2 * k + 1]);
 }
 
-static Status run_columns(Welch *welch, const Columns *series, const Watch *watch,
+static Status run_columns(Welch *welch, const Columns *series, const Progress *progress,
                           Columns *densities, Problem *problem) {
     const size_t length = welch->settings.segment, step = length - welch->settings.overlap;
     size_t unwatched = WATCH_SAMPLES;
@@ -109,7 +109,7 @@ static Status run_columns(Welch *welch, const Columns *series, const Watch *watc
         for (size_t s = 0; s < welch->segments; s++) {
             const double done = (double)c + (double)s / (double)welch->segments;
             if (unwatched >= WATCH_SAMPLES) {
-                if (!watch_advance(watch, done / (double)series->count))
+                if (!progress_advance(progress, done / (double)series->count))
                     return problem_set(problem, STATUS_CANCELLED, "stopped at the spectra");
                 unwatched = 0;
             }
@@ -142,7 +142,7 @@ static Status check_settings(const Columns *series, const SpectrumSettings *sett
 }
 
 static Status make_spectrum(Welch *welch, const Columns *series, const char *const *units,
-                            double sample_rate, const Watch *watch, Spectrum *spectrum,
+                            double sample_rate, const Progress *progress, Spectrum *spectrum,
                             Problem *problem) {
     const size_t length = welch->settings.segment;
     welch->bins = length / 2 + 1;
@@ -167,18 +167,18 @@ static Status make_spectrum(Welch *welch, const Columns *series, const char *con
         columns_name(&spectrum->densities, c, series->at[c].name, units[c]);
     spectrum->settings = welch->settings;
     spectrum->segments = welch->segments;
-    return run_columns(welch, series, watch, &spectrum->densities, problem);
+    return run_columns(welch, series, progress, &spectrum->densities, problem);
 }
 
 Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Watch *watch, FourierStock *stock,
-                      Spectrum *spectrum, Problem *problem) {
+                      const SpectrumSettings *settings, const Progress *progress,
+                      FourierStock *stock, Spectrum *spectrum, Problem *problem) {
     *spectrum = (Spectrum){0};
     TRY(check_settings(series, settings, problem));
     Welch welch = {.settings = *settings,
                    .fourier = fourier_take(stock, settings->segment, FOURIER_FORWARD)};
     const Status status =
-        make_spectrum(&welch, series, units, sample_rate, watch, spectrum, problem);
+        make_spectrum(&welch, series, units, sample_rate, progress, spectrum, problem);
     free(welch.window);
     free(welch.power);
     fourier_put(stock, welch.fourier);

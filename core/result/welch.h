@@ -35,8 +35,8 @@ typedef struct Spectrum {
 // `units[i]` is the density's unit of column i; `stock` may be NULL. Cleared by spectrum_clear;
 // empty on failure.
 Status spectrum_welch(const Columns *series, const char *const *units, double sample_rate,
-                      const SpectrumSettings *settings, const Watch *watch, FourierStock *stock,
-                      Spectrum *spectrum, Problem *problem);
+                      const SpectrumSettings *settings, const Progress *progress,
+                      FourierStock *stock, Spectrum *spectrum, Problem *problem);
 void spectrum_clear(Spectrum *spectrum);
 
 #endif

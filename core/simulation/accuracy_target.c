@@ -131,7 +131,7 @@ Cost aim_cost(const Simulation *simulation) {
 typedef struct Session {
     Aim aim;
     const SimulationLimits *limits;
-    const Watch *watch;
+    const Progress *progress;
     Workspace *workspace;
     double done;      // of the whole
     double steps;     // of all runs
@@ -159,14 +159,15 @@ static Status add_attempt(Session *session, const Way *way, double estimated, do
 static Status run_way(Session *session, const Way *way, double *estimated, Problem *problem) {
     Simulation target = {0};
     const double left = 1 - session->done;
-    Stage stage = stage_of(session->watch, session->done, way_is_whole(way) ? left : left / 2);
-    const Watch watch = stage_watch(&stage);
-    outcome_drop(session->outcome);
+    ProgressRange range =
+        progress_range(session->progress, session->done, way_is_whole(way) ? left : left / 2);
+    const Progress progress = progress_range_view(&range);
+    outcome_unref(session->outcome);
     session->outcome = NULL;
     Problem *fault = way_is_whole(way) ? problem : calloc(1, sizeof *fault);
     Status status = way_apply(session->aim.simulation, way, &target, fault);
     if (status == STATUS_OK)
-        status = simulation_run(&target, session->limits, &watch, session->workspace,
+        status = simulation_run(&target, session->limits, &progress, session->workspace,
                                 &session->outcome, fault);
     simulation_clear(&target);
     *estimated = 1;
@@ -184,7 +185,7 @@ static Status run_way(Session *session, const Way *way, double *estimated, Probl
             problem_set(problem, status, "%s", fault != NULL ? fault->detail : "no memory");
         free(fault);
     }
-    session->done = stage.from + stage.share;
+    session->done = range.from + range.share;
     return status;
 }
 
@@ -254,9 +255,9 @@ static Status finish(Session *session, const Way *way, double estimated, Problem
 
 // *outcome is of the way told by `way`.
 static Status reach(const Simulation *simulation, const SimulationLimits *limits,
-                    const Watch *watch, Workspace *workspace, Way *way, Outcome **outcome,
+                    const Progress *progress, Workspace *workspace, Way *way, Outcome **outcome,
                     Problem *problem) {
-    Session session = {.limits = limits, .watch = watch, .workspace = workspace};
+    Session session = {.limits = limits, .progress = progress, .workspace = workspace};
     double estimated = 1;
     Status status = aim_make(&session.aim, simulation, problem);
     if (status == STATUS_OK) {
@@ -272,25 +273,27 @@ static Status reach(const Simulation *simulation, const SimulationLimits *limits
     if (status == STATUS_OK)
         *outcome = session.outcome;
     else
-        outcome_drop(session.outcome);
+        outcome_unref(session.outcome);
     PlanTarget none = {.attempts = session.attempts};
     fields_clear(target_fields, &none);
     aim_clear(&session.aim);
     return status;
 }
 
-Status aim_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-               Workspace *workspace, Outcome **outcome, Problem *problem) {
+Status aim_run(const Simulation *simulation, const SimulationLimits *limits,
+               const Progress *progress, Workspace *workspace, Outcome **outcome,
+               Problem *problem) {
     Way way = {0};
-    return reach(simulation, limits, watch, workspace, &way, outcome, problem);
+    return reach(simulation, limits, progress, workspace, &way, outcome, problem);
 }
 
-Status aim_settle(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-                  Workspace *workspace, Simulation *settled, Problem *problem) {
+Status aim_settle(const Simulation *simulation, const SimulationLimits *limits,
+                  const Progress *progress, Workspace *workspace, Simulation *settled,
+                  Problem *problem) {
     Way way = {0};
     Outcome *outcome = NULL;
     memset(settled, 0, sizeof *settled);
-    TRY(reach(simulation, limits, watch, workspace, &way, &outcome, problem));
-    outcome_drop(outcome);
+    TRY(reach(simulation, limits, progress, workspace, &way, &outcome, problem));
+    outcome_unref(outcome);
     return way_apply(simulation, &way, settled, problem);
 }

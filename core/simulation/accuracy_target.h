@@ -16,12 +16,13 @@ Status aim_complete(Simulation *simulation, Problem *problem);
 // simulation_plan, simulation_cost and simulation_run of a simulation with a target.
 Status aim_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost aim_cost(const Simulation *simulation);
-Status aim_run(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-               Workspace *workspace, Outcome **outcome, Problem *problem);
+Status aim_run(const Simulation *simulation, const SimulationLimits *limits,
+               const Progress *progress, Workspace *workspace, Outcome **outcome, Problem *problem);
 
 // The simulation by the way that such a run came to, without a target, as it then was run: to run
 // it once more. Cleared by simulation_clear in any case.
-Status aim_settle(const Simulation *simulation, const SimulationLimits *limits, const Watch *watch,
-                  Workspace *workspace, Simulation *settled, Problem *problem);
+Status aim_settle(const Simulation *simulation, const SimulationLimits *limits,
+                  const Progress *progress, Workspace *workspace, Simulation *settled,
+                  Problem *problem);
 
 #endif

@@ -25,7 +25,7 @@ static const double states_most = 1e9; // bytes of the first run's columns
 
 static void shot_clear(Shot *shot) {
     simulation_clear(&shot->simulation);
-    outcome_drop(shot->outcome);
+    outcome_unref(shot->outcome);
     plan_free(shot->plan);
     base_clear(&shot->base);
     columns_clear(&shot->fine);
@@ -98,8 +98,8 @@ static double state_at(const Shot *shot, ChannelId channel, size_t index, size_t
 }
 
 // The scene as it was run. A target's way shows only by running it.
-static Status settle(const Simulation *asked, const SimulationLimits *limits, const Watch *watch,
-                     Workspace *workspace, Shot *shot, Problem *problem) {
+static Status settle(const Simulation *asked, const SimulationLimits *limits,
+                     const Progress *progress, Workspace *workspace, Shot *shot, Problem *problem) {
     const Scene *scene = &asked->scene;
     const size_t storeys = scene_storeys(scene, NULL), dampers = scene->dampers.count;
     if ((double)(2 * (storeys + dampers)) * (double)scene_sample_count(scene) * sizeof(double) >
@@ -110,7 +110,7 @@ static Status settle(const Simulation *asked, const SimulationLimits *limits, co
                            "submit a shorter scene that holds the impact",
                            states_most);
     if (aim_is_asked(asked))
-        TRY(aim_settle(asked, limits, watch, workspace, &shot->simulation, problem));
+        TRY(aim_settle(asked, limits, progress, workspace, &shot->simulation, problem));
     else if (fields_copy(simulation_fields, asked, &shot->simulation) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
     shot->simulation.output.impacts = true;
@@ -236,7 +236,7 @@ static Status make_plan(Shot *shot, Problem *problem) {
                      accuracy_modes(choice_common(simulation), shot->plan->storeys), problem);
 }
 
-static Status make_base(Shot *shot, const SimulationLimits *limits, const Watch *watch,
+static Status make_base(Shot *shot, const SimulationLimits *limits, const Progress *progress,
                         Workspace *workspace, Problem *problem) {
     const Scene *scene = &shot->simulation.scene;
     const Span span = {.duration = scene->duration,
@@ -244,7 +244,7 @@ static Status make_base(Shot *shot, const SimulationLimits *limits, const Watch 
                        .most = limits == NULL ? 0 : limits->samples,
                        .transforms = workspace == NULL ? NULL : &workspace->transforms};
     const Excitation *excitation = scene_excitation(scene);
-    return excitation_kind(excitation)->make(excitation, &span, watch, &shot->base, problem);
+    return excitation_kind(excitation)->make(excitation, &span, progress, &shot->base, problem);
 }
 
 // The plan is this shot's own and nobody else has it yet: it goes on from the sample's state.
@@ -290,7 +290,7 @@ static Status set_clock(Shot *shot, size_t points, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status run_finely(Shot *shot, const SimulationLimits *limits, const Watch *watch,
+static Status run_finely(Shot *shot, const SimulationLimits *limits, const Progress *progress,
                          Workspace *workspace, Problem *problem) {
     const Plan *plan = shot->plan;
     const size_t number = (size_t)shot->impact->damper - 1;
@@ -303,7 +303,7 @@ static Status run_finely(Shot *shot, const SimulationLimits *limits, const Watch
     const bool is_exact = choice_solver(&shot->simulation) == &solver_exact;
     Run run = {.plan = plan,
                .base = &shot->shifted,
-               .watch = watch,
+               .progress = progress,
                .accuracy = is_exact ? choice_settings(&shot->simulation) : NULL,
                .workspace = workspace,
                .columns = columns,
@@ -327,30 +327,30 @@ static Status run_finely(Shot *shot, const SimulationLimits *limits, const Watch
 }
 
 static Status take(Shot *shot, const Simulation *simulation, size_t number, size_t points,
-                   const SimulationLimits *limits, const Watch *watch, Workspace *workspace,
+                   const SimulationLimits *limits, const Progress *progress, Workspace *workspace,
                    Closeup *closeup, Problem *problem) {
-    TRY(settle(simulation, limits, watch, workspace, shot, problem));
+    TRY(settle(simulation, limits, progress, workspace, shot, problem));
     TRY(make_plan(shot, problem));
-    TRY(simulation_run(&shot->simulation, limits, watch, workspace, &shot->outcome, problem));
+    TRY(simulation_run(&shot->simulation, limits, progress, workspace, &shot->outcome, problem));
     TRY(find_impact(shot, number, problem));
-    TRY(make_base(shot, limits, watch, workspace, problem));
+    TRY(make_base(shot, limits, progress, workspace, problem));
     find_start(shot);
     shift_base(shot);
     set_state(shot);
     TRY(set_clock(shot, points, problem));
-    TRY(run_finely(shot, limits, watch, workspace, problem));
+    TRY(run_finely(shot, limits, progress, workspace, problem));
     closeup->impact = *shot->impact;
     return closeup_points(shot, &closeup->columns, problem);
 }
 
 Status closeup_make(const Simulation *simulation, size_t number, size_t points,
-                    const SimulationLimits *limits, const Watch *watch, Workspace *workspace,
+                    const SimulationLimits *limits, const Progress *progress, Workspace *workspace,
                     Closeup *closeup, Problem *problem) {
     Shot shot;
     memset(&shot, 0, sizeof shot);
     memset(closeup, 0, sizeof *closeup);
     const Status status =
-        take(&shot, simulation, number, points, limits, watch, workspace, closeup, problem);
+        take(&shot, simulation, number, points, limits, progress, workspace, closeup, problem);
     shot_clear(&shot);
     if (status != STATUS_OK)
         closeup_clear(closeup);

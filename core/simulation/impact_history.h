@@ -22,9 +22,10 @@ typedef struct Closeup {
 } Closeup;
 
 // Of the impact `number`, from 1, of a completed simulation's ledger. STATUS_NOT_FOUND where there
-// is none, or where contacts have no length. Stops when `watch` says so. `workspace` may be NULL.
+// is none, or where contacts have no length. Stops when `progress` says so. `workspace` may be
+// NULL.
 Status closeup_make(const Simulation *simulation, size_t number, size_t points,
-                    const SimulationLimits *limits, const Watch *watch, Workspace *workspace,
+                    const SimulationLimits *limits, const Progress *progress, Workspace *workspace,
                     Closeup *closeup, Problem *problem);
 void closeup_clear(Closeup *closeup);
 

@@ -6,11 +6,11 @@
 
 #include "core/plan/mode_selection.h"
 #include "core/simulation/accuracy_target.h"
-#include "core/simulation/undamped_baseline.h"
-#include "core/simulation/result_warnings.h"
 #include "core/simulation/choice.h"
 #include "core/simulation/omissions.h"
+#include "core/simulation/result_warnings.h"
 #include "core/simulation/simulation.h"
+#include "core/simulation/undamped_baseline.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/rest.h"
 #include "core/solve/solver.h"
@@ -89,7 +89,7 @@ Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem
 typedef struct Journey {
     const Simulation *simulation;
     const SimulationLimits *limits;
-    const Watch *watch;
+    const Progress *progress;
     Workspace *workspace; // or NULL
     Plan *plan;
     Base base;
@@ -160,11 +160,11 @@ static Status make_spectrum(Journey *journey, Problem *problem) {
         columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
-    Stage stage = stage_of(journey->watch, 0.9, 0.1);
-    const Watch watch = stage_watch(&stage);
+    ProgressRange range = progress_range(journey->progress, 0.9, 0.1);
+    const Progress progress = progress_range_view(&range);
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
-    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &watch,
+    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &progress,
                           stock(journey), &journey->outcome->spectrum, problem);
 }
 
@@ -249,15 +249,17 @@ static Status travel(Journey *journey, Problem *problem) {
                        .most = journey->limits == NULL ? 0 : journey->limits->samples,
                        .transforms = stock(journey)};
     const Excitation *excitation = scene_excitation(scene);
-    Stage making = stage_of(journey->watch, 0, 0.2), solving = stage_of(journey->watch, 0.2, 0.7);
-    const Watch making_watch = stage_watch(&making), solving_watch = stage_watch(&solving);
+    ProgressRange making = progress_range(journey->progress, 0, 0.2),
+                  solving = progress_range(journey->progress, 0.2, 0.7);
+    const Progress making_watch = progress_range_view(&making),
+                   solving_watch = progress_range_view(&solving);
     TRY(excitation_kind(excitation)
             ->make(excitation, &span, &making_watch, &journey->base, problem));
     still(&journey->base);
     const Regime regime = regime_find(journey->plan, &journey->base);
     Run run = {.plan = journey->plan,
                .base = &journey->base,
-               .watch = &solving_watch,
+               .progress = &solving_watch,
                .accuracy = choice_settings(simulation),
                .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
@@ -293,16 +295,16 @@ static Status travel(Journey *journey, Problem *problem) {
 }
 
 static Status run_once(const Simulation *simulation, const SimulationLimits *limits,
-                       const Watch *watch, Workspace *workspace, Outcome **outcome,
+                       const Progress *progress, Workspace *workspace, Outcome **outcome,
                        Problem *problem) {
     if (aim_is_asked(simulation))
-        return aim_run(simulation, limits, watch, workspace, outcome, problem);
+        return aim_run(simulation, limits, progress, workspace, outcome, problem);
     Outcome *made = outcome_new();
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
     Journey journey = {.simulation = simulation,
                        .limits = limits,
-                       .watch = watch,
+                       .progress = progress,
                        .workspace = workspace,
                        .outcome = made};
     const Status status = travel(&journey, problem);
@@ -313,7 +315,7 @@ static Status run_once(const Simulation *simulation, const SimulationLimits *lim
     base_clear(&journey.base);
     plan_free(journey.plan);
     if (status != STATUS_OK) {
-        outcome_drop(made);
+        outcome_unref(made);
         return status;
     }
     *outcome = made;
@@ -329,29 +331,30 @@ Outcome *outcome_new(void) {
 }
 
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      const Progress *progress, Workspace *workspace, Outcome **outcome,
                       Problem *problem) {
     static const double share = 0.8; // of the whole, where the scene without dampers follows
     *outcome = NULL;
     if (!simulation->output.reduction)
-        return run_once(simulation, limits, watch, workspace, outcome, problem);
-    Stage first = stage_of(watch, 0, share), second = stage_of(watch, share, 1 - share);
-    const Watch own = stage_watch(&first), bare = stage_watch(&second);
+        return run_once(simulation, limits, progress, workspace, outcome, problem);
+    ProgressRange first = progress_range(progress, 0, share),
+                  second = progress_range(progress, share, 1 - share);
+    const Progress own = progress_range_view(&first), bare = progress_range_view(&second);
     TRY(run_once(simulation, limits, &own, workspace, outcome, problem));
     const Status status = bare_compare(simulation, limits, &bare, workspace, *outcome, problem);
     if (status != STATUS_OK) {
-        outcome_drop(*outcome);
+        outcome_unref(*outcome);
         *outcome = NULL;
     }
     return status;
 }
 
-Outcome *outcome_hold(Outcome *outcome) {
+Outcome *outcome_ref(Outcome *outcome) {
     atomic_fetch_add(&((Held *)outcome)->holds, 1);
     return outcome;
 }
 
-void outcome_drop(Outcome *outcome) {
+void outcome_unref(Outcome *outcome) {
     if (outcome == NULL || atomic_fetch_sub(&((Held *)outcome)->holds, 1) != 1)
         return;
     fields_clear(plan_report_fields, &outcome->plan);

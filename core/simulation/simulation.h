@@ -105,17 +105,17 @@ struct Outcome {
     Work work;         // what was done, kind by kind
 };
 
-// Runs a completed simulation. Stops with STATUS_CANCELLED when `watch` says so, with STATUS_LIMIT
-// at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold or energy
-// comes out of nothing. The Outcome is the caller's one hold on it, freed by the last outcome_drop.
-// `workspace` may be NULL.
+// Runs a completed simulation. Stops with STATUS_CANCELLED when `progress` says so, with
+// STATUS_LIMIT at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold
+// or energy comes out of nothing. The Outcome is the caller's one hold on it, freed by the last
+// outcome_unref. `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Watch *watch, Workspace *workspace, Outcome **outcome,
+                      const Progress *progress, Workspace *workspace, Outcome **outcome,
                       Problem *problem);
 Outcome *
 outcome_new(void); // empty, one hold, for whoever has kept the numbers; NULL without memory
-Outcome *outcome_hold(Outcome *outcome);
-void outcome_drop(Outcome *outcome);
+Outcome *outcome_ref(Outcome *outcome);
+void outcome_unref(Outcome *outcome);
 size_t outcome_bytes(const Outcome *outcome); // of memory, for caches
 
 // Expected cost of a completed simulation, before running it.

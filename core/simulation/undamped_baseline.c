@@ -41,13 +41,14 @@ static double saved(double with, double without) {
 }
 
 Status bare_compare(const Simulation *simulation, const SimulationLimits *limits,
-                    const Watch *watch, Workspace *workspace, Outcome *outcome, Problem *problem) {
+                    const Progress *progress, Workspace *workspace, Outcome *outcome,
+                    Problem *problem) {
     Simulation bare;
     Outcome *other = NULL;
     memset(&bare, 0, sizeof bare);
     Status status = make(simulation, &bare, problem);
     if (status == STATUS_OK)
-        status = simulation_run(&bare, limits, watch, workspace, &other, problem);
+        status = simulation_run(&bare, limits, progress, workspace, &other, problem);
     if (status == STATUS_OK) {
         const Summary *with = &outcome->summary, *without = &other->summary;
         outcome->has_reduction = true;
@@ -60,7 +61,7 @@ Status bare_compare(const Simulation *simulation, const SimulationLimits *limits
         outcome->steps += other->steps;
         work_add(&outcome->work, &other->work);
     }
-    outcome_drop(other);
+    outcome_unref(other);
     simulation_clear(&bare);
     return status;
 }

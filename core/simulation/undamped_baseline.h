@@ -8,7 +8,8 @@
 // Runs a completed simulation without its dampers, and tells in the outcome, which is of the one
 // with them, by how much it is the smaller. Adds the work.
 Status bare_compare(const Simulation *simulation, const SimulationLimits *limits,
-                    const Watch *watch, Workspace *workspace, Outcome *outcome, Problem *problem);
+                    const Progress *progress, Workspace *workspace, Outcome *outcome,
+                    Problem *problem);
 
 // Foretold for that run alone.
 Cost bare_cost(const Simulation *simulation);

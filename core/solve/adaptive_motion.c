@@ -73,7 +73,7 @@ static void rate(const void *context, double t, const double *y, double *out) {
     total[2] = ground;
 }
 
-static void watch(const void *context, double t, const double *y, double *value, double *slope) {
+static void progress(const void *context, double t, const double *y, double *value, double *slope) {
     const Adaptive *own = context;
     const Frame *frame = &own->steps->frame;
     const size_t m = frame->dampers;
@@ -240,7 +240,7 @@ Status adaptive_motion_make(Adaptive *own, Steps *steps) {
                               .roots = frame->has_stops ? ADAPTIVE_WATCHED * m : 0,
                               .tolerance = steps->tolerance,
                               .rate = rate,
-                              .watch = watch};
+                              .progress = progress};
     if (own->block != NULL)
         own->ode = ode_new(&system);
     if (own->ode == NULL)

@@ -90,7 +90,7 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
         return;
     neighbour->run = (Run){.plan = frame->plan,
                            .base = frame->run->base,
-                           .watch = frame->run->watch,
+                           .progress = frame->run->progress,
                            .steps_most = frame->run->steps_most};
     neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;

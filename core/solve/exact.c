@@ -17,12 +17,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/solve/event_engine.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/exact_events.h"
 #include "core/solve/exact_press.h"
 #include "core/solve/exact_state.h"
 #include "core/solve/exact_stride.h"
-#include "core/solve/event_engine.h"
 #include "core/solve/refine.h"
 #include "core/solve/solver.h"
 
@@ -79,7 +79,7 @@ static Status keep_going(Exact *exact) {
         return problem_set(exact->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
                            exact->run->steps_most, exact->run->steps_most * SOLVER_STEP,
                            exact_time(exact), exact->plan->duration);
-    if (!watch_advance(exact->run->watch, exact_time(exact) / exact->plan->duration))
+    if (!progress_advance(exact->run->progress, exact_time(exact) / exact->plan->duration))
         return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            exact_time(exact));
     return STATUS_OK;
@@ -380,8 +380,8 @@ static Status exact_run(Run *run, Response *response, Problem *problem) {
     Base refined;
     Run own = *run;
     own.base = &refined;
-    Status status =
-        refine_base(run->base, run->plan->sample_rate, fine, values, run->watch, &refined, problem);
+    Status status = refine_base(run->base, run->plan->sample_rate, fine, values, run->progress,
+                                &refined, problem);
     if (status == STATUS_OK)
         status = run_on_grid(&own, response, problem);
     run->steps = own.steps;

@@ -10,13 +10,13 @@
 #include "core/solve/base_motion_cursor.h"
 #include "core/solve/exact_flight.h"
 #include "core/solve/exact_hold.h"
-#include "core/solve/hop.h"
-#include "core/solve/lanes.h"
-#include "core/solve/impact_log.h"
-#include "core/solve/pulse.h"
 #include "core/solve/exact_record.h"
-#include "core/solve/solver.h"
+#include "core/solve/hop.h"
+#include "core/solve/impact_log.h"
+#include "core/solve/lanes.h"
+#include "core/solve/pulse.h"
 #include "core/solve/rounding_growth.h"
+#include "core/solve/solver.h"
 
 // Solver steps of a sample among many, and of a stretch to or of a contact in closed form.
 #define EXACT_SAMPLE_STEPS 0.1
@@ -60,7 +60,7 @@ typedef struct Exact {
     LedgerRow row; // of the present contact or rest
     Recorder recorder;
     size_t contact_arcs; // since it began
-    size_t arcs;         // since the watch was asked
+    size_t arcs;         // since the progress was asked
     size_t events;       // all so far
     size_t still_events; // in a row, without time passing
     // From here on what the next run of the same system finds ready; a run begins with all above

@@ -10,7 +10,7 @@
 
 enum {
     PENDING_MOST = 1024,     // samples between two looks at the energy balance
-    WATCH_SAMPLES = 1 << 16, // made ready between two looks at the watch
+    WATCH_SAMPLES = 1 << 16, // made ready between two looks at the progress
 };
 
 // Of energies, over all samples of a contact: times DBL_EPSILON, what its closed form may lose.
@@ -61,7 +61,7 @@ static void lay(const Exact *exact, size_t from, size_t to) {
 static Status lay_all(const Exact *exact) {
     const size_t count = exact->plan->count;
     for (size_t from = 0; from < count; from += WATCH_SAMPLES) {
-        if (from > 0 && !watch_advance(exact->run->watch, 0))
+        if (from > 0 && !progress_advance(exact->run->progress, 0))
             return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = 0 s");
         lay(exact, from, count - from > WATCH_SAMPLES ? from + WATCH_SAMPLES : count);
     }

@@ -6,7 +6,7 @@
 
 #include "core/solve/exact_state.h"
 
-// STATUS_CANCELLED where the watch says so.
+// STATUS_CANCELLED where the progress says so.
 Status exact_stride_start(Exact *exact);
 
 // From the present sample over as many as go by strides, at most `most`; returns how many.

@@ -18,7 +18,7 @@ static const double SHORTEST = 1e-250; // [s]
 
 static const double GAIN_CONTACTS = 1e3;
 
-static const double WATCH_STEPS = 3e4; // between looks at the watch
+static const double WATCH_STEPS = 3e4; // between looks at the progress
 static const double WORK_OF_STEP = 60; // multiplications
 
 Status frame_engine_check(FrameEngine *engine) {
@@ -38,7 +38,7 @@ Status frame_engine_check(FrameEngine *engine) {
         return problem_set(frame->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
                            frame->run->steps_most, frame->run->steps_most * SOLVER_STEP,
                            frame_time(frame), frame->plan->duration);
-    if (!watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration))
+    if (!progress_advance(frame->run->progress, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));
     return STATUS_OK;

@@ -4,13 +4,13 @@
 #ifndef CORE_SOLVE_FRAME_ENGINE_H
 #define CORE_SOLVE_FRAME_ENGINE_H
 
-#include "core/solve/taylor_step.h"
 #include "core/solve/contact_events.h"
 #include "core/solve/flight.h"
-#include "core/solve/power_contact.h"
-#include "core/solve/sustained_contact.h"
-#include "core/solve/recorder.h"
 #include "core/solve/modal_state.h"
+#include "core/solve/power_contact.h"
+#include "core/solve/recorder.h"
+#include "core/solve/sustained_contact.h"
+#include "core/solve/taylor_step.h"
 
 // All zero is empty.
 typedef struct FrameEngine {
@@ -21,7 +21,7 @@ typedef struct FrameEngine {
     FrameOde ode;
     FrameTrail trail;
     FrameRecord record;
-    double work;   // since the watch was asked
+    double work;   // since the progress was asked
     size_t idle;   // steps of contact in a row that took no time
     double *track; // of the last TRAIL_MOST samples, all modes: sample k at (k - 1) % TRAIL_MOST;
                    // NULL: not wanted
@@ -49,7 +49,7 @@ void frame_engine_take_sample(FrameEngine *engine);
 // From the present sample over `length` [s].
 Status frame_engine_cross(FrameEngine *engine, double length);
 
-// Whether the motion is finite, the limits are kept and the watch lets the run go on.
+// Whether the motion is finite, the limits are kept and the progress lets the run go on.
 Status frame_engine_check(FrameEngine *engine);
 
 #endif

@@ -133,10 +133,11 @@ static Status make_table(Steps *steps, Table *table) {
     if (A != NULL && table->key != NULL) {
         memcpy(table->key, own->key, own->key_size * sizeof *table->key);
         make_system(steps, A);
-        status = exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square,
-                                       frame->run->watch, frame_time(frame) / frame->plan->duration)
-                     ? compress(own, steps->size, A + square, table)
-                     : STATUS_CANCELLED;
+        status =
+            exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square,
+                                  frame->run->progress, frame_time(frame) / frame->plan->duration)
+                ? compress(own, steps->size, A + square, table)
+                : STATUS_CANCELLED;
     }
     free(A);
     if (status == STATUS_OK)

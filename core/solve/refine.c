@@ -4,7 +4,7 @@
 
 #include "core/solve/base_motion_cursor.h"
 
-enum { WATCH_VALUES = 1 << 18 }; // made between two looks at the watch
+enum { WATCH_VALUES = 1 << 18 }; // made between two looks at the progress
 
 size_t refine_count(const Base *base, double sample_rate, size_t samples) {
     BaseCursor cursor;
@@ -17,7 +17,7 @@ size_t refine_count(const Base *base, double sample_rate, size_t samples) {
 }
 
 Status refine_base(const Base *base, double sample_rate, size_t count, double *values,
-                   const Watch *watch, Base *fine, Problem *problem) {
+                   const Progress *progress, Base *fine, Problem *problem) {
     const size_t ratio = (size_t)nearbyint(base->interval * sample_rate);
     size_t unwatched = 0;
     for (size_t j = 0, n = 0; n < count; j++) {
@@ -35,7 +35,7 @@ Status refine_base(const Base *base, double sample_rate, size_t count, double *v
             if (unwatched < WATCH_VALUES)
                 continue;
             unwatched = 0;
-            if (!watch_advance(watch, 0))
+            if (!progress_advance(progress, 0))
                 return problem_set(problem, STATUS_CANCELLED, "cancelled before the first step");
         }
     }

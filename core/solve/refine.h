@@ -4,15 +4,15 @@
 #ifndef CORE_SOLVE_REFINE_H
 #define CORE_SOLVE_REFINE_H
 
-#include "core/base/status.h"
 #include "core/base/progress.h"
+#include "core/base/status.h"
 #include "core/excitation/base_motion.h"
 
 // How many values it takes for a run of `samples` output samples; 0: there is nothing to refine.
 size_t refine_count(const Base *base, double sample_rate, size_t samples);
 
-// Writes them to `values`, which `fine` borrows. STATUS_CANCELLED where the watch says so.
+// Writes them to `values`, which `fine` borrows. STATUS_CANCELLED where the progress says so.
 Status refine_base(const Base *base, double sample_rate, size_t count, double *values,
-                   const Watch *watch, Base *fine, Problem *problem);
+                   const Progress *progress, Base *fine, Problem *problem);
 
 #endif

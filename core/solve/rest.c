@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { WATCH_SAMPLES = 1 << 16 }; // filled between two looks at the watch
+enum { WATCH_SAMPLES = 1 << 16 }; // filled between two looks at the progress
 
 static void fill(double *values, size_t count, double value) {
     for (size_t i = 0; i < count; i++)
@@ -26,7 +26,7 @@ Status rest_run(Run *run, Response *response, Problem *problem) {
         for (size_t j = 0; j < plan->count; j += WATCH_SAMPLES) {
             const size_t left = plan->count - j;
             fill(column->values + j, left < WATCH_SAMPLES ? left : WATCH_SAMPLES, value);
-            if (!watch_advance(run->watch, (double)i / (double)run->column_count))
+            if (!progress_advance(run->progress, (double)i / (double)run->column_count))
                 return problem_set(problem, STATUS_CANCELLED, "cancelled at rest");
         }
     }

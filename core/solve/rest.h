@@ -6,7 +6,7 @@
 #include "core/solve/solver.h"
 
 // For a plan whose structure and masses start without motion, off their stops, over a still base.
-// Fills all of `response` but its series. STATUS_CANCELLED where the watch says so.
+// Fills all of `response` but its series. STATUS_CANCELLED where the progress says so.
 Status rest_run(Run *run, Response *response, Problem *problem);
 
 #endif

@@ -1,4 +1,4 @@
-// The classical Runge-Kutta method of order 4. The contact force is looked up wherever a stage
+// The classical Runge-Kutta method of order 4. The contact force is looked up wherever a range
 // lies, so that it serves every law that has one; where a contact begins or ends inside a step the
 // force jumps or bends between the stages, and the order is the first.
 #include <stdlib.h>
@@ -9,10 +9,10 @@
 enum { STAGES = 4, TOTALS = 2 };
 
 typedef struct Rk4 {
-    double *at;     // a stage's state
+    double *at;     // a range's state
     double *slopes; // of all stages, each with its powers behind it
     double *force;
-    size_t row; // from one stage's slopes to the next
+    size_t row; // from one range's slopes to the next
 } Rk4;
 
 static Status rk4_make(Steps *steps) {
@@ -100,7 +100,7 @@ static Status rk4_step(Steps *steps, double length) {
         steps->sums.impulse[d] = MEAN(totals, TOTALS + d);
         steps->sums.work[d] = MEAN(totals, TOTALS + m + d);
         const double w = steps->y[2 * n + m + d], approach = w < 0 ? -w : w;
-        // Where the step ends may be deeper than any stage.
+        // Where the step ends may be deeper than any range.
         (void)feel(steps, d, steps->y[2 * n + d] + MEAN(s, 2 * n + d), w, approach);
     }
     for (size_t i = 0; i < size; i++)

@@ -49,7 +49,7 @@ typedef struct RunColumn {
 typedef struct Run {
     const Plan *plan;
     const Base *base;
-    const Watch *watch;
+    const Progress *progress;
     const Accuracy *accuracy; // the solver's settings; NULL: its defaults
     Workspace *workspace;     // or NULL
     const RunColumn *columns; // what is wanted, each once

@@ -242,7 +242,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
     pair->near_run = (Run){.plan = &pair->plan,
                            .base = frame->run->base,
-                           .watch = frame->run->watch,
+                           .progress = frame->run->progress,
                            .steps_most = frame->run->steps_most,
                            .is_clear = frame->run->is_clear};
     pair->near_response.is_unlisted = true;

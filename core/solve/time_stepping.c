@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the watch
+static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the progress
 
 // Energy that neither start nor base gave, over what they did: no error of a sound run.
 static const double GROWN = 1e6;
@@ -185,7 +185,7 @@ Status steps_check(Steps *steps) {
                            SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
                            run->steps_most, run->steps_most * SOLVER_STEP, frame_time(frame),
                            frame->plan->duration, steps->length);
-    if (!watch_advance(run->watch, frame_time(frame) / frame->plan->duration))
+    if (!progress_advance(run->progress, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            frame_time(frame));
     return ledger_status(&frame->ledger, frame->problem);

@@ -5,8 +5,8 @@
 #ifndef CORE_SOLVE_TIME_STEPPING_H
 #define CORE_SOLVE_TIME_STEPPING_H
 
-#include "core/solve/recorder.h"
 #include "core/solve/modal_state.h"
+#include "core/solve/recorder.h"
 
 typedef struct Steps Steps;
 
@@ -46,7 +46,7 @@ struct Steps {
     size_t share;     // steps in a sample interval
     double length;    // of one [s]
     double tolerance; // of a method whose steps have no fixed length
-    double watched;   // work since the watch was asked
+    double watched;   // work since the progress was asked
 
     size_t size;      // of y
     double *y;        // the state: q, p, r, w
@@ -86,9 +86,9 @@ void steps_sum(Steps *steps, const double *from, const double *to, double length
                bool is_corrected);
 
 // After each stretch of a run: takes peaks and the energy balance, counts what it cost, asks the
-// watch.
+// progress.
 Status steps_note(Steps *steps, double cost);
-// Whether the limits are kept and the watch lets the run go on.
+// Whether the limits are kept and the progress lets the run go on.
 Status steps_check(Steps *steps);
 
 // Contacts begin and end, masses bounce: steps_contact.c.

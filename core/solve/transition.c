@@ -26,7 +26,7 @@ typedef struct DenseWork {
     Real *series; // of one column: TERMS x storeys
     Real *speeds; // node after node, column after column, of all modes
     Real *pulls;  // D times those of one column
-    size_t done;  // products since the watch was asked
+    size_t done;  // products since the progress was asked
 } DenseWork;
 
 // Coefficients in t / h of a_g for a unit of value or of slope.
@@ -51,7 +51,7 @@ static bool goes_on(DenseWork *work, size_t products) {
     if ((work->done += products) < WATCH_PRODUCTS)
         return true;
     work->done = 0;
-    return watch_advance(frame->run->watch, frame_time(frame) / frame->plan->duration);
+    return progress_advance(frame->run->progress, frame_time(frame) / frame->plan->duration);
 }
 
 // Four sums, so that none waits long for the one before.

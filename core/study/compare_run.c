@@ -160,7 +160,7 @@ static Status tell_reference(CompareWork *work, Problem *problem) {
                : no_memory(problem);
 }
 
-static Status tell(const CompareWork *work, const Outcome *outcome, const Watch *watch,
+static Status tell(const CompareWork *work, const Outcome *outcome, const Progress *progress,
                    CompareEntry *entry, Problem *problem) {
     const Outcome *reference = work->reference;
     const Reals *band = &work->study->band;
@@ -175,8 +175,8 @@ static Status tell(const CompareWork *work, const Outcome *outcome, const Watch 
                                   spectrum, spectrum->densities.at[0].values,
                                   band->count == 2 ? band->at[0] : (double)NAN,
                                   band->count == 2 ? band->at[1] : (double)NAN);
-    entry->displacement = likeness_measure(&from, &to, work->study->part, watch);
-    if (!watch_advance(watch, 1))
+    entry->displacement = likeness_measure(&from, &to, work->study->part, progress);
+    if (!progress_advance(progress, 1))
         return problem_set(problem, STATUS_CANCELLED, "stopped at a comparison");
     TRY(tell_divergence(work, outcome, entry, problem));
     if (!copy_derived(&outcome->plan.derived, &entry->derived) ||
@@ -195,7 +195,7 @@ static Status run_entry(const CompareWork *work, size_t index, const StudyTools 
                                   tools->limits, &member, problem);
     if (status == STATUS_OK) {
         told->status = COMPARE_FAILED;
-        status = simulation_run(&member, tools->limits, tools->watch, tools->workspace, outcome,
+        status = simulation_run(&member, tools->limits, tools->progress, tools->workspace, outcome,
                                 problem);
     }
     simulation_clear(&member);
@@ -220,13 +220,13 @@ static Status make_entry(const StudyWork *of, size_t index, const StudyTools *to
     (void)fields_default(compare_entry_fields, part); // absent and 0: nothing to allocate
     Status status = run_entry(work, index + 1, tools, &outcome, part, problem);
     if (status == STATUS_OK) {
-        status = tell(work, outcome, tools->watch, part, problem);
+        status = tell(work, outcome, tools->progress, part, problem);
     } else if (!member_ends_all(status)) {
         part->why = member_why(problem);
         problem_clear(problem);
         status = part->why != NULL ? STATUS_OK : no_memory(problem);
     }
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     return status;
 }
 
@@ -248,7 +248,7 @@ static Status fold_entry(StudyWork *of, size_t index, void *part, Problem *probl
 
 static void free_entries(StudyWork *of) {
     CompareWork *work = (CompareWork *)(void *)of;
-    outcome_drop(work->reference);
+    outcome_unref(work->reference);
     free(work);
 }
 
@@ -265,7 +265,7 @@ static Status make_reference(CompareWork *work, const StudyTools *tools, Problem
     else
         status = tell_reference(work, problem);
     if (status == STATUS_OK)
-        status = tell(work, work->reference, tools->watch, &told, problem);
+        status = tell(work, work->reference, tools->progress, &told, problem);
     if (status == STATUS_OK)
         take_entry(&work->answer->entries.at[0], &told);
     fields_clear(compare_entry_fields, &told);

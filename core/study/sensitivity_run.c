@@ -9,12 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/candidate_settings.h"
+#include "core/study/contact_sensitivity.h"
+#include "core/study/parameter_perturbation.h"
 #include "core/study/statistics.h"
 #include "core/study/study_run.h"
 #include "core/study/uncertainty_bands.h"
-#include "core/study/parameter_perturbation.h"
-#include "core/study/contact_sensitivity.h"
-#include "core/study/candidate_settings.h"
 
 // Quotients agree that differ by no more than this part of the largest, or by so little that
 // nothing depends on the parameter.
@@ -221,7 +221,7 @@ static Status end_runs(StudyWork *of, const StudyTools *tools, Problem *problem)
     return work->study->runs == 0
                ? STATUS_OK
                : band_tell(&work->runs, work->statuses, &work->densities, work->own,
-                           work->has_force, tools->watch, work->answer, problem);
+                           work->has_force, tools->progress, work->answer, problem);
 }
 
 static Status tell_own(const SensitivityWork *work, Problem *problem) {
@@ -287,7 +287,7 @@ static Status lay_table(SensitivityWork *work, Problem *problem) {
 static Status begin_all(SensitivityWork *work, const StudyTools *tools, Problem *problem) {
     TRY(member_copy(work->simulation, &work->member, problem));
     TRY(member_settle(&work->member, problem));
-    TRY(simulation_run(&work->member, tools->limits, tools->watch, tools->workspace, &work->own,
+    TRY(simulation_run(&work->member, tools->limits, tools->progress, tools->workspace, &work->own,
                        problem));
     TRY(tell_own(work, problem));
     TRY(lay_rows(work, problem));
@@ -303,7 +303,7 @@ static void free_runs(StudyWork *of) {
     free(work->runs.at); // their texts are the table's
     free(work->statuses);
     band_clear(&work->densities);
-    outcome_drop(work->own);
+    outcome_unref(work->own);
     simulation_clear(&work->member);
     free(work);
 }

@@ -5,10 +5,10 @@
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
     const StudyKind *kind = study_kind(study);
-    Stage stage = stage_of(tools->watch, 0, STUDY_BEGUN);
-    const Watch watch = stage_watch(&stage);
+    ProgressRange range = progress_range(tools->progress, 0, STUDY_BEGUN);
+    const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
-    own.watch = &watch;
+    own.progress = &progress;
     *work = NULL;
     *answer = variant_new(kind->answer);
     if (*answer == NULL)
@@ -33,15 +33,15 @@ void study_free(StudyWork *work) {
 }
 
 static Status make_member(StudyWork *work, size_t member, const StudyTools *tools,
-                          const Watch *whole, Problem *problem) {
+                          const Progress *whole, Problem *problem) {
     const StudyMembers *members = work->kind->members;
     const double share = 1 / (double)work->expected;
-    Stage stage = stage_of(whole, (double)member * share, share);
-    const Watch watch = stage_watch(&stage);
+    ProgressRange range = progress_range(whole, (double)member * share, share);
+    const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
     void *part = NULL;
-    own.watch = &watch;
-    if (!watch_advance(&watch, 0))
+    own.progress = &progress;
+    if (!progress_advance(&progress, 0))
         return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
     Status status = members->make(work, member, &own, &part, problem);
     if (status == STATUS_OK)
@@ -53,8 +53,8 @@ static Status make_member(StudyWork *work, size_t member, const StudyTools *tool
 static Status make_all(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                        Variant **answer, Problem *problem) {
     StudyWork *work;
-    Stage stage = stage_of(tools->watch, STUDY_BEGUN, 1 - STUDY_BEGUN);
-    const Watch whole = stage_watch(&stage);
+    ProgressRange range = progress_range(tools->progress, STUDY_BEGUN, 1 - STUDY_BEGUN);
+    const Progress whole = progress_range_view(&range);
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
         status = make_member(work, i, tools, &whole, problem);

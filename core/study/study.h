@@ -14,7 +14,7 @@ typedef struct Study {
 // What a study is given to work with.
 typedef struct StudyTools {
     const SimulationLimits *limits; // of every run, and of the steps of all; may be NULL
-    const Watch *watch;             // may be NULL
+    const Progress *progress;       // may be NULL
     Workspace *workspace;           // may be NULL
     double (*cpu)(void *context);   // CPU time that this thread has taken [s]
     void *cpu_context;
@@ -67,7 +67,7 @@ struct StudyKind {
                    double *steps, Problem *problem);
     const StudyMembers *members; // NULL: it is made by `run`, on one thread
     // Fills `answer`, which holds its defaults; the caller frees it, also after a failure. Stops
-    // with STATUS_CANCELLED when the watch says so.
+    // with STATUS_CANCELLED when the progress says so.
     Status (*run)(const Study *study, const Simulation *simulation, const StudyTools *tools,
                   Variant *answer, Problem *problem);
 };

@@ -1,26 +1,26 @@
 #include "core/study/study_request.h"
 
-const Field inquiry_fields[] = {
-    FIELD_BASE(Inquiry, simulation, simulation_fields),
-    FIELD_VARIANT(Inquiry, study, &study_kinds, PRESENCE_OPTIONAL,
+const Field study_request_fields[] = {
+    FIELD_BASE(StudyRequest, simulation, simulation_fields),
+    FIELD_VARIANT(StudyRequest, study, &study_kinds, PRESENCE_OPTIONAL,
                   "what is to be found out about the scene beside its run"),
     FIELD_END,
 };
 
-void inquiry_clear(Inquiry *inquiry) {
-    fields_clear(inquiry_fields, inquiry);
+void study_request_clear(StudyRequest *inquiry) {
+    fields_clear(study_request_fields, inquiry);
 }
 
 static const double study_runs = 10; // a study may take as long as so many runs
 
-static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits,
+static Status check_steps(const StudyRequest *inquiry, const SimulationLimits *limits,
                           Problem *problem) {
     if (limits == NULL || !(limits->steps > 0))
         return STATUS_OK;
     Cost cost;
     const double own = study_kind(inquiry->study)->most_runs;
     const double most = (own > 0 ? own : study_runs) * limits->steps;
-    TRY(inquiry_cost(inquiry, limits, &cost, problem));
+    TRY(study_request_cost(inquiry, limits, &cost, problem));
     if (cost.steps <= most)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
@@ -28,12 +28,12 @@ static Status check_steps(const Inquiry *inquiry, const SimulationLimits *limits
                        cost.cpu_seconds, most * SOLVER_STEP, study_kind(inquiry->study)->lessen);
 }
 
-Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,
-                        Problem *problem) {
+Status study_request_complete(StudyRequest *inquiry, const SimulationLimits *limits,
+                              Warnings *warnings, Problem *problem) {
     Status status = simulation_complete(&inquiry->simulation, limits, warnings, problem);
     if (inquiry->study == NULL || (status != STATUS_OK && status != STATUS_INVALID))
         return status;
-    const Field *row = &inquiry_fields[1];
+    const Field *row = &study_request_fields[1];
     const Field rows[] = {*row, FIELD_END};
     const Status own = fields_check(rows, inquiry, "", problem);
     if (status == STATUS_OK)
@@ -46,8 +46,8 @@ Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnin
     return status == STATUS_OK ? check_steps(inquiry, limits, problem) : status;
 }
 
-Status inquiry_cost(const Inquiry *inquiry, const SimulationLimits *limits, Cost *cost,
-                    Problem *problem) {
+Status study_request_cost(const StudyRequest *inquiry, const SimulationLimits *limits, Cost *cost,
+                          Problem *problem) {
     *cost = simulation_cost(&inquiry->simulation);
     if (inquiry->study == NULL)
         return STATUS_OK;

@@ -5,23 +5,23 @@
 
 #include "core/study/study.h"
 
-typedef struct Inquiry {
+typedef struct StudyRequest {
     Simulation simulation;
     Variant *study; // a Study; NULL: none
-} Inquiry;
+} StudyRequest;
 
 // Without a study, to the byte what simulation_fields are: in JSON and in the canonical form.
-extern const Field inquiry_fields[];
+extern const Field study_request_fields[];
 
-void inquiry_clear(Inquiry *inquiry);
+void study_request_clear(StudyRequest *inquiry);
 
 // simulation_complete, and the same for the study: judges and completes it, and refuses one that is
 // foretold to take more than ten times limits->steps.
-Status inquiry_complete(Inquiry *inquiry, const SimulationLimits *limits, Warnings *warnings,
-                        Problem *problem);
+Status study_request_complete(StudyRequest *inquiry, const SimulationLimits *limits,
+                              Warnings *warnings, Problem *problem);
 
 // Expected cost of the whole. `problem` may be NULL.
-Status inquiry_cost(const Inquiry *inquiry, const SimulationLimits *limits, Cost *cost,
-                    Problem *problem);
+Status study_request_cost(const StudyRequest *inquiry, const SimulationLimits *limits, Cost *cost,
+                          Problem *problem);
 
 #endif

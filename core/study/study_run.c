@@ -45,7 +45,7 @@ static void keep(Outcome *outcome, MemberPart *part) {
     part->summary = outcome->summary;
     part->spectrum = outcome->spectrum;
     outcome->spectrum = (Spectrum){0};
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 Status member_run(const Simulation *member, const StudyTools *tools, MemberPart *part,
@@ -54,7 +54,7 @@ Status member_run(const Simulation *member, const StudyTools *tools, MemberPart 
     *part = (MemberPart){.steps = (double)NAN};
     (void)fields_default(summary_fields, &part->summary); // absent: nothing to allocate
     part->status =
-        simulation_run(member, tools->limits, tools->watch, tools->workspace, &outcome, problem);
+        simulation_run(member, tools->limits, tools->progress, tools->workspace, &outcome, problem);
     if (part->status == STATUS_OK) {
         keep(outcome, part);
         return STATUS_OK;

@@ -102,7 +102,7 @@ static SweepStatus kept_status(Status status) {
 }
 
 Status sweep_run_point(const SweepPlan *plan, size_t point, const SimulationLimits *limits,
-                       const Watch *watch, Workspace *workspace, double *values,
+                       const Progress *progress, Workspace *workspace, double *values,
                        SweepStatus *status, Problem *fault) {
     const Texts *metrics = &plan->study->metrics;
     Simulation scene;
@@ -110,11 +110,11 @@ Status sweep_run_point(const SweepPlan *plan, size_t point, const SimulationLimi
     problem_clear(fault);
     Status made = sweep_scene(plan, point, true, limits, &scene, fault);
     if (made == STATUS_OK)
-        made = simulation_run(&scene, limits, watch, workspace, &outcome, fault);
+        made = simulation_run(&scene, limits, progress, workspace, &outcome, fault);
     simulation_clear(&scene);
     for (size_t i = 0; i < metrics->count; i++)
         values[i] = made == STATUS_OK ? metric(metrics->at[i], outcome) : (double)NAN;
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     *status = made == STATUS_OK ? SWEEP_MADE : kept_status(made);
     return made == STATUS_CANCELLED || made == STATUS_NO_MEMORY ? made : STATUS_OK;
 }
@@ -145,7 +145,7 @@ static Status make_point(const StudyWork *of, size_t point, const StudyTools *to
     *made = part;
     if (part == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a point");
-    TRY(sweep_run_point(plan, point, tools->limits, tools->watch, tools->workspace, part->values,
+    TRY(sweep_run_point(plan, point, tools->limits, tools->progress, tools->workspace, part->values,
                         &part->status, problem));
     if (part->status == SWEEP_MADE)
         return STATUS_OK;
@@ -206,7 +206,7 @@ static Status begin_points(const Study *asked, const Simulation *simulation,
     work->answer = (Sweep *)(void *)told;
     Status status = sweep_plan_new(study, simulation, tools->limits, &work->plan, problem);
     if (status == STATUS_OK)
-        status = sweep_check(work->plan, SIZE_MAX, tools->limits, tools->watch, problem);
+        status = sweep_check(work->plan, SIZE_MAX, tools->limits, tools->progress, problem);
     if (status == STATUS_OK) {
         status = tell(study, work->plan, work->answer);
         if (status != STATUS_OK)

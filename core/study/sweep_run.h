@@ -7,9 +7,10 @@
 
 // Runs a point and writes its metrics to `values`, one for each that the study asks for; NAN where
 // it is unknown, and all of them where it failed. `fault` is left with why. STATUS_OK also then;
-// STATUS_CANCELLED when the watch said so, STATUS_NO_MEMORY where nothing can be said of the point.
+// STATUS_CANCELLED when the progress said so, STATUS_NO_MEMORY where nothing can be said of the
+// point.
 Status sweep_run_point(const SweepPlan *plan, size_t point, const SimulationLimits *limits,
-                       const Watch *watch, Workspace *workspace, double *values,
+                       const Progress *progress, Workspace *workspace, double *values,
                        SweepStatus *status, Problem *fault);
 
 // Adds a point that failed to those that failed in the same way. STATUS_NO_MEMORY.

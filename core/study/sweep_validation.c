@@ -68,13 +68,13 @@ static Status check_point(const SweepPlan *plan, size_t point, const SimulationL
 typedef struct Check {
     const SweepPlan *plan;
     const SimulationLimits *limits;
-    const Watch *watch;
+    const Progress *progress;
     Problem *fault, *problem;
     bool is_faulty;
 } Check;
 
 static Status check_next(Check *check, size_t point) {
-    if (!watch_advance(check->watch, (double)point / (double)check->plan->points))
+    if (!progress_advance(check->progress, (double)point / (double)check->plan->points))
         return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
     const Status status =
         check_point(check->plan, point, check->limits, check->fault, check->problem);
@@ -111,10 +111,10 @@ static Status check_all(Check *check) {
 }
 
 Status sweep_check(const SweepPlan *plan, size_t scenes, const SimulationLimits *limits,
-                   const Watch *watch, Problem *problem) {
+                   const Progress *progress, Problem *problem) {
     Check check = {.plan = plan,
                    .limits = limits,
-                   .watch = watch,
+                   .progress = progress,
                    .fault = malloc(sizeof(Problem)),
                    .problem = problem};
     if (check.fault == NULL)

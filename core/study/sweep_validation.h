@@ -7,10 +7,10 @@
 
 // Judges every point where they are no more work than `scenes` small ones, else about as many as
 // that: points where one axis alone leaves its first value, of long axes some, and the last one.
-// Each fault stands at the value it comes of and says which point it is of. `watch`, asked before
-// each point, may stop it.
+// Each fault stands at the value it comes of and says which point it is of. `progress`, asked
+// before each point, may stop it.
 Status sweep_check(const SweepPlan *plan, size_t scenes, const SimulationLimits *limits,
-                   const Watch *watch, Problem *problem);
+                   const Progress *progress, Problem *problem);
 
 // Judges axes and points, these as sweep_check does; `limits` NULL: the axes alone.
 Status sweep_judge(const SweepStudy *study, const Simulation *simulation, size_t scenes,

@@ -8,10 +8,10 @@
 #include <string.h>
 
 #include "core/simulation/error_metrics.h"
+#include "core/study/candidate_settings.h"
+#include "core/study/pareto.h"
 #include "core/study/statistics.h"
 #include "core/study/tradeoff_budget.h"
-#include "core/study/pareto.h"
-#include "core/study/candidate_settings.h"
 
 enum { BATCH = 10000 };                   // runs of a timing at most
 static const double batch_seconds = 5e-3; // of CPU, that a timing takes at least
@@ -33,10 +33,11 @@ typedef struct Session {
 // Runs within the study's progress, of which it is `steps`.
 static Status run(Session *session, const Simulation *simulation, const SimulationLimits *limits,
                   double steps, Outcome **outcome, Problem *problem) {
-    Stage stage =
-        stage_of(session->tools->watch, session->done / session->all, steps / session->all);
-    const Watch watch = stage_watch(&stage);
-    return simulation_run(simulation, limits, &watch, session->tools->workspace, outcome, problem);
+    ProgressRange range = progress_range(session->tools->progress, session->done / session->all,
+                                         steps / session->all);
+    const Progress progress = progress_range_view(&range);
+    return simulation_run(simulation, limits, &progress, session->tools->workspace, outcome,
+                          problem);
 }
 
 static bool ends_all(Status status) {
@@ -126,7 +127,7 @@ static Status measure_errors(Session *session, size_t index, Problem *problem) {
         status = set_aside(point, as, status, session->fault, problem);
     }
     session->done += steps;
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
     return status;
 }
@@ -150,7 +151,7 @@ static Status time_point(Session *session, size_t index, size_t round, Problem *
         Outcome *outcome = NULL;
         const double share = fmin(steps, end - session->done);
         status = run(session, &simulation, &session->limits, share, &outcome, problem);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         session->done += share;
         runs++;
         took = cpu(session) - began;
@@ -184,11 +185,11 @@ static Status measure_all(Session *session, Problem *problem) {
     session->done += BUDGET_BATCH;
     for (size_t i = 0; i < points->count; i++)
         TRY(measure_errors(session, i, problem));
-    outcome_drop(session->reference);
+    outcome_unref(session->reference);
     session->reference = NULL;
     for (size_t round = 0; round < session->study->repeats; round++)
         for (size_t i = 0; i < points->count; i++) {
-            if (!watch_advance(session->tools->watch, session->done / session->all))
+            if (!progress_advance(session->tools->progress, session->done / session->all))
                 return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
             if (points->at[i].status == TRADEOFF_MEASURED)
                 TRY(time_point(session, i, round, problem));
@@ -231,7 +232,7 @@ Status tradeoff_measure(const TradeoffStudy *study, const Simulation *simulation
         if (status != STATUS_OK)
             (void)problem_set(problem, status, "no memory for the study's answer");
     }
-    outcome_drop(session.reference);
+    outcome_unref(session.reference);
     free(session.steps);
     free(session.times);
     free(session.fault);

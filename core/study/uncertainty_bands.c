@@ -7,7 +7,7 @@
 
 #include "core/study/statistics.h"
 
-enum { LOOK = 64 }; // frequencies between looks at the watch
+enum { LOOK = 64 }; // frequencies between looks at the progress
 
 static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
@@ -63,7 +63,7 @@ static Status tell_statistics(const EnsembleRuns *table, const Summary *own, boo
 
 // `values` has room for all runs.
 static Status tell_spectrum(const BandDensities *kept, size_t channel, const Column *own,
-                            const Watch *watch, double *values, SensitivitySpectrum *told,
+                            const Progress *progress, double *values, SensitivitySpectrum *told,
                             Problem *problem) {
     const size_t rows = kept->rows, runs = kept->runs;
     told->channel = strdup(own->name);
@@ -75,7 +75,7 @@ static Status tell_spectrum(const BandDensities *kept, size_t channel, const Col
     memcpy(told->value.at, own->values, rows * sizeof *values);
     for (size_t k = 0; k < rows; k++) {
         double sum = 0;
-        if (k % LOOK == 0 && !watch_advance(watch, 1))
+        if (k % LOOK == 0 && !progress_advance(progress, 1))
             return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
         for (size_t i = 0; i < runs; i++) {
             values[i] = kept->at[(i * kept->channels + channel) * rows + k];
@@ -90,7 +90,7 @@ static Status tell_spectrum(const BandDensities *kept, size_t channel, const Col
     return STATUS_OK;
 }
 
-static Status tell_spectra(const BandDensities *kept, const Spectrum *own, const Watch *watch,
+static Status tell_spectra(const BandDensities *kept, const Spectrum *own, const Progress *progress,
                            Sensitivity *answer, Problem *problem) {
     if (kept->runs == 0)
         return STATUS_OK;
@@ -103,16 +103,16 @@ static Status tell_spectra(const BandDensities *kept, const Spectrum *own, const
     if (status == STATUS_OK)
         memcpy(answer->frequency.at, own->frequency, kept->rows * sizeof *own->frequency);
     for (size_t c = 0; c < kept->channels && status == STATUS_OK; c++)
-        status = tell_spectrum(kept, c, &own->densities.at[c], watch, values,
+        status = tell_spectrum(kept, c, &own->densities.at[c], progress, values,
                                &answer->spectra.at[answer->spectra.count++], problem);
     free(values);
     return status;
 }
 
 Status band_tell(const EnsembleRuns *table, const Status *statuses, const BandDensities *kept,
-                 const Outcome *own, bool has_force, const Watch *watch, Sensitivity *answer,
+                 const Outcome *own, bool has_force, const Progress *progress, Sensitivity *answer,
                  Problem *problem) {
     TRY(tell_statistics(table, &own->summary, has_force, answer, problem));
     TRY(statistics_failures(table, statuses, &answer->failures, problem));
-    return tell_spectra(kept, &own->spectrum, watch, answer, problem);
+    return tell_spectra(kept, &own->spectrum, progress, answer, problem);
 }

@@ -18,9 +18,9 @@ Status band_keep(BandDensities *kept, const Spectrum *spectrum, size_t most, Pro
 void band_clear(BandDensities *kept);
 
 // Fills statistics, failures and spectra of the answer. The table's "seed" is the run's number.
-// Sorting many densities takes long: `watch` may stop it.
+// Sorting many densities takes long: `progress` may stop it.
 Status band_tell(const EnsembleRuns *table, const Status *statuses, const BandDensities *kept,
-                 const Outcome *own, bool has_force, const Watch *watch, Sensitivity *answer,
+                 const Outcome *own, bool has_force, const Progress *progress, Sensitivity *answer,
                  Problem *problem);
 
 #endif

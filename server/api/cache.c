@@ -97,7 +97,7 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
     return STATUS_OK;
 }
 
-static Status explain(App *app, const Inquiry *inquiry, Bytes *bytes, Problem *problem) {
+static Status explain(App *app, const StudyRequest *inquiry, Bytes *bytes, Problem *problem) {
     char result[72];
     IntakeLayers layers;
     Bytes scene = {.most = app->reply_most};
@@ -125,7 +125,7 @@ static Status explain(App *app, const Inquiry *inquiry, Bytes *bytes, Problem *p
 }
 
 Status cache_explain(App *app, const Request *request, Reply *reply, Problem *problem) {
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     Bytes bytes = {.most = app->reply_most};
     TRY(body_require_json(request, problem));
@@ -137,7 +137,7 @@ Status cache_explain(App *app, const Request *request, Reply *reply, Problem *pr
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     else
         bytes_clear(&bytes);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }

@@ -35,9 +35,9 @@ static bool name_in_folder(const char *path, const char *folder, char name[64]) 
 }
 
 static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *name) {
-    Inquiry inquiry;
+    StudyRequest inquiry;
     const bool is_read =
-        read_json(file->bytes, file->size, inquiry_fields, &inquiry, NULL) == STATUS_OK;
+        read_json(file->bytes, file->size, study_request_fields, &inquiry, NULL) == STATUS_OK;
     bytes_text(bytes, "{\"name\": ");
     bytes_json_string(bytes, name);
     bytes_text(bytes, ", \"title\": ");
@@ -46,7 +46,7 @@ static void write_example(Bytes *bytes, const EmbeddedFile *file, const char *na
                  name);
     bytes_put(bytes, file->bytes, file->size);
     bytes_text(bytes, "}");
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 Status examples_list(App *app, const Request *request, Reply *reply, Problem *problem) {

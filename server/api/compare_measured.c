@@ -16,7 +16,7 @@
 
 enum { SEGMENT = 4096 };
 
-static const char *const quantity_units[] = {"m/s^2", "m/s", "m"};
+static const char *const statistic_units[] = {"m/s^2", "m/s", "m"};
 
 static Status refuse_channel(const MeasuredRequest *asked, const Response *response,
                              Problem *problem) {
@@ -24,7 +24,7 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
     for (size_t i = 0; i < response->series.count; i++) {
         const Column *column = &response->series.at[i];
         const size_t used = strlen(there);
-        if (strcmp(column->unit, quantity_units[asked->measured.quantity]) == 0 &&
+        if (strcmp(column->unit, statistic_units[asked->measured.quantity]) == 0 &&
             used + sizeof column->name + 2 < sizeof there)
             text_list(there, sizeof there, column->name);
     }
@@ -33,7 +33,7 @@ static Status refuse_channel(const MeasuredRequest *asked, const Response *respo
         text_quote(fault.value, sizeof fault.value, asked->channel);
     snprintf(fault.detail, sizeof fault.detail,
              "must be a sampled channel in %s; the result has: %s",
-             quantity_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
+             statistic_units[asked->measured.quantity], there[0] != '\0' ? there : "none");
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
@@ -41,10 +41,10 @@ static Status choose_channel(const MeasuredRequest *asked, const Response *respo
                              const Column **column, Problem *problem) {
     const int quantity = asked->measured.quantity;
     *column = columns_find(&response->series,
-                           asked->channel != NULL ? asked->channel : quantity_names[quantity]);
+                           asked->channel != NULL ? asked->channel : statistic_names[quantity]);
     if (*column == NULL && asked->channel == NULL && quantity == QUANTITY_ACCELERATION)
         *column = columns_find(&response->series, "mean_acceleration");
-    return *column != NULL && strcmp((*column)->unit, quantity_units[quantity]) == 0
+    return *column != NULL && strcmp((*column)->unit, statistic_units[quantity]) == 0
                ? STATUS_OK
                : refuse_channel(asked, response, problem);
 }

@@ -45,7 +45,7 @@ Sides sides_begin(const Request *request) {
 
 void sides_end(Sides *sides) {
     for (size_t i = 0; i < SIDES; i++)
-        outcome_drop(sides->outcomes[i]);
+        outcome_unref(sides->outcomes[i]);
     if (sides->release != NULL)
         sides->release(sides->asked);
     *sides = (Sides){{NULL}, NULL, NULL};

@@ -14,7 +14,7 @@ static const double quick = 0.005;  // foretold CPU that a request itself may ta
 static const double wait_most = 60; // [s]
 
 typedef struct Look {
-    Inquiry inquiry;
+    StudyRequest inquiry;
     size_t number, points;
     Closeup closeup;
     Status status;
@@ -24,12 +24,12 @@ typedef struct Look {
 static void look_free(void *context) {
     Look *look = context;
     closeup_clear(&look->closeup);
-    inquiry_clear(&look->inquiry);
+    study_request_clear(&look->inquiry);
     free(look);
 }
 
 // Nobody's limits: the scene was within them when its result was made.
-static void look_run(void *context, const Watch *watch) {
+static void look_run(void *context, const Progress *watch) {
     Look *look = context;
     look->status = closeup_make(&look->inquiry.simulation, look->number, look->points, NULL, watch,
                                 NULL, &look->closeup, &look->problem);

@@ -113,7 +113,7 @@ void job_put_known(Bytes *bytes, const JobShow *show, JobSlots *slots) {
 
 void job_put_dry_run(Bytes *bytes, const DryRun *run) {
     bytes_text(bytes, "{\"dry_run\": true, \"scene\": ");
-    write_item(bytes, inquiry_fields, &run->inquiry, WRITE_SCENE);
+    write_item(bytes, study_request_fields, &run->inquiry, WRITE_SCENE);
     bytes_format(bytes, ", \"result\": \"%s\", \"cached\": %s, \"plan\": ", run->result,
                  run->is_cached ? "true" : "false");
     write_item(bytes, plan_report_fields, &run->plan, WRITE_REPORT);

@@ -4,14 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/formats/ground_motion_text.h"
 #include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/codec/read.h"
 #include "server/http/body.h"
 #include "server/http/header.h"
 #include "server/http/reply.h"
 
-const char *const quantity_names[] = {"acceleration", "velocity", "displacement", NULL};
+const char *const statistic_names[] = {"acceleration", "velocity", "displacement", NULL};
 const char *const align_names[] = {"given", "auto", NULL};
 
 // clang-format off
@@ -19,7 +19,7 @@ static const Field measured_fields[] = {
     FIELD_REALS(Measured, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "what was measured, in SI units"),
     FIELD_REAL(Measured, interval, "s", WITHIN(1e-9, 1e6), REQUIRED, "from one sample to the next"),
     FIELD_REAL(Measured, start, "s", WITHIN(-1e9, 1e9), 0, "time of the first sample; the result's first is at 0"),
-    FIELD_CHOICE(Measured, quantity, quantity_names, QUANTITY_ACCELERATION, "what was measured"),
+    FIELD_CHOICE(Measured, quantity, statistic_names, QUANTITY_ACCELERATION, "what was measured"),
     FIELD_END
 };
 

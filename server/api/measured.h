@@ -8,8 +8,12 @@
 
 enum { MEASURED_LEAST = 16 }; // samples
 
-typedef enum Quantity { QUANTITY_ACCELERATION, QUANTITY_VELOCITY, QUANTITY_DISPLACEMENT } Quantity;
-extern const char *const quantity_names[];
+typedef enum Statistic {
+    QUANTITY_ACCELERATION,
+    QUANTITY_VELOCITY,
+    QUANTITY_DISPLACEMENT
+} Statistic;
+extern const char *const statistic_names[];
 
 typedef enum Align { ALIGN_GIVEN, ALIGN_AUTO } Align;
 extern const char *const align_names[];
@@ -17,7 +21,7 @@ extern const char *const align_names[];
 typedef struct Measured {
     Reals samples;
     double interval, start; // [s]
-    int quantity;           // Quantity
+    int quantity;           // Statistic
 } Measured;
 
 typedef struct MeasuredRequest {

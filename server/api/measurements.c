@@ -47,7 +47,7 @@ Status material_latest(App *app, const char *slug, MaterialRevision *revision, P
 
 Status material_evaluate(Patience *patience, const Measurement *tests, size_t count, int separation,
                          Evaluation *evaluation, Reply *reply, Problem *problem) {
-    const Watch watch = {patience, patience_lasts};
+    const Progress watch = {patience, patience_lasts};
     Status status =
         evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
     if (status == STATUS_CANCELLED)

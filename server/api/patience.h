@@ -14,7 +14,7 @@ typedef struct Patience {
 } Patience;
 
 void patience_begin(App *app, Patience *patience);
-// Of a Watch, whose context is the patience; on the thread that began. False: give up.
+// Of a Progress, whose context is the patience; on the thread that began. False: give up.
 bool patience_lasts(void *patience, double fraction);
 // Why it was given up: STATUS_BUSY while others take long or the daemon stops, else STATUS_LIMIT.
 Status patience_tell(const Patience *patience, Problem *problem);

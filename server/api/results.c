@@ -40,9 +40,9 @@ void results_link_gone(const char *id, Reply *reply) {
              id, id);
 }
 
-// The scene as it was run, read back from its canonical JSON. Cleared by inquiry_clear in any
+// The scene as it was run, read back from its canonical JSON. Cleared by study_request_clear in any
 // case.
-static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *problem) {
+static Status read_scene(const ResultRow *row, StudyRequest *inquiry, Problem *problem) {
     Problem *fault = malloc(sizeof *fault);
     if (fault == NULL || row->scene == NULL) {
         free(fault);
@@ -50,7 +50,8 @@ static Status read_scene(const ResultRow *row, Inquiry *inquiry, Problem *proble
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's scene");
     }
     problem_clear(fault);
-    const Status status = read_json(row->scene, strlen(row->scene), inquiry_fields, inquiry, fault);
+    const Status status =
+        read_json(row->scene, strlen(row->scene), study_request_fields, inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
@@ -168,7 +169,7 @@ static void write_link(App *app, Bytes *bytes, const Use *use) {
 }
 
 // What the scene and its study were made with, each in the words of `write`.
-static void write_materials(App *app, Bytes *bytes, const Inquiry *inquiry,
+static void write_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
                             void (*write)(App *app, Bytes *bytes, const Use *use)) {
     Bytes lines = {0};
     Use use;
@@ -188,7 +189,7 @@ static void write_materials(App *app, Bytes *bytes, const Inquiry *inquiry,
     bytes_clear(&lines);
 }
 
-static void write_result(Bytes *bytes, const ResultRow *row, const Inquiry *inquiry,
+static void write_result(Bytes *bytes, const ResultRow *row, const StudyRequest *inquiry,
                          const StudyAnswer *answer) {
     const Simulation *simulation = &inquiry->simulation;
     bytes_format(bytes, "{\"id\": \"%s\", \"engine\": ", row->id);
@@ -225,14 +226,14 @@ static void write_result(Bytes *bytes, const ResultRow *row, const Inquiry *inqu
 }
 
 Status results_put(const ResultRow *row, Bytes *bytes, Problem *problem) {
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     StudyAnswer answer = {NULL};
     Status status = read_scene(row, &inquiry, problem);
     if (status == STATUS_OK && row->study != NULL)
         status = study_read(row, &answer, problem);
     if (status == STATUS_OK)
         write_result(bytes, row, &inquiry, &answer);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     fields_clear(study_answer_fields, &answer);
     return status;
 }
@@ -253,7 +254,7 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
 }
 
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem) {
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     const Status status = read_scene(row, &inquiry, problem);
     if (status == STATUS_OK) {
         char created[32];
@@ -282,7 +283,7 @@ Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *probl
                               "it");
         bytes_text(bytes, "\"}}\n");
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     return status;
 }
 

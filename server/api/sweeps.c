@@ -242,7 +242,7 @@ static Status show_point(App *app, const Request *request, Reply *reply, bool is
         status = reply_bytes(reply, 200, type_json, &bytes, problem);
     }
     free(point.values);
-    inquiry_clear(&point.scene);
+    study_request_clear(&point.scene);
     sweep_show_clear(&show);
     return status;
 }

@@ -21,7 +21,7 @@ void sheet_clear(Sheet *sheet) {
     encoding_close(sheet->encoding);
     free(sheet->chosen);
     columns_clear(&sheet->own);
-    outcome_drop(sheet->outcome);
+    outcome_unref(sheet->outcome);
     *sheet = (Sheet){.encoding = NULL};
 }
 

@@ -10,7 +10,7 @@
 
 // clang-format off
 const SchemaDocument schema_documents[] = {
-    {"scene", "A scene: what impactd is asked to simulate", inquiry_fields},
+    {"scene", "A scene: what impactd is asked to simulate", study_request_fields},
     {"material", "A buffer material: what one revision of it says", material_fields},
     {"new_material", "A new material: its first revision", new_material_fields},
     {"material_revision", "A new revision of a material: all that it says, and why", material_revision_fields},

@@ -40,8 +40,8 @@ static void interrupts_catch(void) {
 }
 
 static bool advance(void *bar, double fraction) {
-    const Watch drawn = bar_watch(bar);
-    (void)watch_advance(&drawn, fraction);
+    const Progress drawn = bar_watch(bar);
+    (void)progress_advance(&drawn, fraction);
     return is_interrupted == 0;
 }
 
@@ -58,7 +58,7 @@ static int backup(void *of, const Options *options, Problem *problem) {
     const char *path = options->operands[0];
     Backup made = {0};
     Bar bar;
-    const Watch watch = {&bar, advance};
+    const Progress watch = {&bar, advance};
     interrupts_catch();
     bar_start(&bar);
     Status status = data_folder_find(&settings->data, problem);

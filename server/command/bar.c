@@ -37,8 +37,8 @@ static bool bar_advance(void *context, double fraction) {
     return true;
 }
 
-Watch bar_watch(Bar *bar) {
-    return (Watch){bar, bar_advance};
+Progress bar_watch(Bar *bar) {
+    return (Progress){bar, bar_advance};
 }
 
 void bar_stop(Bar *bar) {

@@ -14,8 +14,8 @@ typedef struct Bar {
 } Bar;
 
 void bar_start(Bar *bar);
-// A Watch that draws; it never asks to stop. Borrows `bar`.
-Watch bar_watch(Bar *bar);
+// A Progress that draws; it never asks to stop. Borrows `bar`.
+Progress bar_watch(Bar *bar);
 void bar_stop(Bar *bar);
 
 #endif

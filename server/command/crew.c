@@ -12,7 +12,7 @@ enum { THREADS = 256 };
 
 typedef struct Crew {
     const SimulationLimits *limits;
-    const Watch *watch;
+    const Progress *watch;
     Order order;
     pthread_mutex_t lock; // of what follows
     pthread_cond_t changed;
@@ -45,7 +45,7 @@ static bool advance(void *context, double fraction) {
         hand->told = fraction;
     }
     const double share = STUDY_BEGUN + (1 - STUDY_BEGUN) * fmin(crew->done / expected, 1);
-    if (crew->status == STATUS_OK && !watch_advance(crew->watch, share))
+    if (crew->status == STATUS_OK && !progress_advance(crew->watch, share))
         fail(crew, STATUS_CANCELLED, "the study was stopped");
     const bool goes_on = crew->status == STATUS_OK;
     pthread_mutex_unlock(&crew->lock);
@@ -55,8 +55,8 @@ static bool advance(void *context, double fraction) {
 static Status make_member(Hand *hand, Workspace *workspace, size_t member) {
     Crew *crew = hand->crew;
     const StudyMembers *members = crew->order.work->kind->members;
-    const Watch watch = {hand, advance};
-    const StudyTools tools = {.limits = crew->limits, .watch = &watch, .workspace = workspace};
+    const Progress watch = {hand, advance};
+    const StudyTools tools = {.limits = crew->limits, .progress = &watch, .workspace = workspace};
     void *part = NULL;
     hand->told = 0;
     problem_clear(&hand->problem);
@@ -133,7 +133,7 @@ static Status make_all(Crew *crew, size_t most, Problem *problem) {
 }
 
 static Status make_members(StudyWork *of, const StudyTools *tools, Problem *problem) {
-    Crew crew = {.limits = tools->limits, .watch = tools->watch, .problem = problem};
+    Crew crew = {.limits = tools->limits, .watch = tools->progress, .problem = problem};
     pthread_mutex_init(&crew.lock, NULL);
     pthread_cond_init(&crew.changed, NULL);
     const size_t threads = slots();
@@ -147,10 +147,10 @@ static Status make_members(StudyWork *of, const StudyTools *tools, Problem *prob
 }
 
 Status crew_run(const Variant *study, const Simulation *simulation, const SimulationLimits *limits,
-                const Watch *watch, Variant **answer, Problem *problem) {
+                const Progress *watch, Variant **answer, Problem *problem) {
     Workspace workspace = {0};
     StudyWork *work;
-    const StudyTools tools = {.limits = limits, .watch = watch, .workspace = &workspace};
+    const StudyTools tools = {.limits = limits, .progress = watch, .workspace = &workspace};
     Status status = study_begin(study, simulation, &tools, answer, &work, problem);
     if (status == STATUS_OK)
         status = make_members(work, &tools, problem);

@@ -8,6 +8,6 @@
 // study_run with many threads: the same bytes. `watch` may be NULL, and is called by one thread at
 // a time.
 Status crew_run(const Variant *study, const Simulation *simulation, const SimulationLimits *limits,
-                const Watch *watch, Variant **answer, Problem *problem);
+                const Progress *watch, Variant **answer, Problem *problem);
 
 #endif

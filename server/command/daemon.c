@@ -124,8 +124,8 @@ typedef struct Show {
 static void show_job(Show *show, const JobTold *job) {
     const double progress = job->progress >= 0 && job->progress <= 100 ? job->progress : 0;
     if (show->bar.is_terminal) {
-        const Watch watch = bar_watch(&show->bar);
-        (void)watch_advance(&watch, progress / 100);
+        const Progress watch = bar_watch(&show->bar);
+        (void)progress_advance(&watch, progress / 100);
         return;
     }
     if (show->lines == NULL ||

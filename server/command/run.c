@@ -64,8 +64,9 @@ static Status whole_write(const Outcome *outcome, const Bytes *job, Bytes *bytes
 }
 
 // A job of nobody's queue, finished.
-static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const Outcome *outcome,
-                        const int64_t began_unix_ms, double took, Bytes *bytes) {
+static Status job_write(const StudyRequest *inquiry, const Warnings *warnings,
+                        const Outcome *outcome, const int64_t began_unix_ms, double took,
+                        Bytes *bytes) {
     Bytes plan = {0}, summary = {0}, work = {0}, told = {0}, notes = {0};
     document_plan(&plan, &outcome->plan);
     document_summary(&summary, outcome);
@@ -100,7 +101,7 @@ static Status job_write(const Inquiry *inquiry, const Warnings *warnings, const 
 }
 
 // Runs and prints or writes. `encoder` is that of the output's extension, NULL without output.
-static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings *warnings,
+static Status scene_run(const char *path, const StudyRequest *inquiry, const Warnings *warnings,
                         const RunSettings *settings, const Encoder *encoder, Problem *problem) {
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     const char *output = settings->output;
@@ -109,7 +110,7 @@ static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings
     Bar bar;
     const int64_t began_unix_ms = clock_unix_ms(), began_ns = clock_monotonic_ns();
     bar_start(&bar);
-    const Watch watch = bar_watch(&bar);
+    const Progress watch = bar_watch(&bar);
     Status status = simulation_run(&inquiry->simulation, &limits, &watch, NULL, &outcome, problem);
     bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
@@ -135,7 +136,7 @@ static Status scene_run(const char *path, const Inquiry *inquiry, const Warnings
         (void)problem_set(problem, status, "no memory for the answer");
     bytes_clear(&job);
     bytes_clear(&bytes);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     return status;
 }
 
@@ -144,7 +145,7 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text,
                                     Problem *problem) {
     const SimulationLimits limits = scene_file_limits(settings->max_cpu_seconds);
     Store *store = NULL;
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {0};
     TRY(store_open(NULL, &store, problem));
     Status status =
@@ -164,7 +165,7 @@ static Status scene_prepare_and_run(const char *path, const Bytes *text,
             status = scene_run(path, &inquiry, &warnings, settings, encoder, problem);
         output_drop();
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }

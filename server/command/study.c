@@ -62,22 +62,22 @@ static double thread_cpu(void *context) {
 }
 
 // CPU times are measured on one thread, by itself.
-static Status measure(const Inquiry *inquiry, const SimulationLimits *limits, const Watch *watch,
-                      Variant **answer, Problem *problem) {
+static Status measure(const StudyRequest *inquiry, const SimulationLimits *limits,
+                      const Progress *watch, Variant **answer, Problem *problem) {
     Workspace workspace = {0};
     const StudyTools tools = {
-        .limits = limits, .watch = watch, .workspace = &workspace, .cpu = thread_cpu};
+        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = thread_cpu};
     const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, answer, problem);
     workspace_clear(&workspace);
     return status;
 }
 
-static Status study_make(const StudyCommand *command, const Inquiry *inquiry, const Texts *outputs,
-                         const SimulationLimits *limits, Problem *problem) {
+static Status study_make(const StudyCommand *command, const StudyRequest *inquiry,
+                         const Texts *outputs, const SimulationLimits *limits, Problem *problem) {
     Bar bar;
     Variant *answer = NULL;
     bar_start(&bar);
-    const Watch watch = bar_watch(&bar);
+    const Progress watch = bar_watch(&bar);
     Status status =
         study_kind(inquiry->study)->members != NULL
             ? crew_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem)
@@ -92,7 +92,7 @@ static Status study_make(const StudyCommand *command, const Inquiry *inquiry, co
 }
 
 // The document's own study, or a new one, with what the flags say.
-static Status study_choose(const StudyCommand *command, Inquiry *inquiry, void *settings,
+static Status study_choose(const StudyCommand *command, StudyRequest *inquiry, void *settings,
                            Problem *problem) {
     if (inquiry->study == NULL && command->kind == NULL)
         return problem_add(problem, STATUS_INVALID, "/study",
@@ -118,7 +118,7 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
                           Problem *problem) {
     const SimulationLimits limits = scene_file_limits(cpu_seconds);
     Store *store = NULL;
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {0};
     TRY(store_open(NULL, &store, problem));
     Status status =
@@ -129,7 +129,7 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
     if (status == STATUS_OK)
         status = study_choose(command, &inquiry, settings, problem);
     if (status == STATUS_OK)
-        status = inquiry_complete(&inquiry, &limits, NULL, problem);
+        status = study_request_complete(&inquiry, &limits, NULL, problem);
     StudyCommand own = *command;
     if (status == STATUS_OK && own.kind == NULL) {
         own.kind = study_kind(inquiry.study);
@@ -142,7 +142,7 @@ static Status scene_study(const StudyCommand *command, const char *path, const B
     }
     if (status == STATUS_OK)
         status = study_make(&own, &inquiry, outputs, &limits, problem);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }

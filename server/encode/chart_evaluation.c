@@ -20,7 +20,7 @@ static const char rules[] = ".ring, .cross { fill: none; stroke-width: 1.5; } .c
 
 // One of the two quantities.
 typedef struct Panel {
-    const Quantity *of;
+    const Statistic *of;
     bool is_time;
     const char *name, *unit;
     double without_speed; // where readings that have none are drawn
@@ -66,7 +66,7 @@ static void fit(Plot *plot, Panel *panel, const Evaluation *evaluation) {
 }
 
 static void put_mean(const Plot *plot, const Panel *panel) {
-    const Quantity *of = panel->of;
+    const Statistic *of = panel->of;
     if (isnan(of->mean))
         return;
     if (!isnan(of->low))
@@ -131,7 +131,7 @@ static void put_panel(const Evaluation *evaluation, Panel panel, int index, Byte
     char text[160];
     plot_begin(&plot);
     fit(&plot, &panel, evaluation);
-    const Quantity *of = panel.of;
+    const Statistic *of = panel.of;
     if (of->count == 0)
         snprintf(text, sizeof text, "%s: not known", panel.name);
     else if (isnan(of->low))

@@ -239,6 +239,6 @@ static const char scene_back[] =
 void manual_scene(FILE *file) {
     head(file, "IMPACTD\\-SCENE", "5");
     fputs(scene_front, file);
-    rows_print(file, inquiry_fields, "");
+    rows_print(file, study_request_fields, "");
     fputs(scene_back, file);
 }

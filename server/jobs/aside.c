@@ -34,7 +34,7 @@ static bool go_on(void *context, double fraction) {
 static void *aside_main(void *context) {
     Aside *aside = context;
     Asides *all = aside->all;
-    const Watch watch = {aside, go_on};
+    const Progress watch = {aside, go_on};
     aside->work.run(aside->work.context, &watch);
     pthread_mutex_lock(&all->lock);
     Aside **at = &all->running;

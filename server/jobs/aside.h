@@ -16,7 +16,7 @@ void asides_close(Asides *asides);
 
 typedef struct AsideWork {
     void *context; // freed by `release` once neither the thread nor the reader needs it
-    void (*run)(void *context, const Watch *watch);
+    void (*run)(void *context, const Progress *watch);
     void (*release)(void *context);
 } AsideWork;
 

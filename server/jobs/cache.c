@@ -54,7 +54,7 @@ static void evict(Cache *cache, Entry *entry) {
     cache->heads.bytes -= entry->head_bytes;
     cache->series.count -= entry->outcome != NULL;
     cache->heads.count -= entry->head != NULL;
-    outcome_drop(entry->outcome);
+    outcome_unref(entry->outcome);
     head_drop(entry->head);
     free(entry);
 }
@@ -75,7 +75,7 @@ void cache_put(Cache *cache, const char *id, Outcome *outcome, Head *head) {
     text_fit(entry->id, sizeof entry->id, id);
     Outcome *kept = outcome != NULL ? outcome : old != NULL ? old->outcome : NULL;
     if (kept != NULL)
-        entry->outcome = outcome_hold(kept);
+        entry->outcome = outcome_ref(kept);
     entry->head = head_hold(head != NULL ? head : old != NULL ? old->head : NULL);
     if (old != NULL)
         evict(cache, old);
@@ -109,7 +109,7 @@ Outcome *cache_find(Cache *cache, const char *id) {
     const bool is_hit = entry != NULL && entry->outcome != NULL;
     cache->series.hits += is_hit;
     cache->series.misses += !is_hit;
-    return is_hit ? outcome_hold(entry->outcome) : NULL;
+    return is_hit ? outcome_ref(entry->outcome) : NULL;
 }
 
 Head *cache_head(Cache *cache, const char *id) {

@@ -50,7 +50,7 @@ void document_energy(Bytes *bytes, const Energy *energy) {
 
 enum { WATCH_IMPACTS = 1 << 12, WATCH_VALUES = 1 << 16 }; // written between two looks at the watch
 
-bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch) {
+bool document_impacts(Bytes *bytes, const Response *response, const Progress *watch) {
     const Impacts *impacts = &response->impacts;
     if (response->is_unlisted) {
         bytes_text(bytes, "null");
@@ -60,7 +60,7 @@ bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch
                  (unsigned long long)response->impact_count,
                  (unsigned long long)response->resting_count);
     for (size_t i = 0; i < impacts->count; i++) {
-        if (i % WATCH_IMPACTS == 0 && !watch_advance(watch, 1))
+        if (i % WATCH_IMPACTS == 0 && !progress_advance(watch, 1))
             return false;
         bytes_text(bytes, i > 0 ? ", " : "");
         write_item(bytes, impact_fields, &impacts->at[i], WRITE_REPORT);
@@ -70,12 +70,12 @@ bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch
 }
 
 static bool put_values(Bytes *bytes, const char *unit, const double *values, size_t count,
-                       const Watch *watch) {
+                       const Progress *watch) {
     bytes_text(bytes, "{\"unit\": ");
     bytes_json_string(bytes, unit);
     bytes_text(bytes, ", \"values\": [");
     for (size_t i = 0; i < count; i += WATCH_VALUES) {
-        if (!watch_advance(watch, 1))
+        if (!progress_advance(watch, 1))
             return false;
         bytes_text(bytes, i > 0 ? "," : "");
         bytes_reals(bytes, values + i, count - i < WATCH_VALUES ? count - i : WATCH_VALUES);
@@ -84,7 +84,7 @@ static bool put_values(Bytes *bytes, const char *unit, const double *values, siz
     return true;
 }
 
-bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Watch *watch) {
+bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Progress *watch) {
     const SpectrumSettings *settings = &spectrum->settings;
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0) {
@@ -111,11 +111,11 @@ bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Watch *watch) {
     return true;
 }
 
-void document_scene(Bytes *bytes, const Inquiry *inquiry) {
-    Inquiry plain = *inquiry; // a borrowed view: nothing is cleared
+void document_scene(Bytes *bytes, const StudyRequest *inquiry) {
+    StudyRequest plain = *inquiry; // a borrowed view: nothing is cleared
     plain.simulation.title = NULL;
     plain.simulation.labels = (Texts){NULL, 0};
-    write_item(bytes, inquiry_fields, &plain, WRITE_SCENE);
+    write_item(bytes, study_request_fields, &plain, WRITE_SCENE);
 }
 
 void document_study(Bytes *bytes, const StudyAnswer *answer) {

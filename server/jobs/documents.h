@@ -17,11 +17,11 @@ void document_join(Bytes *bytes, const char *first, const char *second);
 void document_energy(Bytes *bytes, const Energy *energy);
 // These two may be long: where the watch says so they are left unfinished, and it is false.
 // Where the scene asked for none: null.
-bool document_impacts(Bytes *bytes, const Response *response, const Watch *watch);
+bool document_impacts(Bytes *bytes, const Response *response, const Progress *watch);
 // Without any density: null.
-bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Watch *watch);
+bool document_psd(Bytes *bytes, const Spectrum *spectrum, const Progress *watch);
 // The scene as it can be submitted again, with its study, without its notes.
-void document_scene(Bytes *bytes, const Inquiry *inquiry);
+void document_scene(Bytes *bytes, const StudyRequest *inquiry);
 // A study's answer, as it is kept: what is unknown is left out, so that it can be read again.
 void document_study(Bytes *bytes, const StudyAnswer *answer);
 // The same as people get it: {"kind": ..., what is unknown null}.

@@ -16,7 +16,7 @@ static Status no_memory(Problem *problem) {
 }
 
 static Status fold_open(Worker *worker, StudyRun *run, Problem *problem) {
-    const Inquiry *inquiry = &run->computation->inquiry;
+    const StudyRequest *inquiry = &run->computation->inquiry;
     Fold *fold = calloc(1, sizeof *fold);
     Cost cost;
     if (fold == NULL)
@@ -25,7 +25,7 @@ static Status fold_open(Worker *worker, StudyRun *run, Problem *problem) {
     const Status status = run->executor->probe(worker->intake, &fold->limits, problem);
     TRY(order_make(run->work, fold->limits.slots, &fold->order, problem));
     TRY(status);
-    TRY(inquiry_cost(inquiry, &worker->intake->settings.limits, &cost, problem));
+    TRY(study_request_cost(inquiry, &worker->intake->settings.limits, &cost, problem));
     fold->seconds = cost.cpu_seconds / (double)(run->work->members + 1);
     run->bytes = run->work->bytes + fold->order.window * run->work->part_bytes;
     return STATUS_OK;

@@ -29,7 +29,7 @@ void computation_free(Computation *computation) {
     if (computation == NULL)
         return;
     study_run_free(computation->study);
-    inquiry_clear(&computation->inquiry);
+    study_request_clear(&computation->inquiry);
     free(computation->scene);
     free(computation->warnings);
     free(computation->askers.at);

@@ -23,12 +23,13 @@ typedef struct IntakeSettings {
 } IntakeSettings;
 
 // Reads a scene's JSON, perhaps with a study, resolves its materials, judges and completes it, all
-// faults at once. `inquiry` is cleared by inquiry_clear in any case, `warnings` by warnings_clear.
+// faults at once. `inquiry` is cleared by study_request_clear in any case, `warnings` by
+// warnings_clear.
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      Inquiry *inquiry, Warnings *warnings, Problem *problem);
+                      StudyRequest *inquiry, Warnings *warnings, Problem *problem);
 
 // "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
-void intake_result_id(const Inquiry *inquiry, char target[72]);
+void intake_result_id(const StudyRequest *inquiry, char target[72]);
 
 // Opens the queue, takes up unfinished jobs of the store, starts the workers. Borrows `store`.
 Status intake_open(Store *store, const IntakeSettings *settings, Intake **intake, Problem *problem);
@@ -88,7 +89,7 @@ void intake_learn(Intake *intake, const Submission *submission, uint64_t mark, J
 
 // The same without running: everything a dry run answers.
 typedef struct DryRun {
-    Inquiry inquiry;
+    StudyRequest inquiry;
     Warnings warnings;
     PlanReport plan;
     Cost cost;

@@ -28,7 +28,7 @@ typedef struct Wakers {
 typedef struct Computation {
     IndexEntry indexed; // in flight, by result; not once it was stopped
     char result[72];
-    Inquiry inquiry;
+    StudyRequest inquiry;
     char *scene, *warnings; // documents
     QueueEntry queued;      // also for the next turn of a study
     bool is_running;

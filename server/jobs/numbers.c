@@ -180,7 +180,7 @@ Outcome *numbers_read(const char *at, size_t size) {
         take_spectrum(&reader, head, &outcome->spectrum);
     }
     if (outcome != NULL && (reader.is_bad || reader.left > 0)) {
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         outcome = NULL;
     }
     return outcome;

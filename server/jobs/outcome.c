@@ -92,7 +92,7 @@ static Status tell_failure(Intake *intake, const char *result, Problem *problem)
 static Status compute_again(Intake *intake, const char *result, const Waker *waker,
                             Problem *problem) {
     ResultRow row = {0};
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     Computation *computation = NULL;
     Status status = store_result_scene(intake->store, result, &row, problem);
@@ -115,7 +115,7 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the series");
     if (status == STATUS_OK) {
         computation->inquiry = inquiry;
-        inquiry = (Inquiry){0};
+        inquiry = (StudyRequest){0};
         computation->is_again = true;
         pthread_mutex_lock(&intake->lock);
         Computation *other = index_find(intake->in_flight, result);
@@ -129,7 +129,7 @@ static Status compute_again(Intake *intake, const char *result, const Waker *wak
         pthread_mutex_unlock(&intake->lock);
     }
     computation_free(computation);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     result_row_clear(&row);
     return status;

@@ -15,12 +15,12 @@
 #include "server/jobs/prepare_sweep.h"
 
 Status intake_prepare(Store *store, const char *text, size_t size, const SimulationLimits *limits,
-                      Inquiry *inquiry, Warnings *warnings, Problem *problem) {
+                      StudyRequest *inquiry, Warnings *warnings, Problem *problem) {
     // All three add to one problem: what could not be read is judged no further, the rest is.
     Problem *own = NULL;
     if (problem == NULL && (problem = own = calloc(1, sizeof *own)) == NULL)
         return STATUS_NO_MEMORY;
-    Status status = read_json(text, size, inquiry_fields, inquiry, problem);
+    Status status = read_json(text, size, study_request_fields, inquiry, problem);
     const bool is_object = problem->count == 0 || problem->faults[0].pointer[0] != '\0';
     if (is_object && (status == STATUS_OK || status == STATUS_INVALID)) {
         Status resolved = prepare_materials(store, &inquiry->simulation, warnings, problem);
@@ -32,7 +32,7 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
         else if (inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep)
             status = prepare_sweep(store, inquiry, limits, warnings, problem);
         else
-            status = inquiry_complete(inquiry, limits, warnings, problem);
+            status = study_request_complete(inquiry, limits, warnings, problem);
         if (status == STATUS_OK)
             status = resolved;
     }
@@ -40,20 +40,20 @@ Status intake_prepare(Store *store, const char *text, size_t size, const Simulat
     return status;
 }
 
-void intake_result_id(const Inquiry *inquiry, char target[72]) {
+void intake_result_id(const StudyRequest *inquiry, char target[72]) {
     char hex[65];
     Digest *digest = digest_new();
     target[0] = '\0';
     if (digest == NULL)
         return;
     digest_take(digest, engine_version, strlen(engine_version) + 1);
-    canonical_write(inquiry_fields, inquiry, digest_take, digest);
+    canonical_write(study_request_fields, inquiry, digest_take, digest);
     digest_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
 }
 
 void dry_run_clear(DryRun *dry_run) {
-    inquiry_clear(&dry_run->inquiry);
+    study_request_clear(&dry_run->inquiry);
     warnings_clear(&dry_run->warnings);
     fields_clear(plan_report_fields, &dry_run->plan);
 }
@@ -68,7 +68,7 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
     if (caution_warn_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
                               &dry_run->warnings) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-    TRY(inquiry_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
+    TRY(study_request_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
     dry_run->is_cached = store_result_exists(intake->store, dry_run->result);
     return STATUS_OK;
 }

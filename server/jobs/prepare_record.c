@@ -185,13 +185,13 @@ static Status resolve_value(Store *store, const char *value, PinnedRecords *reco
     return status;
 }
 
-static SweepStudy *sweep_of(const Inquiry *inquiry) {
+static SweepStudy *sweep_of(const StudyRequest *inquiry) {
     return inquiry->study != NULL && study_kind(inquiry->study) == &study_sweep
                ? (SweepStudy *)(void *)inquiry->study
                : NULL;
 }
 
-Status prepare_sweep_records(Store *store, Inquiry *inquiry, Problem *problem) {
+Status prepare_sweep_records(Store *store, StudyRequest *inquiry, Problem *problem) {
     SweepStudy *study = sweep_of(inquiry);
     Status status = STATUS_OK;
     size_t samples = 0;
@@ -227,7 +227,7 @@ Status prepare_sweep_records(Store *store, Inquiry *inquiry, Problem *problem) {
     return status;
 }
 
-void prepare_records_drop(Inquiry *inquiry) {
+void prepare_records_drop(StudyRequest *inquiry) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL) {
@@ -240,7 +240,7 @@ void prepare_records_drop(Inquiry *inquiry) {
     }
 }
 
-Status prepare_records_again(Store *store, Inquiry *inquiry, Problem *problem) {
+Status prepare_records_again(Store *store, StudyRequest *inquiry, Problem *problem) {
     ExcitationRecord *record = record_of(&inquiry->simulation);
     SweepStudy *study = sweep_of(inquiry);
     if (record != NULL)
@@ -258,7 +258,7 @@ static void put_use(Bytes *uses, const char *name) {
     bytes_text(uses, "\n");
 }
 
-void prepare_record_uses(const Inquiry *inquiry, Bytes *uses) {
+void prepare_record_uses(const StudyRequest *inquiry, Bytes *uses) {
     const ExcitationRecord *record = record_of(&inquiry->simulation);
     const SweepStudy *study = sweep_of(inquiry);
     if (record != NULL)

@@ -91,7 +91,8 @@ static Status resolve_axes(Store *store, SweepStudy *study, Warnings *warnings, 
 
 // Materials that were pinned are what the store says, those of the scene are pinned, and those of
 // the axes found and pinned.
-static Status resolve_sweep(Store *store, Inquiry *inquiry, Warnings *warnings, Problem *problem) {
+static Status resolve_sweep(Store *store, StudyRequest *inquiry, Warnings *warnings,
+                            Problem *problem) {
     SweepStudy *study = (SweepStudy *)(void *)inquiry->study;
     Status status = STATUS_OK;
     for (size_t i = 0; i < study->materials.count && problem->count < PROBLEM_FAULTS; i++) {
@@ -120,7 +121,7 @@ static Status resolve_sweep(Store *store, Inquiry *inquiry, Warnings *warnings, 
 
 // An axis's unknown name is no reason to leave the other values unjudged: its fault is told beside
 // theirs, and in place of what the same name leads to there.
-Status prepare_sweep(Store *store, Inquiry *inquiry, const SimulationLimits *limits,
+Status prepare_sweep(Store *store, StudyRequest *inquiry, const SimulationLimits *limits,
                      Warnings *warnings, Problem *problem) {
     Problem *names = calloc(1, sizeof *names), *rest = calloc(1, sizeof *rest);
     Status status = STATUS_NO_MEMORY;
@@ -132,7 +133,7 @@ Status prepare_sweep(Store *store, Inquiry *inquiry, const SimulationLimits *lim
             status = STATUS_INVALID; // told; names that were not looked up are judged no further
         } else if (status == STATUS_OK || status == STATUS_INVALID) {
             const Status resolved = status;
-            status = inquiry_complete(inquiry, limits, warnings, has_own ? problem : rest);
+            status = study_request_complete(inquiry, limits, warnings, has_own ? problem : rest);
             status = resolved != STATUS_OK ? resolved : status;
         }
         for (size_t i = 0; i < names->count && i < PROBLEM_FAULTS; i++)

@@ -6,9 +6,9 @@
 #include "core/study/study_request.h"
 #include "server/store/store.h"
 
-// Behind prepare_materials, in place of inquiry_complete, of an inquiry whose study is a sweep.
-// Adds all faults, those of names among them.
-Status prepare_sweep(Store *store, Inquiry *inquiry, const SimulationLimits *limits,
+// Behind prepare_materials, in place of study_request_complete, of an inquiry whose study is a
+// sweep. Adds all faults, those of names among them.
+Status prepare_sweep(Store *store, StudyRequest *inquiry, const SimulationLimits *limits,
                      Warnings *warnings, Problem *problem);
 
 #endif

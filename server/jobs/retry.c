@@ -24,7 +24,7 @@ static Status judge(Intake *intake, const char *id, SweepRow *row, Problem *prob
 
 // Chunks of another engine's cannot be mended by this one.
 static Status judge_engine(Intake *intake, const SweepRow *row, Problem *problem) {
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     char result[72] = "";
     Status status = intake_prepare(intake->store, row->scene, strlen(row->scene), NULL, &inquiry,
@@ -36,7 +36,7 @@ static Status judge_engine(Intake *intake, const SweepRow *row, Problem *problem
                              "the sweep was made by another engine version, this is %s: POST to "
                              "/v1/results/%.72s/again, which submits its scene anew",
                              engine_version, row->result);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return status;
 }

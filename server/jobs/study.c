@@ -26,11 +26,11 @@ bool study_is_shared(const Computation *computation) {
 }
 
 void study_foretell(Computation *computation, const SimulationLimits *limits) {
-    const Inquiry *inquiry = &computation->inquiry;
+    const StudyRequest *inquiry = &computation->inquiry;
     const Cost own = simulation_cost(&inquiry->simulation);
     Cost whole = own;
     // A series that is computed again needs no study.
-    if (!computation->is_again && inquiry_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
+    if (!computation->is_again && study_request_cost(inquiry, limits, &whole, NULL) != STATUS_OK)
         whole.cpu_seconds = queue_quick; // the run will tell
     computation->queued.seconds = whole.cpu_seconds;
     computation->queued.charge = study_is_shared(computation) ? own.cpu_seconds : 0;
@@ -91,11 +91,11 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
 }
 
-static Status open_run(Worker *worker, StudyRun *run, Findings *findings, const Watch *watch,
+static Status open_run(Worker *worker, StudyRun *run, Findings *findings, const Progress *watch,
                        Problem *problem) {
-    const Inquiry *inquiry = &run->computation->inquiry;
+    const StudyRequest *inquiry = &run->computation->inquiry;
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
-                              .watch = watch,
+                              .progress = watch,
                               .workspace = &worker->workspace};
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &findings->answer.study,
                     &run->work, problem));
@@ -103,8 +103,8 @@ static Status open_run(Worker *worker, StudyRun *run, Findings *findings, const 
     return run->gather->open(worker, run, problem);
 }
 
-Status study_open(Worker *worker, Computation *computation, Findings *findings, const Watch *watch,
-                  Problem *problem) {
+Status study_open(Worker *worker, Computation *computation, Findings *findings,
+                  const Progress *watch, Problem *problem) {
     Intake *intake = worker->intake;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
@@ -280,9 +280,9 @@ void study_work(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
 
 // What remains to be told, and the study's document.
 static Status tell_end(Worker *worker, StudyRun *run, Problem *problem) {
-    const Watch watch = {run->computation, computation_is_wanted};
+    const Progress watch = {run->computation, computation_is_wanted};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
-                              .watch = &watch,
+                              .progress = &watch,
                               .workspace = &worker->workspace};
     problem_clear(problem);
     if (run->gather->finish != NULL)

@@ -54,8 +54,8 @@ void study_foretell(Computation *computation, const SimulationLimits *limits);
 
 // Makes ready: a worker's part of the way, until there are members to be shared out. Fills
 // findings->answer and computation->study. Stops when `watch` says so.
-Status study_open(Worker *worker, Computation *computation, Findings *findings, const Watch *watch,
-                  Problem *problem);
+Status study_open(Worker *worker, Computation *computation, Findings *findings,
+                  const Progress *watch, Problem *problem);
 // Hands the members to the executor; takes the computation and the findings. From here on whoever
 // takes its last chunk ends it.
 void study_launch(Worker *worker, Computation *computation, Findings *findings, Problem *problem);
@@ -84,7 +84,7 @@ void shift_free(StudyRun *run, Shift *shift); // NULL is fine
 // later.
 enum { STUDY_TURN_MS = 10 }; // that is not interrupted for others
 Status study_chunk_make(Worker *worker, StudyRun *run, Shift *shift, Problem *problem);
-// A Watch's advance: whether the study, a StudyRun, goes on.
+// A Progress's advance: whether the study, a StudyRun, goes on.
 bool study_goes_on(void *run, double fraction);
 // Members were there before.
 void study_count(StudyRun *run, size_t members);

@@ -50,9 +50,9 @@ static Status make_member(Worker *worker, StudyRun *run, Shift *shift, Problem *
     const StudyMembers *members = run->work->kind->members;
     const Chunk *chunk = &shift->chunk;
     Making making = {run, 0};
-    const Watch watch = {&making, advance};
+    const Progress watch = {&making, advance};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
-                              .watch = &watch,
+                              .progress = &watch,
                               .workspace = &worker->workspace};
     void *part = NULL;
     if (run->gather->has != NULL && run->gather->has(run, shift))

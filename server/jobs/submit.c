@@ -124,23 +124,24 @@ static Status find_room(const Intake *intake, const Job *job, Problem *problem) 
 }
 
 // A computation of this scene, without jobs. Takes the inquiry. NULL without memory.
-static Computation *begin(const JobRow *row, Inquiry *inquiry) {
+static Computation *begin(const JobRow *row, StudyRequest *inquiry) {
     Computation *computation = computation_new(row->result);
     if (computation != NULL) {
         computation->scene = strdup(row->scene);
         computation->warnings = strdup(row->warnings);
         computation->inquiry = *inquiry;
-        *inquiry = (Inquiry){0};
+        *inquiry = (StudyRequest){0};
         if (computation->scene != NULL && computation->warnings != NULL)
             return computation;
     }
     computation_free(computation);
-    inquiry_clear(inquiry);
+    study_request_clear(inquiry);
     return NULL;
 }
 
 // Queues it, or lets it share what is under way. Takes the inquiry.
-static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, Problem *problem) {
+static Status start(Intake *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+                    Problem *problem) {
     Computation *computation = begin(&job->row, inquiry);
     if (computation == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
@@ -177,7 +178,7 @@ static Status start(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, P
 enum { LABELS_MOST = 8192 };
 
 // Title, labels and study, as they are shown and searched.
-static Status fill_notes(JobRow *row, const Inquiry *inquiry, Problem *problem) {
+static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
     const Simulation *simulation = &inquiry->simulation;
     const Texts *labels = &simulation->labels;
     Bytes shown = {0}, words = {0};
@@ -224,7 +225,7 @@ static Status fill_sender(Job *job, const Submission *submission, const KeyHold 
                : STATUS_OK;
 }
 
-static Status fill_job(Job *job, const Inquiry *inquiry, const Warnings *warnings,
+static Status fill_job(Job *job, const StudyRequest *inquiry, const Warnings *warnings,
                        Problem *problem) {
     JobRow *row = &job->row;
     Bytes scene = {0}, told = {0}, uses = {0};
@@ -259,7 +260,8 @@ static void fail_row(JobRow *row, const Problem *problem) {
     row->finished_unix_ms = clock_unix_ms();
 }
 
-static Status submit(Intake *intake, Job *job, Inquiry *inquiry, bool is_retry, Problem *problem) {
+static Status submit(Intake *intake, Job *job, StudyRequest *inquiry, bool is_retry,
+                     Problem *problem) {
     const Status known = is_retry ? STATUS_NOT_FOUND : find_known(intake, job, problem);
     if (known == STATUS_OK)
         return finish_known(intake, job, problem);
@@ -284,7 +286,7 @@ static Status enter_client(Intake *intake, const Submission *submission, Client 
 
 // A record that it names may have been deleted since it was looked up under `generation`. From here
 // on none is before the store knows of the job.
-static Status submit_named(Intake *intake, Job *job, Inquiry *inquiry, uint64_t generation,
+static Status submit_named(Intake *intake, Job *job, StudyRequest *inquiry, uint64_t generation,
                            const Submission *submission, Problem *problem) {
     Status status = STATUS_OK;
     naming_enter(&intake->naming);
@@ -305,7 +307,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     const uint64_t generation = store_generation(intake->store);
     Status status = intake_prepare(intake->store, submission->text, submission->size,
@@ -318,7 +320,7 @@ static Status submit_new(Intake *intake, const Submission *submission, const Key
         status = submit(intake, job, &inquiry, submission->retry_of != NULL, problem);
     else if (status == STATUS_OK)
         status = submit_named(intake, job, &inquiry, generation, submission, problem);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     if (status != STATUS_OK) {
         job_drop(job);
@@ -362,7 +364,7 @@ Status intake_submit(Intake *intake, const Submission *submission, Job **accepte
 }
 
 // Takes the row and the inquiry.
-static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *problem) {
+static Status resume(Intake *intake, JobRow *row, StudyRequest *inquiry, Problem *problem) {
     Job *job = job_new(intake);
     Client *client = queue_client(intake->queue, row->client != NULL ? row->client : "");
     Computation *computation = NULL;
@@ -394,7 +396,7 @@ static Status resume(Intake *intake, JobRow *row, Inquiry *inquiry, Problem *pro
 
 Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the unfinished jobs");
@@ -409,7 +411,7 @@ Status intake_take_up(Intake *intake, JobRow *row, Problem *problem) {
     } else {
         problem_set(problem, status, "%s", fault->detail);
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     free(fault);
     return status;

@@ -17,9 +17,9 @@ static Status no_memory(Problem *problem) {
 
 // CPU that a point takes, about, by some of them [s].
 static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem *problem) {
-    const Watch watch = {run, study_goes_on};
+    const Progress watch = {run, study_goes_on};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
-                              .watch = &watch,
+                              .progress = &watch,
                               .workspace = &worker->workspace};
     const size_t points = run->work->members, most = points < PILOT ? points : PILOT;
     const int64_t began_ns = clock_thread_cpu_ns();

@@ -19,8 +19,8 @@ static Status read_scene(SweepShow *show, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return no_memory(problem);
-    const Status status =
-        read_json(show->row.scene, strlen(show->row.scene), inquiry_fields, &show->inquiry, fault);
+    const Status status = read_json(show->row.scene, strlen(show->row.scene), study_request_fields,
+                                    &show->inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
         problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
@@ -136,7 +136,7 @@ Status sweep_show_load(Store *store, const char *id, bool is_job, bool has_rows,
 
 void sweep_show_clear(SweepShow *show) {
     sweep_row_clear(&show->row);
-    inquiry_clear(&show->inquiry);
+    study_request_clear(&show->inquiry);
     variant_free((Variant *)(void *)show->sweep);
     sweep_chunk_rows_clear(&show->chunks);
     free(show->window);

@@ -10,8 +10,8 @@
 // A sweep read back. All zero is empty.
 typedef struct SweepShow {
     SweepRow row;
-    Inquiry inquiry; // with its study
-    Sweep *sweep;    // the answer; of its table what failed, where it was asked for
+    StudyRequest inquiry; // with its study
+    Sweep *sweep;         // the answer; of its table what failed, where it was asked for
     Store *store;
     SweepChunkRows chunks; // that are there, without their rows
     size_t rows;           // of those
@@ -36,9 +36,9 @@ bool sweep_show_read(void *show, size_t cell, size_t first, size_t count, double
 // One point of it.
 typedef struct SweepPointShow {
     SweepStatus status;
-    char why[200];  // "" unless it failed
-    double *values; // of the metrics; freed by the caller
-    Inquiry scene;  // completed, as it can be submitted; by inquiry_clear
+    char why[200];      // "" unless it failed
+    double *values;     // of the metrics; freed by the caller
+    StudyRequest scene; // completed, as it can be submitted; by study_request_clear
 } SweepPointShow;
 // STATUS_NOT_FOUND beyond the last. Cleared by the caller in any case.
 Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,

@@ -26,7 +26,7 @@ static void add(Bytes *bytes, const Buffer *buffer) {
     bytes_text(bytes, "\n");
 }
 
-void uses_write(Bytes *bytes, const Inquiry *inquiry) {
+void uses_write(Bytes *bytes, const StudyRequest *inquiry) {
     const Dampers *dampers = &inquiry->simulation.scene.dampers;
     for (size_t i = 0; i < dampers->count; i++) {
         add(bytes, &dampers->at[i].buffer);

@@ -8,7 +8,7 @@
 
 // Adds a line for each revision of a material, "sponge@1\n", and each record,
 // "record:elcentro\n", that the prepared scene or its sweep names.
-void uses_write(Bytes *bytes, const Inquiry *inquiry);
+void uses_write(Bytes *bytes, const StudyRequest *inquiry);
 
 // One of those lines.
 typedef struct Use {

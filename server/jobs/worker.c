@@ -36,7 +36,7 @@ bool computation_is_wanted(void *context, double fraction) {
 }
 
 void findings_clear(Findings *findings) {
-    outcome_drop(findings->outcome);
+    outcome_unref(findings->outcome);
     fields_clear(study_answer_fields, &findings->answer);
     result_row_clear(&findings->result);
     free(findings->problem);
@@ -54,7 +54,7 @@ static char *take(Bytes *bytes, Status *status) {
 }
 
 static Status describe(Computation *computation, Findings *findings) {
-    const Watch watch = {computation, computation_is_wanted};
+    const Progress watch = {computation, computation_is_wanted};
     const Outcome *outcome = findings->outcome;
     ResultRow *row = &findings->result;
     Bytes plan = {0}, summary = {0}, work = {0}, notes = {0}, energy = {0}, uses = {0};
@@ -115,9 +115,9 @@ static double thread_cpu(void *context) {
 static Status run_study(Worker *worker, Computation *computation, Findings *findings,
                         Problem *problem) {
     Part part = {computation, STUDY_OWN, 1 - STUDY_OWN};
-    const Watch watch = {&part, advance};
+    const Progress watch = {&part, advance};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
-                              .watch = &watch,
+                              .progress = &watch,
                               .workspace = &worker->workspace,
                               .cpu = thread_cpu};
     // What has members goes on chunk by chunk, on all threads. What measures CPU times has none: it
@@ -133,7 +133,7 @@ static void run(Worker *worker, Computation *computation, Findings *findings, Pr
     // Only the scene's own series is ever wanted again.
     const bool has_study = computation->inquiry.study != NULL && !computation->is_again;
     Part part = {computation, 0, has_study ? STUDY_OWN : 1};
-    const Watch watch = {&part, advance};
+    const Progress watch = {&part, advance};
     // A series that is computed again was within the limits when it was computed first.
     const SimulationLimits *limits = computation->is_again ? NULL : &intake->settings.limits;
     problem_clear(problem);
@@ -188,12 +188,12 @@ void computation_abandon(Intake *intake, Computation *computation) {
 void computation_finish(Intake *intake, Computation *computation, Findings *findings) {
     char result[sizeof computation->result];
     const double seconds = findings->seconds;
-    Outcome *outcome = findings->outcome != NULL ? outcome_hold(findings->outcome) : NULL;
+    Outcome *outcome = findings->outcome != NULL ? outcome_ref(findings->outcome) : NULL;
     memcpy(result, computation->result, sizeof result);
     intake_save(intake, computation, findings);
     if (outcome != NULL)
         intake_keep_series(intake, result, outcome, seconds);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static bool is_slow(const Computation *computation) {

@@ -15,7 +15,7 @@ Status findings_tell_study(Findings *findings, Problem *problem);
 // Without the lock. Takes both: saves what it came to, also its series where that pays.
 void computation_finish(Intake *intake, Computation *computation, Findings *findings);
 
-// A Watch's advance that tells no progress: false once a computation was stopped.
+// A Progress's advance that tells no progress: false once a computation was stopped.
 bool computation_is_wanted(void *computation, double fraction);
 // Without the lock. Takes the computation: nobody waits for it any more, or the daemon ends and its
 // jobs stay unfinished in the store.

@@ -196,9 +196,9 @@ static Status count_copy(Work *work, Problem *problem) {
 
 static Status fill(Work *work, Problem *problem) {
     Database *source = NULL;
-    Stage copying = stage_of(work->request->watch, 0, copy_share);
-    Stage checking = stage_of(work->request->watch, copy_share, 1 - copy_share);
-    const Watch watches[] = {stage_watch(&copying), stage_watch(&checking)};
+    ProgressRange copying = progress_range(work->request->watch, 0, copy_share);
+    ProgressRange checking = progress_range(work->request->watch, copy_share, 1 - copy_share);
+    const Progress watches[] = {progress_range_view(&copying), progress_range_view(&checking)};
     Status status = open_source(work, &source, problem);
     if (status == STATUS_OK)
         status = open_part(work, problem);
@@ -222,7 +222,7 @@ static Status give_name(Work *work, Problem *problem) {
         return problem_set(problem, errno == ENOSPC || errno == EDQUOT ? STATUS_FULL : STATUS_IO,
                            "%s cannot be written: %s", path, strerror(errno));
     work->backup.bytes = (uint64_t)what.st_size;
-    if (!watch_advance(work->request->watch, 1))
+    if (!progress_advance(work->request->watch, 1))
         return problem_set(problem, STATUS_CANCELLED, "it was interrupted");
     TRY(check_place(work, problem));
     const bool is_linked = !work->request->replaces && link(work->part, path) == 0;

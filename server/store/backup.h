@@ -5,14 +5,14 @@
 
 #include <stdint.h>
 
-#include "core/base/status.h"
 #include "core/base/progress.h"
+#include "core/base/status.h"
 
 typedef struct BackupRequest {
     const char *directory; // the daemon's
     const char *path;      // of the copy
     bool replaces;         // what is at `path` already
-    const Watch *watch;    // NULL: nobody
+    const Progress *watch; // NULL: nobody
 } BackupRequest;
 
 // What is in a copy.

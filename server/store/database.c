@@ -340,7 +340,7 @@ Status database_migrate(Database *database, const EmbeddedFile *files, Problem *
 
 // The open transaction is what makes it one moment: without it the copy would begin anew whenever
 // another process has written.
-static Status copy_pages(Database *from, Database *to, const Watch *watch, Problem *problem) {
+static Status copy_pages(Database *from, Database *to, const Progress *watch, Problem *problem) {
     enum { PAGES = 64 };
     int64_t tables;
     TRY(read_number(from, "SELECT count(*) AS number FROM sqlite_schema", &tables, problem));
@@ -352,7 +352,7 @@ static Status copy_pages(Database *from, Database *to, const Watch *watch, Probl
     do {
         code = sqlite3_backup_step(backup, PAGES);
         const int all = sqlite3_backup_pagecount(backup);
-        is_wanted = watch_advance(
+        is_wanted = progress_advance(
             watch, all > 0 ? 1 - (double)sqlite3_backup_remaining(backup) / (double)all : 0);
     } while (code == SQLITE_OK && is_wanted);
     (void)sqlite3_backup_finish(backup); // the copy's connection has its error
@@ -362,7 +362,7 @@ static Status copy_pages(Database *from, Database *to, const Watch *watch, Probl
                                : report(to->connection, "copying the database", problem);
 }
 
-Status database_copy(Database *from, Database *to, const Watch *watch, Problem *problem) {
+Status database_copy(Database *from, Database *to, const Progress *watch, Problem *problem) {
     TRY(database_execute(from, "BEGIN", problem));
     const Status status = copy_pages(from, to, watch, problem);
     (void)database_execute(from, "ROLLBACK", NULL);
@@ -372,10 +372,10 @@ Status database_copy(Database *from, Database *to, const Watch *watch, Problem *
 }
 
 static int ask(void *watch) {
-    return !watch_advance(watch, 0);
+    return !progress_advance(watch, 0);
 }
 
-void database_watch(Database *database, const Watch *watch) {
+void database_watch(Database *database, const Progress *watch) {
     enum { OPERATIONS = 20000 };
     sqlite3_progress_handler(database->connection, OPERATIONS, watch != NULL ? ask : NULL,
                              (void *)(uintptr_t)watch);

@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/base/status.h"
 #include "core/base/progress.h"
+#include "core/base/status.h"
 #include "server/base/embedded.h"
 
 typedef struct Database Database;
@@ -68,10 +68,10 @@ Status database_read_part(Database *database, const char *table, const char *col
 
 // Fills `to` with all that is in `from` at this moment, while others write to that. `watch` (NULL:
 // nobody) is told how far it is. STATUS_CANCELLED when it wants no more.
-Status database_copy(Database *from, Database *to, const Watch *watch, Problem *problem);
+Status database_copy(Database *from, Database *to, const Progress *watch, Problem *problem);
 
 // Until NULL is given, `watch` is asked now and then whether a statement that takes long shall go
 // on; where not it is STATUS_CANCELLED.
-void database_watch(Database *database, const Watch *watch);
+void database_watch(Database *database, const Progress *watch);
 
 #endif

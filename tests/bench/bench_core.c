@@ -17,7 +17,7 @@
 
 typedef struct Lane {
     pthread_t thread;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     double displacement; // as read [m]
     int64_t end_ns;
     uint64_t number, runs;
@@ -50,13 +50,13 @@ static Status run_one(Lane *lane, Workspace *workspace) {
     Outcome *outcome = NULL;
     Cost cost;
     alter(lane);
-    Status status = inquiry_complete(&lane->inquiry, &limits, &warnings, &lane->problem);
+    Status status = study_request_complete(&lane->inquiry, &limits, &warnings, &lane->problem);
     if (status == STATUS_OK)
-        status = inquiry_cost(&lane->inquiry, &limits, &cost, &lane->problem);
+        status = study_request_cost(&lane->inquiry, &limits, &cost, &lane->problem);
     if (status == STATUS_OK)
         status = simulation_run(&lane->inquiry.simulation, &limits, NULL, workspace, &outcome,
                                 &lane->problem);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     warnings_clear(&warnings);
     return status;
 }
@@ -124,7 +124,7 @@ int main(int argc, char **argv) {
     }
     const double took = 1e-9 * (double)(clock_monotonic_ns() - began);
     for (size_t i = 0; i < threads; i++)
-        inquiry_clear(&lanes[i].inquiry);
+        study_request_clear(&lanes[i].inquiry);
     if (status != STATUS_OK) {
         fprintf(stderr, "bench_core: %s\n", problem->detail);
         return 1;

@@ -28,7 +28,7 @@ static double scene_us(bool is_random, bool has_channels, double duration) {
         for (int j = 0; j < RUNS && status == STATUS_OK; j++) {
             Outcome *outcome = NULL;
             status = simulation_run(&simulation, NULL, NULL, &workspace, &outcome, &problem);
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
         const double here = (double)(clock_thread_cpu_ns() - start) / 1e3 / RUNS;
         us = here < us ? here : us;

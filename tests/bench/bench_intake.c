@@ -54,7 +54,7 @@ static void stop(const char *what) {
 
 static void measure_core(Store *store) {
     char text[2400];
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     const int size = scene_text(text, 1);
     if (intake_prepare(store, text, (size_t)size, NULL, &inquiry, &warnings, &problem) != STATUS_OK)
@@ -68,14 +68,14 @@ static void measure_core(Store *store) {
         if (simulation_run(&inquiry.simulation, NULL, NULL, &workspace, &outcome, &problem) !=
             STATUS_OK)
             stop("the core");
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         count++;
         took = now() - began;
     } while (took < seconds);
     printf("%-44s %10.0f /s %8.2f us\n", "core alone, one thread", (double)count / took,
            1e6 * took / (double)count);
     workspace_clear(&workspace);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
 }
 

@@ -106,7 +106,7 @@ static bool our_errors(BenchScene *scene, const ReferenceAnswer *truth, Row *row
         starts[i] = impacts->at[i].start;
     const Column *column = columns_find(&outcome->response.series, "displacement");
     measure(truth, column->values, starts, impacts->count, row);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     return true;
 }
 

@@ -50,13 +50,13 @@ static Status measure(const Simulation *const simulations[2], bool are_kept, dou
         Outcome **outcome = &outcomes[j % 2][j / 2];
         us[j % 2][j / 2] = once(simulations[j % 2], &workspace, outcome, &status, problem);
         if (!are_kept) {
-            outcome_drop(*outcome);
+            outcome_unref(*outcome);
             *outcome = NULL;
         }
     }
     for (size_t i = 0; i < 2; i++) {
         for (size_t j = 0; j < RUNS; j++)
-            outcome_drop(outcomes[i][j]);
+            outcome_unref(outcomes[i][j]);
         qsort(us[i], RUNS, sizeof us[i][0], by_size);
         middle[i] = us[i][RUNS / 2];
     }

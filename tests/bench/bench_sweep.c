@@ -58,7 +58,7 @@ static void *run_loop(void *context) {
     for (size_t i = loop->first; i < points; i += threads) {
         Outcome *outcome;
         if (simulation_run(&loop->scenes[i], NULL, NULL, &workspace, &outcome, NULL) == STATUS_OK)
-            outcome_drop(outcome);
+            outcome_unref(outcome);
     }
     workspace_clear(&workspace);
     return NULL;
@@ -104,7 +104,7 @@ static double median(double *values, size_t count) {
 
 static int bench_judging(Store *store, Problem *problem) {
     char text[1024];
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepPlan *plan;
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
@@ -123,7 +123,7 @@ static int bench_judging(Store *store, Problem *problem) {
     printf("all 100000 points judged before the first run: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return 0;
 }
@@ -173,7 +173,7 @@ int main(int argc, char **argv) {
     if (store_open(folder, &store, &problem) != STATUS_OK ||
         intake_open(store, &settings, &intake, &problem) != STATUS_OK)
         return fail("opening", &problem);
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepPlan *plan;
     scene_text(text, points, 1.35);
@@ -215,7 +215,7 @@ int main(int argc, char **argv) {
         simulation_clear(&scenes[i]);
     free(scenes);
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     intake_close(intake);
     store_close(store);

@@ -54,7 +54,7 @@ static double longest(Store *store, const char *path, double longer) {
     assert_true(problem != NULL && text != NULL && file != NULL);
     const size_t size = fread(text, 1, (1 << 20) - 1, file);
     fclose(file);
-    Inquiry inquiry = {0};
+    StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     double ms = 0;
     // The first look is for defaults alone; the duration is then stretched as a client would.
@@ -64,10 +64,10 @@ static double longest(Store *store, const char *path, double longer) {
     Outcome *outcome = NULL;
     Gaps gaps = {.began_ns = clock_thread_cpu_ns()};
     gaps.last_ns = gaps.began_ns;
-    const Watch watch = {&gaps, look};
+    const Progress watch = {&gaps, look};
     status = simulation_run(&inquiry.simulation, &limits, &watch, NULL, &outcome, problem);
     if (status == STATUS_OK && inquiry.study != NULL) {
-        const StudyTools tools = {.limits = &limits, .watch = &watch, .cpu = cpu};
+        const StudyTools tools = {.limits = &limits, .progress = &watch, .cpu = cpu};
         Variant *answer = NULL;
         gaps.began_ns = gaps.last_ns = clock_thread_cpu_ns();
         status = study_run(inquiry.study, &inquiry.simulation, &tools, &answer, problem);
@@ -75,8 +75,8 @@ static double longest(Store *store, const char *path, double longer) {
     }
     const int64_t last = clock_thread_cpu_ns() - gaps.last_ns;
     ms = 1e-6 * (double)(last > gaps.longest_ns ? last : gaps.longest_ns);
-    outcome_drop(outcome);
-    inquiry_clear(&inquiry);
+    outcome_unref(outcome);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     free(problem);
     free(text);

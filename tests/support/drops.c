@@ -38,7 +38,7 @@ DropMade drops_simulate(double restitution, double contact_time, Separation sepa
     assert_true(outcome->response.impacts.count > 0);
     const Impact *impact = &outcome->response.impacts.at[0];
     const DropMade made = {impact->approach_speed, impact->separation_speed, impact->duration};
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
     return made;
 }

@@ -81,7 +81,7 @@ static SimulationLimits limits_of(double seconds) {
 }
 
 static void answer_clear(Answer *answer) {
-    outcome_drop(answer->outcome);
+    outcome_unref(answer->outcome);
     simulation_clear(&answer->simulation);
 }
 
@@ -108,12 +108,12 @@ static void answer_run(Answer *answer, double seconds) {
     const SimulationLimits limits = limits_of(seconds);
     const Cost cost = simulation_cost(&answer->simulation);
     Gaps gaps = {.last = now()};
-    const Watch watch = {&gaps, look};
+    const Progress progress = {&gaps, look};
     const double start = gaps.last;
     answer->predicted = cost.cpu_seconds;
     answer->bytes = cost.bytes;
     answer->status =
-        simulation_run(&answer->simulation, &limits, &watch, NULL, &answer->outcome, &problem);
+        simulation_run(&answer->simulation, &limits, &progress, NULL, &answer->outcome, &problem);
     (void)look(&gaps, 1);
     answer->cpu = gaps.last - start;
     answer->gap = gaps.longest;

@@ -43,7 +43,7 @@ typedef struct ExtremesRecord {
     double predicted, cpu; // [s]
     double steps, samples, impacts;
     double told, found; // error of displacement, of its largest value
-    double gap;         // CPU time between two looks at the watch, the longest [s]
+    double gap;         // CPU time between two looks at the progress, the longest [s]
     double bytes;       // foretold
     char solver[16], what[64], reason[EXTREMES_REASON];
 } ExtremesRecord;

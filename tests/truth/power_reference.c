@@ -46,7 +46,7 @@ static void rate(const void *context, double t, const double *y, double *out) {
     out[J] = N;
 }
 
-static void watch(const void *context, double t, const double *y, double *value, double *slope) {
+static void progress(const void *context, double t, const double *y, double *value, double *slope) {
     const Walk *walk = context;
     const double d = walk->plan->dampers[0].clearance;
     (void)t;
@@ -106,7 +106,7 @@ static bool start(const Walk *walk, Ode *ode, const double *y) {
 void power_truth(const Plan *plan, const Base *base, size_t most, PowerTruth *truth) {
     Walk walk = {.plan = plan, .base = base, .side = -1, .last = -1};
     const OdeSystem system = {
-        .context = &walk, .size = SIZE, .roots = ROOTS, .rate = rate, .watch = watch};
+        .context = &walk, .size = SIZE, .roots = ROOTS, .rate = rate, .progress = progress};
     Ode *ode = ode_new(&system);
     const PlanDamper *damper = &plan->dampers[0];
     double y[SIZE] = {plan->displacement[0], plan->velocity[0], damper->position, damper->velocity};

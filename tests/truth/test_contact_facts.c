@@ -69,7 +69,7 @@ static void the_end_of_a_contact_is_tensile(void **state) {
         for (size_t n = 0; n < outcome->response.count; n++)
             pulled += force[n] > 0; // the left stop presses to the left
         assert_within((double)pulled / 5000, cases[i].part - 0.001, cases[i].part + 0.001);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -93,7 +93,7 @@ static void the_force_jumps_at_touch_and_samples_show_what_follows(void **state)
         assert_true(fabs(channel(outcome, "acceleration")[16] / (-jump / 1.35) - 1) < 1e-12);
         assert_true((fabs(impact->peak_force / jump - 1) < 1e-12) == (Z > 0.5));
         assert_true(impact->peak_force >= jump * (1 - 1e-12));
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -113,7 +113,7 @@ static void peaks_of_stiff_contacts_are_not_those_of_samples(void **state) {
         most = fmax(most, fabs(force[n]));
     assert_true(impacts->count > 20 && 2 * seen < impacts->count);
     assert_true(most < 0.95 * outcome->summary.peak_contact_force);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void the_sponge_is_hit_eighty_times_less_hard_than_aluminium(void **state) {
@@ -126,7 +126,7 @@ static void the_sponge_is_hit_eighty_times_less_hard_than_aluminium(void **state
         Outcome *outcome = run(&simulation);
         peak[i][0] = outcome->response.impacts.at[0].peak_force;
         peak[i][1] = outcome->summary.peak_contact_force;
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     printf("aluminium over sponge: first impact %.1f, largest %.1f\n", peak[1][0] / peak[0][0],
            peak[1][1] / peak[0][1]);
@@ -164,8 +164,8 @@ static void statistics_bear_errors_of_measurement_better_than_samples(void **sta
             assert_within(worst / a->peak_displacement, 0.09, 0.26);
         }
         assert_true(rms < worst / a->peak_displacement);
-        outcome_drop(outcomes[0]);
-        outcome_drop(outcomes[1]);
+        outcome_unref(outcomes[0]);
+        outcome_unref(outcomes[1]);
     }
 }
 
@@ -184,7 +184,7 @@ static void contacts_under_a_moving_base_do_not_last_their_contact_time(void **s
     }
     printf("sponge under a random base: %.2f to %.2f T_c\n", least, most);
     assert_true(least < 0.8 && most > 2);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // While it rests on its stop the force is m (C v + K x) / (M + m), and it leaves where that is 0.
@@ -218,7 +218,7 @@ static void a_resting_mass_is_held_by_the_structures_push(void **state) {
             assert_true(fabs(force[last]) < 1.1 * fabs(force[last] - force[last - 1]));
     }
     assert_true(rests > 2 && held > 1000);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // A buffer that gives nothing back: the mass stays where it hit, unless it is pulled off at once.
@@ -238,7 +238,7 @@ static void without_restitution_the_mass_stays_at_its_stop(void **state) {
     }
     assert_true(stays > 3);
     assert_true(outcome->summary.energy_residual < 1e-12);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // What an error of e or T_c does to k_b and c_b, to first order.
@@ -286,8 +286,8 @@ static void point_samples_of_the_acceleration_tell_less_than_means(void **state)
                      high = paper_distance(outcomes[0], outcomes[1], 15, 100);
         printf("%s: %.1f / %.1f dB\n", cases[i].buffer->name, low, high);
         assert_true(fabs(low - cases[i].low) < 0.1 && fabs(high - cases[i].high) < 0.1);
-        outcome_drop(outcomes[0]);
-        outcome_drop(outcomes[1]);
+        outcome_unref(outcomes[0]);
+        outcome_unref(outcomes[1]);
     }
 }
 

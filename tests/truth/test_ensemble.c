@@ -106,7 +106,7 @@ static void whole_clear(Whole *whole) {
     free(whole->steps);
 }
 
-static void whole_make(const Inquiry *inquiry, Whole *whole) {
+static void whole_make(const StudyRequest *inquiry, Whole *whole) {
     const EnsembleStudy *study = (const EnsembleStudy *)(const void *)inquiry->study;
     *whole = (Whole){.runs = (size_t)study->runs};
     whole->steps = calloc(whole->runs, sizeof(double));
@@ -136,7 +136,7 @@ static void whole_make(const Inquiry *inquiry, Whole *whole) {
         memcpy(whole->densities + i * whole->rows, densities->at[0].values,
                whole->rows * sizeof(double));
         whole->steps[i] = outcome->steps;
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&member);
     }
     workspace_clear(&workspace);
@@ -227,10 +227,10 @@ static void scene_judge(Draws *draws) {
     unsigned long runs;
     bool has_damper, has_force;
     draw(draws, &runs, &has_damper, &has_force, text, sizeof text);
-    Inquiry inquiry;
+    StudyRequest inquiry;
     problem_clear(&problem);
-    if (read_json(text, strlen(text), inquiry_fields, &inquiry, &problem) != STATUS_OK ||
-        inquiry_complete(&inquiry, NULL, NULL, &problem) != STATUS_OK)
+    if (read_json(text, strlen(text), study_request_fields, &inquiry, &problem) != STATUS_OK ||
+        study_request_complete(&inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s: %s %s", text, problem.faults[0].pointer, problem.detail);
     EnsembleStudy *study = (EnsembleStudy *)(void *)inquiry.study;
     Whole whole;
@@ -268,7 +268,7 @@ static void scene_judge(Draws *draws) {
     workspace_clear(&workspace);
     free(errors);
     whole_clear(&whole);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static int by_size(const void *a, const void *b) {

@@ -130,7 +130,7 @@ static void pulses_between_the_samples_are_met_to_rounding(void **state) {
         const double error = integrate(pulses[i].ground, outcome, 1e-3, 40);
         if (!(error < 1e-10))
             fail_msg("%s is off by %g", pulses[i].kind, error);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -154,7 +154,7 @@ static void a_sweep_is_met_to_a_billionth(void **state) {
     const double error = integrate(sweep, outcome, 1e-3, 10);
     if (!(error < 1e-9))
         fail_msg("is off by %g", error);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void a_sweep_with_fewer_knots_errs_with_their_fourth_power(void **state) {
@@ -165,7 +165,7 @@ static void a_sweep_with_fewer_knots_errs_with_their_fourth_power(void **state) 
         chirp(&simulation)->rate = i == 0 ? 250 : 500;
         Outcome *outcome = run(&simulation);
         errors[i] = integrate(sweep, outcome, 1e-3, 4);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     if (!(errors[0] > 12 * errors[1] && errors[1] < 1e-6))
         fail_msg("is off by %g and %g", errors[0], errors[1]);
@@ -214,7 +214,7 @@ static void a_record_on_another_grid_gives_the_same_motion(void **state) {
                 fail_msg("knots %g s apart, form %d: %g and %g", grids[i].interval, form, other,
                          finer);
             for (int j = 0; j < 3; j++)
-                outcome_drop(outcomes[j]);
+                outcome_unref(outcomes[j]);
         }
 }
 
@@ -232,7 +232,7 @@ static void the_balance_closes_under_a_base_far_faster_than_the_structure(void *
         Outcome *outcome = run(&simulation);
         if (!(outcome->summary.energy_residual < 1e-12))
             fail_msg("knots %g s apart leave %g", intervals[i], outcome->summary.energy_residual);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -246,8 +246,8 @@ static void pulses_are_what_other_kinds_make_of_them(void **state) {
     record(&simulation, (const double[]){0, 8, 0}, 3, 0.125);
     Outcome *other = run(&simulation);
     assert_true(one->summary.impacts > 3 && parted(one, other, 1, 0) < 1e-12);
-    outcome_drop(one);
-    outcome_drop(other);
+    outcome_unref(one);
+    outcome_unref(other);
     paper_scene(&simulation, 0.46, 3e-4, 0.5);
     pulse(&simulation, "half_sine", 3, 0, 0.5);
     one = run(&simulation);
@@ -255,8 +255,8 @@ static void pulses_are_what_other_kinds_make_of_them(void **state) {
     paper_sine(&simulation, 3, 1);
     other = run(&simulation);
     assert_true(one->summary.impacts > 1 && parted(one, other, 1, 0) < 1e-12);
-    outcome_drop(one);
-    outcome_drop(other);
+    outcome_unref(one);
+    outcome_unref(other);
 }
 
 static void a_later_pulse_gives_the_same_motion_later(void **state) {
@@ -275,8 +275,8 @@ static void a_later_pulse_gives_the_same_motion_later(void **state) {
             assert_true(one->summary.impacts > 3);
             assert_true(one->summary.impacts == other->summary.impacts);
             assert_true(parted(one, other, 1, 1000000) < 1e-10);
-            outcome_drop(one);
-            outcome_drop(other);
+            outcome_unref(one);
+            outcome_unref(other);
         }
 }
 
@@ -293,8 +293,8 @@ static void a_pulse_far_shorter_than_all_else_is_a_release(void **state) {
     assert_true(one->summary.impacts > 3 && one->summary.impacts == other->summary.impacts);
     assert_true(one->summary.energy_residual < 1e-12);
     assert_true(parted(one, other, 1, 0) < 1e-6);
-    outcome_drop(one);
-    outcome_drop(other);
+    outcome_unref(one);
+    outcome_unref(other);
 }
 
 int main(void) {

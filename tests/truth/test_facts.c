@@ -63,7 +63,7 @@ static void table_one_follows_from_restitution_and_contact_time(void **state) {
         const Derived *derived = &outcome->plan.derived.at[0];
         assert_near(derived->stiffness, buffer->stiffness, 0.005);
         assert_near(derived->damping, buffer->damping, 0.005);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -77,7 +77,7 @@ static void the_first_impact_comes_at_the_same_instant_with_every_model(void **s
             paper_model(&simulation, is_impulse ? "impulse" : "spring_damper");
             Outcome *outcome = run(&simulation);
             assert_true(fabs(impact(outcome, 0)->start - 0.0416214083419515) <= 1e-13);
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
 }
 
@@ -88,7 +88,7 @@ static double third_impact(double restitution, double contact_time, const char *
     paper_model(&simulation, model);
     Outcome *outcome = run(&simulation);
     const double start = impact(outcome, 2)->start;
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     return start;
 }
 
@@ -122,7 +122,7 @@ static void an_isolated_pair_returns_restitution_and_contact_time(void **state) 
                 assert_near(first->start, 0.015, 1e-14);
                 assert_near(first->restitution, restitutions[i], 1e-12);
                 assert_near(first->duration, times[k], 1e-12);
-                outcome_drop(outcome);
+                outcome_unref(outcome);
             }
 }
 
@@ -143,7 +143,7 @@ static void sponge_contacts_in_free_vibration_last_as_long_as_published(void **s
     assert_near(outcome->summary.peak_acceleration, 9.6111111, 1e-7);
     assert_near(impact(outcome, 0)->peak_force, 3.8424065276783246, 1e-12);
     assert_near(outcome->summary.peak_contact_force, impact(outcome, 1)->peak_force, 0);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void constant_base(Simulation *simulation, double acceleration, double duration) {
@@ -180,7 +180,7 @@ static void a_bouncing_mass_comes_to_rest_after_infinitely_many_impacts(void **s
     assert_near(impact(outcome, count)->start, 1.354570922957, 1e-10);
     assert_near(impact(outcome, count)->peak_force, 1e-3 * g, 1e-6);
     assert_true(outcome->response.impacts.count == count + 1);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // Masri and Caughey's two symmetric impacts per cycle.
@@ -220,7 +220,7 @@ static void the_masri_caughey_orbit_is_reached_and_kept(void **state) {
     const Impacts *impacts = &outcome->response.impacts;
     for (size_t i = impacts->count - 40; i < impacts->count; i++)
         assert_near(impacts->at[i].start - impacts->at[i - 1].start, TURN / 2, 1e-9);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void model_distance(const PaperBuffer *buffer, bool is_random, double out[2]) {
@@ -235,8 +235,8 @@ static void model_distance(const PaperBuffer *buffer, bool is_random, double out
     }
     out[0] = paper_distance(outcomes[0], outcomes[1], 0.5, 15);
     out[1] = paper_distance(outcomes[0], outcomes[1], 15, 100);
-    outcome_drop(outcomes[0]);
-    outcome_drop(outcomes[1]);
+    outcome_unref(outcomes[0]);
+    outcome_unref(outcomes[1]);
 }
 
 static void the_models_agree_on_aluminium_and_differ_on_the_sponge(void **state) {
@@ -276,7 +276,7 @@ static void white_noise_gives_the_variance_of_theory(void **state) {
     const double w = sqrt(865 / 1.35), xi = 1.092 / (2 * sqrt(865 * 1.35)), G = 1.0 / 100;
     const double variance = outcome->summary.rms_displacement * outcome->summary.rms_displacement;
     assert_near(variance, G / (8 * xi * w * w * w), 0.05);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // Statistics that begin late leave the transient out of peaks as of rms values.
@@ -294,7 +294,7 @@ static void statistics_leave_the_transient_out(void **state) {
     assert_true(most < 0.001);
     assert_near(outcome->summary.peak_displacement, most, 1e-3);
     assert_true(outcome->summary.peak_contact_force < 1);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // Statistics that begin within a contact leave out how hard it pressed before.
@@ -313,7 +313,7 @@ static void statistics_leave_out_how_hard_a_contact_pressed_before(void **state)
         peak[0] = i == 0 ? outcome->summary.peak_contact_force : peak[0];
         for (size_t k = 4700; k < outcome->response.count; k++)
             peak[1] = fmax(peak[1], fabs(channel(outcome, "contact_force")[k]));
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     assert_near(peak[0], peak[1], 1e-4);
 }
@@ -332,7 +332,7 @@ static void contacts_of_soft_structures_keep_the_energy_balance(void **state) {
         Outcome *outcome = run(&simulation);
         if (!(outcome->summary.energy_residual < 1e-11))
             fail_msg("trial %d: residual %g", trial, outcome->summary.energy_residual);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -351,7 +351,7 @@ static void hops_after_a_rest_keep_the_energy_balance(void **state) {
         Outcome *outcome = run(&simulation);
         if (!(outcome->summary.energy_residual < 1e-11))
             fail_msg("trial %d: residual %g", trial, outcome->summary.energy_residual);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -369,7 +369,7 @@ static void energy_that_comes_and_goes_is_not_gained_from_nowhere(void **state) 
         simulation.scene.sample_rate = trial == 0 ? 300 : trial == 1 ? 1000 : 4000;
         Outcome *outcome = run(&simulation);
         assert_true(outcome->summary.energy_residual < 1e-12);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 

@@ -45,7 +45,7 @@ static void no_impact_is_missed(void **state) {
             printf("scene %zu (seed %llu): %s\n", i, (unsigned long long)seed, scan.why);
             drawn_print(&scene);
         }
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         drawn_clear(&scene);
     }
     printf("%zu scenes with %zu impacts, %zu pieces proved: %zu failed, %zu refused; listed events "
@@ -89,7 +89,7 @@ static void a_ledger_that_is_not_whole_is_seen(void **state) {
             }
             free(wrong.at);
         }
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         drawn_clear(&scene);
     }
     assert_true(tried > 300);

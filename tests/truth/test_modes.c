@@ -290,9 +290,9 @@ static void judge(uint64_t number, bool has_dampers) {
         tally->short_estimates += !(outcome->summary.error_estimate >= fmin(found.displacement, 1));
         // One in some 100000 contacts leaves more than rounding, with all modes as with some.
         assert_true(outcome->response.energy.residual < 1e-6);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
-    outcome_drop(all);
+    outcome_unref(all);
     simulation_clear(&drawn.simulation);
 }
 

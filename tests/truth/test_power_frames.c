@@ -110,9 +110,9 @@ static void frames_agree_with_another_integrator(void **state) {
             judged++;
             impacts += exact->summary.impacts;
         }
-        outcome_drop(exact);
+        outcome_unref(exact);
         if (adaptive != NULL)
-            outcome_drop(adaptive);
+            outcome_unref(adaptive);
         simulation_clear(&simulation);
     }
     print_message("%zu of %zu judged, %zu impacts\n", judged, scenes, impacts);

@@ -106,10 +106,10 @@ static void rate(const Reduced *of, double t, const double *y, double *out) {
 static void step(const Reduced *of, double t, double h, double *y) {
     double slope[4][SIZE], at[SIZE];
     static const double node[4] = {0, 0.5, 0.5, 1};
-    for (int stage = 0; stage < 4; stage++) {
+    for (int range = 0; range < 4; range++) {
         for (size_t i = 0; i < SIZE; i++)
-            at[i] = y[i] + (stage > 0 ? node[stage] * h * slope[stage - 1][i] : 0);
-        rate(of, t + node[stage] * h, at, slope[stage]);
+            at[i] = y[i] + (range > 0 ? node[range] * h * slope[range - 1][i] : 0);
+        rate(of, t + node[range] * h, at, slope[range]);
     }
     for (size_t i = 0; i < SIZE; i++)
         y[i] += h / 6 * (slope[0][i] + 2 * (slope[1][i] + slope[2][i]) + slope[3][i]);
@@ -220,7 +220,7 @@ static void every_solver_moves_the_modes_that_are_kept(void **state) {
             const double error = compare(outcome, &answer, false);
             if (!(error <= solvers_tried[i].flight))
                 fail_msg("%s: %.2g", accuracy, error);
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
     }
 }
@@ -248,7 +248,7 @@ static void a_free_mass_meets_the_storey_that_they_move(void **state) {
             assert_true(outcome->summary.impacts > 2);
             if (i < 2)
                 assert_true(outcome->summary.energy_residual < 1e-12);
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
     }
 }
@@ -266,7 +266,7 @@ static void a_mass_that_meets_nothing_stays_where_it_is(void **state) {
             assert_true(fabs(z[k] - wanted) <= 1e-5 * AMPLITUDE / turning);
         }
         assert_true(outcome->summary.energy_residual < 1e-4);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -305,7 +305,7 @@ static void the_summary_is_of_the_same_motion(void **state) {
             }
             assert_true(summary->energy_residual < 1e-12);
             assert_true(summary->error_estimate > 1e-4);
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
 }
 
@@ -365,7 +365,7 @@ static void fewer_modes_are_fewer_steps(void **state) {
             Outcome *outcome = run(accuracy, has_contact, 100, sine);
             assert_true(outcome->steps > 0 && outcome->steps < last);
             last = outcome->steps;
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
     }
 }

@@ -102,7 +102,7 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
             }
         }
     }
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     reference_clear(&quad);
     for (int i = 0; i < DOUBLES; i++)
         reference_clear(&plain[i]);

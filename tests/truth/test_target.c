@@ -222,7 +222,7 @@ static void ladder_try(Ladder *ladder, const Outcome *reference, const Drawn *dr
         ladder->steps[at] = outcome->steps;
         ladder->error[at] = error_of(reference, outcome, drawn->storeys, metric);
     }
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void ladder_make(Ladder *ladder, const Outcome *reference, const Drawn *drawn, int metric,
@@ -292,7 +292,7 @@ static void judge(uint64_t number, const Drawn *drawn, const Outcome *reference,
                told->attempts.count,
                told->verdict == VERDICT_KEPT ? error <= target ? "" : "  WRONG" : "  marked",
                told->verdict == VERDICT_KEPT && work > WORK ? "  DEAR" : "");
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void scene_judge(uint64_t number) {
@@ -312,7 +312,7 @@ static void scene_judge(uint64_t number) {
     ladder_make(&ladder, reference, &drawn, metric, drawn.kind != 1);
     for (size_t i = 0; i < TARGETS; i++)
         judge(number, &drawn, reference, &ladder, metric_name, metric, targets[i]);
-    outcome_drop(reference);
+    outcome_unref(reference);
 }
 
 static void targets_are_kept_or_marked_by_work_near_the_cheapest(void **state) {

@@ -112,7 +112,7 @@ static Trusted measure(const ReferenceScene *scene) {
             if (!isnan(outcome->summary.trust_horizon))
                 trusted.horizon = outcome->summary.trust_horizon;
         }
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     reference_clear(&truth);
     return trusted;

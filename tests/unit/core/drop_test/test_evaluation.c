@@ -315,7 +315,7 @@ static int covered(Blur blur, size_t count, double noise, bool is_stated) {
             }
         }
         evaluate(&test, SEPARATION_ZERO_PENETRATION);
-        const Quantity *told =
+        const Statistic *told =
             blur == BLUR_TIMES ? &evaluation.contact_time : &evaluation.restitution;
         const double truth = blur == BLUR_TIMES ? T : e;
         assert_int_equal(told->count, count);
@@ -423,10 +423,10 @@ static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
          "0.01}, {\"approach_speed\": 1, \"rebound_speed\": 0.5}]}",
          &test);
     int asked = 0;
-    const Watch watch = {&asked, refuse_third};
+    const Progress progress = {&asked, refuse_third};
     const Measurement one = {COUNT_ABSENT, &test};
     assert_int_equal(
-        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, &watch, &evaluation, &problem),
+        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, &progress, &evaluation, &problem),
         STATUS_CANCELLED);
     assert_int_equal(asked, 3);
     evaluation_clear(&evaluation);

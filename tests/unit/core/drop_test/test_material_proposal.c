@@ -201,7 +201,7 @@ static void readings_weigh_in_a_table_as_in_a_constant(void **state) {
     propose((const char *const[]){constant}, 1, PROPOSAL_CONSTANT);
     const double mean = proposal.material.restitution;
     const double deviation = proposal.material.restitution_deviation;
-    const Quantity *e = &evaluation.restitution;
+    const Statistic *e = &evaluation.restitution;
     assert_true(fabs(e->mean / e->unweighted_mean - 1) > 1e-3);
     assert_near(deviation, fmax(e->scatter, e->standard_error), 0);
     assert_true(deviation < e->deviation);

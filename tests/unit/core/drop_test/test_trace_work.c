@@ -18,15 +18,15 @@ double exp(double x) {
     return (double)expl(x);
 }
 
-enum { COUNT_MOST = 600 };
+enum { COUNT_MAX = 600 };
 static const double interval = 1e-3, T_c = 0.02, m_e = 0.1, v0 = 0.5;
 
 // One contact of 20 samples and more; how many looks reading it takes.
 static size_t work(double pull, int separation, bool by_mass) {
-    double values[COUNT_MOST];
-    noise_normal_pairs(5, 7, 0, COUNT_MOST / 2, values);
+    double values[COUNT_MAX];
+    noise_normal_pairs(5, 7, 0, COUNT_MAX / 2, values);
     const TraceShape shape = trace_shape(0.25, pull, separation);
-    for (size_t i = 0; i < COUNT_MOST; i++) {
+    for (size_t i = 0; i < COUNT_MAX; i++) {
         const double s = ((double)i - 290.37) * interval / T_c;
         values[i] *= 0.02;
         if (s >= 0 && s <= shape.length)
@@ -43,7 +43,7 @@ static size_t work(double pull, int separation, bool by_mass) {
     TraceReading reading;
     const size_t before = looks;
     assert_int_equal(
-        trace_read(interval, &(Reals){values, COUNT_MOST}, &way, "/force", &reading, NULL),
+        trace_read(interval, &(Reals){values, COUNT_MAX}, &way, "/force", &reading, NULL),
         STATUS_OK);
     assert_int_equal(reading.contacts.count, 1);
     if (reading.contacts.at[0].why != NULL)

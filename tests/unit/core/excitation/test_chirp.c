@@ -139,11 +139,11 @@ static bool stop_at_once(void *data, double part) {
 
 static void making_a_sweep_can_be_stopped(void **state) {
     (void)state;
-    const Watch watch = {.advance = stop_at_once};
+    const Progress progress = {.advance = stop_at_once};
     ExcitationChirp chirp = sweep(1, 2, NAN, NAN);
     Base base;
     assert_int_equal(complete(&chirp), STATUS_OK);
-    assert_int_equal(excitation_chirp.make(&chirp.excitation, &span, &watch, &base, &problem),
+    assert_int_equal(excitation_chirp.make(&chirp.excitation, &span, &progress, &base, &problem),
                      STATUS_CANCELLED);
     assert_null(base.values);
 }

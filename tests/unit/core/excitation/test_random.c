@@ -355,14 +355,14 @@ static void the_watch_sees_every_block_and_can_stop(void **state) {
     const Span span = {.duration = 100, .sample_rate = 1000};
     Base base;
     int looks = 0;
-    const Watch stopping = {&looks, stop_at_once};
+    const Progress stopping = {&looks, stop_at_once};
     assert_int_equal(excitation_random.make(&random.start, &span, &stopping, &base, &problem),
                      STATUS_CANCELLED);
     assert_int_equal(looks, 1);
     assert_null(base.values);
     assert_int_equal(base.count, 0);
     double fraction = 0;
-    const Watch going = {&fraction, go_on};
+    const Progress going = {&fraction, go_on};
     assert_int_equal(excitation_random.make(&random.start, &span, &going, &base, NULL), STATUS_OK);
     assert_true(fraction > 0.8);
     base_clear(&base);

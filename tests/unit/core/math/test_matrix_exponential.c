@@ -92,9 +92,9 @@ static void a_long_doubling_stops_when_told(void **state) {
     for (size_t i = 0; i < SIZE * SIZE; i++)
         room[i] = 1e-3 * sin((double)i);
     int asked = 0;
-    const Watch watch = {&asked, refuse};
+    const Progress progress = {&asked, refuse};
     assert_false(exponential_doublings(room, SIZE, 1, room + SIZE * SIZE, room + 2 * SIZE * SIZE,
-                                       &watch, 0.25));
+                                       &progress, 0.25));
     assert_int_equal(asked, 1);
     free(room);
 }

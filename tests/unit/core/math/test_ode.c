@@ -20,7 +20,7 @@ static void rate(const void *context, double t, const double *y, double *out) {
     out[1] = -y[0];
 }
 
-static void watch(const void *context, double t, const double *y, double *value, double *slope) {
+static void progress(const void *context, double t, const double *y, double *value, double *slope) {
     (void)t;
     const Swing *swing = context;
     value[0] = y[0] - swing->level;
@@ -34,7 +34,7 @@ static const double scale[2] = {1, 1};
 
 static Ode *swing_new(const Swing *swing) {
     const OdeSystem system = {
-        .context = swing, .size = 2, .roots = 2, .rate = rate, .watch = watch};
+        .context = swing, .size = 2, .roots = 2, .rate = rate, .progress = progress};
     Ode *ode = ode_new(&system);
     assert_non_null(ode);
     return ode;
@@ -67,7 +67,7 @@ static void a_tolerance_trades_errors_for_steps(void **state) {
                                   .size = 2,
                                   .roots = 2,
                                   .rate = rate,
-                                  .watch = watch,
+                                  .progress = progress,
                                   .tolerance = tolerance};
         Ode *ode = ode_new(&system);
         assert_non_null(ode);

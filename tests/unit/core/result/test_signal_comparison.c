@@ -148,8 +148,8 @@ static void a_long_measurement_stops_soon_when_it_is_told_to(void **state) {
     double *values = test_calloc(MANY, sizeof *values);
     const Signal signal = {.values = values, .count = MANY, .rate = 1000};
     int looks = 0;
-    const Watch watch = {&looks, stop_at_third};
-    assert_true(isnan(likeness_measure(&signal, &signal, 0.5, &watch).rms));
+    const Progress progress = {&looks, stop_at_third};
+    assert_true(isnan(likeness_measure(&signal, &signal, 0.5, &progress).rms));
     assert_int_equal(looks, 3);
     assert_true(likeness_measure(&signal, &signal, 0.5, NULL).rms == 0);
     test_free(values);

@@ -216,14 +216,14 @@ static void the_watch_sees_progress_and_can_stop(void **state) {
     const SpectrumSettings settings = {4096, 2048, WINDOW_HANN, DETREND_CONSTANT};
     Spectrum spectrum;
     Looks looks = {.most = 1000};
-    const Watch watch = {&looks, look};
-    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &watch, NULL, &spectrum, NULL),
+    const Progress progress = {&looks, look};
+    assert_int_equal(spectrum_welch(&columns, unit, 1, &settings, &progress, NULL, &spectrum, NULL),
                      STATUS_OK);
     assert_true(looks.count > 10 && looks.last > 0.9);
     spectrum_clear(&spectrum);
     looks = (Looks){.most = 3};
     assert_int_equal(
-        spectrum_welch(&columns, unit, 1, &settings, &watch, NULL, &spectrum, &problem),
+        spectrum_welch(&columns, unit, 1, &settings, &progress, NULL, &spectrum, &problem),
         STATUS_CANCELLED);
     assert_int_equal(looks.count, 3);
     assert_null(spectrum.frequency);

@@ -63,8 +63,8 @@ static void linear_contact_is_run_exactly_and_says_so(void **state) {
     assert_memory_equal(outcome->response.series.block, plain->response.series.block,
                         plain->response.series.rows * plain->response.series.count *
                             sizeof(double));
-    outcome_drop(outcome);
-    outcome_drop(plain);
+    outcome_unref(outcome);
+    outcome_unref(plain);
 }
 
 static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
@@ -83,9 +83,9 @@ static void a_power_law_is_followed_no_closer_than_asked_for(void **state) {
         worst = fmax(worst, fabs(loose->response.series.at[0].values[i] -
                                  whole->response.series.at[0].values[i]));
     assert_true(worst > 0 && worst <= 1e-2 * whole->summary.peak_displacement);
-    outcome_drop(loose);
-    outcome_drop(tight);
-    outcome_drop(whole);
+    outcome_unref(loose);
+    outcome_unref(tight);
+    outcome_unref(whole);
 }
 
 #define FRAME(contact_time)                                                                        \
@@ -111,8 +111,8 @@ static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
                  *y = whole->response.series.at[0].values;
     for (size_t i = 0; i < whole->response.count; i++)
         assert_true(fabs(x[i] - y[i]) <= 1e-2 * whole->summary.peak_displacement);
-    outcome_drop(struck);
-    outcome_drop(whole);
+    outcome_unref(struck);
+    outcome_unref(whole);
     static const char *const others[] = {
         FRAME(1e-8) HEARD ", \"accuracy\": {\"target\": 1e-2}",
         FRAME(1e-8) SEEN ", \"accuracy\": {\"target\": 1e-9}",
@@ -124,7 +124,7 @@ static void contacts_are_impulses_where_that_keeps_the_target(void **state) {
     for (size_t i = 0; i < COUNT(others); i++) {
         Outcome *outcome = run(others[i]);
         assert_string_equal(outcome->plan.contact_model, "spring_damper");
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -145,8 +145,8 @@ static void late_statistics_are_beside_what_is_left_of_the_motion(void **state) 
         fabs(aimed->summary.rms_displacement / whole->summary.rms_displacement - 1);
     assert_int_equal(aimed->plan.target.verdict, VERDICT_KEPT);
     assert_true(error <= aimed->plan.target.estimated_error);
-    outcome_drop(aimed);
-    outcome_drop(whole);
+    outcome_unref(aimed);
+    outcome_unref(whole);
     simulation_clear(&simulation);
 }
 
@@ -157,7 +157,7 @@ static void what_does_not_move_has_no_error(void **state) {
                            "\"metric\": \"rms_displacement\"}");
     assert_int_equal(outcome->plan.target.verdict, VERDICT_KEPT);
     assert_true(outcome->plan.target.estimated_error == 0);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void what_no_double_can_keep_is_marked(void **state) {
@@ -176,12 +176,12 @@ static void what_no_double_can_keep_is_marked(void **state) {
     for (size_t i = 0; i < outcome->warnings.count; i++)
         is_warned = is_warned || strcmp(outcome->warnings.at[i].pointer, "/accuracy/target") == 0;
     assert_true(is_warned);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     ((AccuracyAuto *)(void *)simulation.accuracy)->metric = METRIC_RMS_DISPLACEMENT;
     assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &outcome, NULL), STATUS_OK);
     assert_int_equal(outcome->plan.target.verdict, VERDICT_UNKNOWN);
     assert_true(isnan(outcome->plan.target.estimated_error));
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -240,17 +240,17 @@ static void a_metric_without_a_target_means_nothing(void **state) {
     assert_string_equal(plain, with);
 }
 
-typedef struct Progress {
+typedef struct Countdown {
     double last;
     int left;
     bool is_back;
-} Progress;
+} Countdown;
 
 static bool advance(void *context, double fraction) {
-    Progress *progress = context;
-    progress->is_back = progress->is_back || fraction < progress->last || fraction > 1;
-    progress->last = fraction;
-    return --progress->left > 0;
+    Countdown *countdown = context;
+    countdown->is_back = countdown->is_back || fraction < countdown->last || fraction > 1;
+    countdown->last = fraction;
+    return --countdown->left > 0;
 }
 
 static void progress_goes_forward_over_all_runs_and_a_stop_is_heard(void **state) {
@@ -260,18 +260,19 @@ static void progress_goes_forward_over_all_runs_and_a_stop_is_heard(void **state
     assert_non_null(problem);
     document_pass(&simulation, CHAOTIC ", \"accuracy\": {\"target\": 1e-4}");
     simulation.scene.duration = 60;
-    Progress progress = {.left = 1 << 30};
-    const Watch watch = {&progress, advance};
+    Countdown countdown = {.left = 1 << 30};
+    const Progress progress = {&countdown, advance};
     Outcome *outcome;
-    assert_int_equal(simulation_run(&simulation, NULL, &watch, NULL, &outcome, problem), STATUS_OK);
-    assert_false(progress.is_back);
-    assert_true(progress.last > 0.6);
-    outcome_drop(outcome);
-    const int calls = (1 << 30) - progress.left;
+    assert_int_equal(simulation_run(&simulation, NULL, &progress, NULL, &outcome, problem),
+                     STATUS_OK);
+    assert_false(countdown.is_back);
+    assert_true(countdown.last > 0.6);
+    outcome_unref(outcome);
+    const int calls = (1 << 30) - countdown.left;
     for (int left = 1; left < calls; left += calls / 7 + 1) {
-        progress = (Progress){.left = left};
+        countdown = (Countdown){.left = left};
         problem_clear(problem);
-        assert_int_equal(simulation_run(&simulation, NULL, &watch, NULL, &outcome, problem),
+        assert_int_equal(simulation_run(&simulation, NULL, &progress, NULL, &outcome, problem),
                          STATUS_CANCELLED);
         assert_null(outcome);
         assert_int_equal(problem->status, STATUS_CANCELLED);

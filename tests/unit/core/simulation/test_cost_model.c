@@ -57,7 +57,7 @@ static void work_counted_is_about_what_was_foretold(void **state) {
         if (!(outcome->steps > solving / 3 && outcome->steps < 3 * solving))
             fail_msg("%zu: %g steps, foretold %g", i, outcome->steps, solving);
         assert_true(cost.cpu_seconds == cost.steps * SOLVER_STEP);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }

@@ -14,7 +14,7 @@
 #include "server/command/scene_file.h"
 #include "server/jobs/intake.h"
 
-static void read_scene(const char *text, size_t size, Inquiry *inquiry) {
+static void read_scene(const char *text, size_t size, StudyRequest *inquiry) {
     Store *store = NULL;
     Warnings warnings = {NULL, 0};
     Problem problem;
@@ -28,7 +28,7 @@ static void read_scene(const char *text, size_t size, Inquiry *inquiry) {
     warnings_clear(&warnings);
 }
 
-static void open_example(const char *name, Inquiry *inquiry) {
+static void open_example(const char *name, StudyRequest *inquiry) {
     char path[512];
     Bytes text;
     snprintf(path, sizeof path, "%s/schema/examples/%s.json", IMPACTD_SOURCE_DIR, name);
@@ -92,7 +92,7 @@ static void compare(const Simulation *simulation, const Impacts *impacts, size_t
 
 // The first few impacts of an example, one in the middle and the last.
 static Misses compare_example(const char *name, size_t points) {
-    Inquiry inquiry;
+    StudyRequest inquiry;
     Outcome *outcome = NULL;
     Misses misses = {0};
     open_example(name, &inquiry);
@@ -104,8 +104,8 @@ static Misses compare_example(const char *name, size_t points) {
     for (size_t i = 0; i < COUNT(numbers); i++)
         if (numbers[i] >= 1 && numbers[i] <= count)
             compare(simulation, &outcome->response.impacts, numbers[i], points, &misses);
-    outcome_drop(outcome);
-    inquiry_clear(&inquiry);
+    outcome_unref(outcome);
+    study_request_clear(&inquiry);
     return misses;
 }
 
@@ -140,7 +140,7 @@ static void every_law_base_and_structure_keeps_peak_and_impulse(void **state) {
         {"matrices", 1e-9, 1e-6},
         {"all_keys", 1e-9, 1e-6},
         {"accuracy_target", 1e-6, 1e-6}, // its contacts are followed to a tolerance
-        {"solver_rk4", 5e-2, 5e-2},     // and these by steps of their own
+        {"solver_rk4", 5e-2, 5e-2},      // and these by steps of their own
         {"solver_newmark", 1e-1, 1e-1},
         {"solver_precise", 5e-2, 5e-2},
         {"solver_adaptive", 5e-2, 5e-2},
@@ -162,7 +162,7 @@ static Closeup look(const Simulation *simulation, size_t number, size_t points) 
 
 static void the_rows_go_from_touch_to_release(void **state) {
     (void)state;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     open_example("paper_free_sponge", &inquiry);
     Closeup closeup = look(&inquiry.simulation, 1, CLOSEUP_POINTS);
     const Column *column = closeup.columns.at;
@@ -182,7 +182,7 @@ static void the_rows_go_from_touch_to_release(void **state) {
                     1e-5);
     }
     closeup_clear(&closeup);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 // Carried along by a base that accelerates, the mass comes to rest at the left stop, and is pushed
@@ -194,7 +194,7 @@ static void a_rest_has_a_force_too(void **state) {
         "[{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": {\"restitution\": 0.3}}], "
         "\"contact\": {\"model\": \"impulse\"}, \"excitation\": {\"kind\": \"record\", "
         "\"samples\": [2, 2], \"interval\": 5}, \"duration\": 5, \"sample_rate\": 1000}";
-    Inquiry inquiry;
+    StudyRequest inquiry;
     Outcome *outcome = NULL;
     read_scene(scene, strlen(scene), &inquiry);
     const Simulation *simulation = &inquiry.simulation;
@@ -208,8 +208,8 @@ static void a_rest_has_a_force_too(void **state) {
     const double *force = closeup.columns.at[1].values;
     assert_true(fabs(force[closeup.columns.rows - 1] - 0.1107 * 2) < 1e-6);
     closeup_clear(&closeup);
-    outcome_drop(outcome);
-    inquiry_clear(&inquiry);
+    outcome_unref(outcome);
+    study_request_clear(&inquiry);
 }
 
 static void assert_refused(const Simulation *simulation, size_t number, Status expected,
@@ -230,21 +230,22 @@ static bool never(void *context, double fraction) {
 
 static void what_is_not_there_is_told(void **state) {
     (void)state;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     open_example("paper_free_sponge", &inquiry);
     assert_refused(&inquiry.simulation, 0, STATUS_NOT_FOUND, "from 1 to 22");
     assert_refused(&inquiry.simulation, 23, STATUS_NOT_FOUND, "from 1 to 22");
     Closeup closeup;
-    const Watch watch = {NULL, never};
-    assert_int_equal(closeup_make(&inquiry.simulation, 1, 401, NULL, &watch, NULL, &closeup, NULL),
-                     STATUS_CANCELLED);
-    inquiry_clear(&inquiry);
+    const Progress progress = {NULL, never};
+    assert_int_equal(
+        closeup_make(&inquiry.simulation, 1, 401, NULL, &progress, NULL, &closeup, NULL),
+        STATUS_CANCELLED);
+    study_request_clear(&inquiry);
     open_example("paper_free_impulse_sponge", &inquiry);
     assert_refused(&inquiry.simulation, 1, STATUS_NOT_FOUND, "impulse");
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     open_example("no_damper", &inquiry);
     assert_refused(&inquiry.simulation, 1, STATUS_NOT_FOUND, "no impacts");
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 int main(void) {

@@ -38,8 +38,8 @@ static double stopped_at(double displacement, const char *channel, int most) {
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     Outcome *outcome = NULL;
     Looks looks = {.most = most};
-    const Watch watch = {&looks, look};
-    assert_int_equal(simulation_run(&simulation, NULL, &watch, NULL, &outcome, &problem),
+    const Progress progress = {&looks, look};
+    assert_int_equal(simulation_run(&simulation, NULL, &progress, NULL, &outcome, &problem),
                      STATUS_CANCELLED);
     assert_int_equal(looks.count, most);
     simulation_clear(&simulation);

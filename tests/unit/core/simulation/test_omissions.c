@@ -158,7 +158,7 @@ static void where_no_stop_is_reached_none_is_looked_for(void **state) {
         assert_int_equal(work->neighbour_samples, 0);
         assert_true(outcome->summary.error_estimate < 1e-9);
         assert_as_with_contacts(scenes[i], outcome);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -185,7 +185,7 @@ static void solvers_that_step_look_for_no_stops_either(void **state) {
             assert_int_equal(work->contacts > 0, !is_far);
             assert_true(i + 1 == COUNT(settings) || work->steps > 100);
             peaks[i] = outcome->summary.rms_displacement;
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
     for (size_t i = 0; i + 1 < COUNT(settings); i++)
         assert_true(fabs(peaks[i] - peaks[COUNT(settings) - 1]) < 1e-3 * peaks[i]);
@@ -194,7 +194,7 @@ static void solvers_that_step_look_for_no_stops_either(void **state) {
                                           "1e-5}}], " RELEASE ", " TIME
                                           ", \"accuracy\": {\"solver\": \"rk4\", \"step\": 1e-3}");
     assert_true(stiff->summary.impacts == 0);
-    outcome_drop(stiff);
+    outcome_unref(stiff);
 }
 
 static void where_one_may_be_reached_all_of_it_runs(void **state) {
@@ -212,11 +212,11 @@ static void where_one_may_be_reached_all_of_it_runs(void **state) {
         assert_int_equal(outcome->work.contacts, outcome->summary.impacts);
         assert_int_equal(outcome->work.ledger_rows, outcome->response.impacts.count);
         assert_true(outcome->summary.impacts > 0);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     Outcome *frame = outcome_of(scenes[2]);
     assert_true(frame->work.neighbour_samples > 0);
-    outcome_drop(frame);
+    outcome_unref(frame);
 }
 
 static void bounces_and_rests_are_counted_apart(void **state) {
@@ -226,12 +226,12 @@ static void bounces_and_rests_are_counted_apart(void **state) {
                                                   "\"impulse\"}, " RELEASE ", " TIME);
     assert_int_equal(outcome->work.contacts, 0);
     assert_int_equal(outcome->work.bounces, outcome->summary.impacts);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     outcome = outcome_of(STRUCTURE ", " DAMPER("0.015") ", \"contact\": {\"model\": "
                                                         "\"hunt_crossley\"}, " RELEASE ", " TIME);
     assert_true(outcome->work.steps > 100); // of contacts
     assert_int_equal(outcome->work.contacts, outcome->summary.impacts);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void a_still_base_is_flown_over_in_closed_form(void **state) {
@@ -241,13 +241,13 @@ static void a_still_base_is_flown_over_in_closed_form(void **state) {
     assert_int_equal(outcome->work.unforced_samples, 10000);
     assert_int_equal(outcome->work.flight_samples, 0);
     assert_int_equal(outcome->work.base_samples, 0);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     outcome = outcome_of(STRUCTURE ", " RANDOM ", " TIME);
     assert_null(left_out(&outcome->plan, "forcing"));
     assert_int_equal(outcome->work.unforced_samples, 0);
     assert_int_equal(outcome->work.flight_samples, 10000);
     assert_true(outcome->work.base_samples >= 10001);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void where_nothing_moves_nothing_is_integrated(void **state) {
@@ -284,13 +284,13 @@ static void where_nothing_moves_nothing_is_integrated(void **state) {
             for (size_t j = 0; j < series->rows; j++)
                 assert_true(series->at[c].values[j] ==
                             (strcmp(series->at[c].name, "damper_displacement") == 0 ? 0.1 : 0));
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     // Held between stops without room, or on one of them, it is a matter for the solver.
     Outcome *held = outcome_of(STRUCTURE ", " DAMPER("0") ", " SHORT);
     assert_null(left_out(&held->plan, "motion"));
     assert_true(held->work.stop_searches > 0);
-    outcome_drop(held);
+    outcome_unref(held);
 }
 
 static void what_is_not_asked_for_is_not_made(void **state) {
@@ -318,8 +318,8 @@ static void what_is_not_asked_for_is_not_made(void **state) {
                                bare->response.energy.contact, bare->summary.peak_acceleration}};
     for (int i = 0; i < 4; i++)
         assert_true(fabs(all[0][i] - all[1][i]) <= 1e-9 * fabs(all[0][i]));
-    outcome_drop(whole);
-    outcome_drop(bare);
+    outcome_unref(whole);
+    outcome_unref(bare);
 }
 
 // A stepping solver takes its error from impacts, a table its warning: listed or not.
@@ -356,8 +356,8 @@ static void what_impacts_tell_is_told_without_their_list(void **state) {
             assert_string_equal(outcomes[0]->warnings.at[k].detail,
                                 outcomes[1]->warnings.at[k].detail);
         assert_int_equal(outcomes[0]->warnings.count > 0, i == 0 || i == 1);
-        outcome_drop(outcomes[0]);
-        outcome_drop(outcomes[1]);
+        outcome_unref(outcomes[0]);
+        outcome_unref(outcomes[1]);
     }
 }
 
@@ -374,7 +374,7 @@ static void an_unlisted_run_has_as_many_impacts_as_it_likes(void **state) {
         simulation.output.impacts = is_listed;
         const Status status = simulation_run(&simulation, &limits, NULL, NULL, &outcome, &problem);
         assert_int_equal(status, is_listed ? STATUS_LIMIT : STATUS_OK);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }

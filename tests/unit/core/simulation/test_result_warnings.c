@@ -106,7 +106,7 @@ static void impacts_outside_a_table_are_told_under_every_form_of_law(void **stat
         expect_table(wanted, sizeof wanted, outcome, 1, LEFT | RIGHT, 0.1, 0.35);
         assert_string_equal(warning_of(outcome, 1, LEFT | RIGHT), wanted);
         assert_string_equal(outcome->warnings.at[0].pointer, "/dampers/0/buffer/table");
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }
@@ -118,7 +118,7 @@ static void speeds_between_the_first_row_and_the_last_are_not_told(void **state)
     Outcome *outcome = run(&simulation);
     assert_true(outcome->summary.impacts > 5);
     assert_int_equal(outcome->warnings.count, 0);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -148,7 +148,7 @@ static void each_stop_of_each_damper_has_its_own_table(void **state) {
     assert_int_equal(outcome->warnings.count, 2);
     assert_string_equal(outcome->warnings.at[0].pointer, "/dampers/0/left_buffer/table");
     assert_string_equal(outcome->warnings.at[1].pointer, "/dampers/1/right_buffer/table");
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -174,7 +174,7 @@ static void contacts_that_resume_inside_a_buffer_are_of_the_impact_before(void *
     assert_int_equal(slower, told); // nothing moves at 100 m/s
     assert_true(resumed > 0);
     assert_int_equal(told + resumed, outcome->summary.impacts);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -192,10 +192,10 @@ static void a_full_ledger_counts_all_and_a_fuller_one_gives_no_result(void **sta
     snprintf(wanted, sizeof wanted, "%s", warning_of(outcome, 1, LEFT | RIGHT));
     assert_string_not_equal(wanted, "(none)");
     assert_string_equal(warning_of(limited, 1, LEFT | RIGHT), wanted);
-    outcome_drop(limited);
+    outcome_unref(limited);
     assert_int_equal(simulation_run(&simulation, &few, NULL, NULL, &limited, &problem),
                      STATUS_LIMIT);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -213,8 +213,10 @@ static void impacts_outside_what_a_material_was_measured_at_are_told_with_its_na
     static const struct {
         double least, most;
         const char *range;
-    } ranges[] = {
-        {0.1, 0.3, "0.1 to 0.3 m/s"}, {0.1, NAN, "0.1 m/s and more"}, {0.1, 50, "0.1 to 50 m/s"}, {NAN, 0.3, "0.3 m/s and less"}};
+    } ranges[] = {{0.1, 0.3, "0.1 to 0.3 m/s"},
+                  {0.1, NAN, "0.1 m/s and more"},
+                  {0.1, 50, "0.1 to 50 m/s"},
+                  {NAN, 0.3, "0.3 m/s and less"}};
     static const char end[] = "its numbers are used there without a measurement";
     for (size_t i = 0; i < COUNT(ranges); i++) {
         Simulation simulation;
@@ -227,7 +229,7 @@ static void impacts_outside_what_a_material_was_measured_at_are_told_with_its_na
                whose, end);
         assert_string_equal(outcome->warnings.at[0].detail, wanted);
         assert_string_equal(outcome->warnings.at[0].pointer, "/dampers/0/buffer");
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }
@@ -239,7 +241,7 @@ static void a_material_of_unknown_range_is_not_warned_of(void **state) {
     Outcome *outcome = run(&simulation);
     assert_int_equal(outcome->warnings.count, 0);
     assert_null(outcome->response.approaches);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
 }
 
@@ -251,8 +253,8 @@ static void a_range_moves_no_bit_of_the_run(void **state) {
     scene_with_material(&without, NAN, NAN);
     Outcome *first = run(&with), *second = run(&without);
     assert_memory_equal(&first->summary, &second->summary, sizeof first->summary);
-    outcome_drop(first);
-    outcome_drop(second);
+    outcome_unref(first);
+    outcome_unref(second);
     simulation_clear(&with);
     simulation_clear(&without);
 }
@@ -306,7 +308,7 @@ a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene(void 
                 told, "foam@2 was measured with an effective mass of 0.5 kg, that of this pair is "
                       "0.102 kg: restitution and contact time belong to a pair of masses; \"rig\" "
                       "carries over the stiffness and damping instead");
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 

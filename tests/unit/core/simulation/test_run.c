@@ -83,8 +83,8 @@ static void a_workspace_leaves_no_trace_in_a_run(void **state) {
                             sizeof fresh->summary.error_estimate);
         assert_memory_equal(&fresh->response.energy, &used->response.energy,
                             sizeof fresh->response.energy);
-        outcome_drop(fresh);
-        outcome_drop(used);
+        outcome_unref(fresh);
+        outcome_unref(used);
     }
     workspace_clear(&workspace);
 }

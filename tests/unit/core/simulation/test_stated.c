@@ -55,8 +55,8 @@ static void assert_states_its_error(const char *text) {
     assert_true(largest > 0);
     if (!(apart <= fmax(10 * error, 1e-9) * largest))
         fail_msg("off by %g, states %g to %g s", apart / largest, error, until);
-    outcome_drop(stepped);
-    outcome_drop(exact);
+    outcome_unref(stepped);
+    outcome_unref(exact);
 }
 
 #define FAST "{\"structure\": {\"mass\": 1, \"stiffness\": 3947841760, \"damping\": 0},"
@@ -87,7 +87,7 @@ static void a_pulse_between_two_instants_is_told(void **state) {
         assert_states_its_error(text);
         Outcome *outcome = run(text, false, NULL);
         assert_true(outcome->summary.trust_horizon <= 1.1e-5);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -123,7 +123,7 @@ static void a_base_that_ends_at_once_is_no_error_of_adaptive_steps(void **state)
     assert_states_its_error(text);
     Outcome *outcome = run(text, false, NULL);
     assert_true(outcome->summary.error_estimate < 1e-9);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 // At 0.7 of what rk4 bears, its neighbour may not take longer steps.
@@ -136,7 +136,7 @@ static void a_neighbour_that_would_be_unstable_takes_shorter_steps(void **state)
         "\"duration\": 0.1, \"sample_rate\": 1000," END;
     Outcome *outcome = run(text, false, NULL);
     assert_true(outcome->summary.error_estimate > 0.1);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     assert_states_its_error(text);
 }
 

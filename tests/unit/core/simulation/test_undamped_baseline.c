@@ -41,8 +41,8 @@ static void a_reduction_is_that_of_two_runs(void **state) {
                      (1 - a->summary.rms_acceleration / b->summary.rms_acceleration)) < 1e-12);
     assert_true(fabs(reduction->peak_acceleration_reduction -
                      (1 - a->summary.peak_acceleration / b->summary.peak_acceleration)) < 1e-12);
-    outcome_drop(a);
-    outcome_drop(b);
+    outcome_unref(a);
+    outcome_unref(b);
     simulation_clear(&with);
     simulation_clear(&without);
 }
@@ -60,8 +60,8 @@ static void the_rest_is_as_without_it_and_its_cost_is_foretold(void **state) {
     const Cost dear = simulation_cost(&asked), cheap = simulation_cost(&plain),
                bare = bare_cost(&asked);
     assert_true(bare.steps > 0 && dear.steps == cheap.steps + bare.steps);
-    outcome_drop(a);
-    outcome_drop(b);
+    outcome_unref(a);
+    outcome_unref(b);
     simulation_clear(&asked);
     simulation_clear(&plain);
 }
@@ -75,7 +75,7 @@ static void where_nothing_moves_nothing_is_known(void **state) {
     Outcome *outcome = run(&still);
     assert_true(outcome->has_reduction);
     assert_true(isnan(outcome->reduction.peak_displacement_reduction));
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&still);
 }
 
@@ -92,7 +92,7 @@ static void every_law_and_a_target_have_one(void **state) {
         Outcome *outcome = run(&simulation);
         assert_true(outcome->has_reduction &&
                     fabs(outcome->reduction.rms_displacement_reduction) < 1);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
 }
@@ -106,11 +106,11 @@ static void it_can_be_stopped(void **state) {
     (void)state;
     Simulation simulation;
     Outcome *outcome = NULL;
-    const Watch watch = {NULL, never};
+    const Progress progress = {NULL, never};
     scene_with_damper(&simulation, 0.61, 0.025);
     simulation.output.reduction = true;
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, NULL), STATUS_OK);
-    assert_int_equal(simulation_run(&simulation, NULL, &watch, NULL, &outcome, NULL),
+    assert_int_equal(simulation_run(&simulation, NULL, &progress, NULL, &outcome, NULL),
                      STATUS_CANCELLED);
     assert_null(outcome);
     simulation_clear(&simulation);

@@ -364,10 +364,10 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
     Plan *plan = shaken_frame(2, false, 2);
     Problem problem;
     int asked = 0;
-    const Watch watch = {&asked, stop};
+    const Progress progress = {&asked, stop};
     plan->duration = 600;
     plan->count = 300001;
-    assert_int_equal(status_of(plan, (Run){.watch = &watch}, &problem), STATUS_CANCELLED);
+    assert_int_equal(status_of(plan, (Run){.progress = &progress}, &problem), STATUS_CANCELLED);
     assert_int_equal(asked, 3);
     assert_int_equal(status_of(plan, (Run){.impacts_most = 5}, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "5 impacts"));
@@ -456,8 +456,8 @@ static void making_the_tables_of_many_coupled_storeys_is_cancelled_on_the_way(vo
     plan->displacement[0] = 0.01;
     for (size_t most = 1; most < 14; most += 6) {
         Asked asked = {.most = most};
-        const Watch watch = {&asked, stop_after};
-        assert_int_equal(status_of(plan, (Run){.watch = &watch}, &problem), STATUS_CANCELLED);
+        const Progress progress = {&asked, stop_after};
+        assert_int_equal(status_of(plan, (Run){.progress = &progress}, &problem), STATUS_CANCELLED);
         assert_int_equal(asked.times, most);
         assert_true(asked.fraction == 0);
     }

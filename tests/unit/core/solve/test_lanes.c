@@ -11,12 +11,12 @@
 
 #include "core/solve/lanes.h"
 
-enum { COUNT_MOST = 203 };
+enum { COUNT_MAX = 203 };
 static const double INTERVAL = 1e-3;
 
 typedef struct Flown {
     Stretch stretch;
-    double columns[CHANNEL_COUNT][COUNT_MOST + 1];
+    double columns[CHANNEL_COUNT][COUNT_MAX + 1];
     size_t count;
 } Flown;
 
@@ -27,7 +27,7 @@ static Motion structure(double damping) {
 }
 
 static void make_base(double *base) {
-    for (size_t i = 0; i <= COUNT_MOST + 1; i++)
+    for (size_t i = 0; i <= COUNT_MAX + 1; i++)
         base[i] = sin(0.07 * (double)i) + 0.3 * cos(1.1 * (double)(i * i % 17));
 }
 
@@ -52,12 +52,12 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
     for (int i = 0; i < CHANNEL_COUNT; i++)
         if (i <= CHANNEL_DAMPER_VELOCITY)
             s->columns[i] = flown->columns[i];
-    flown->count = lanes_fly(lanes, s, 0, COUNT_MOST, base);
+    flown->count = lanes_fly(lanes, s, 0, COUNT_MAX, base);
 }
 
 static void lanes_agree_with_arcs(void **state) {
     (void)state;
-    double base[COUNT_MOST + 2];
+    double base[COUNT_MAX + 2];
     make_base(base);
     for (int kind = 0; kind < 6; kind++) {
         const bool is_still = kind < 4 && kind % 2 == 0, is_sine = kind >= 4;
@@ -68,10 +68,10 @@ static void lanes_agree_with_arcs(void **state) {
         const State start = {0.015, -0.1, 0.002, 0.03};
         static Flown flown;
         fly(&lanes, &start, 1, is_still || is_sine ? NULL : base, &flown);
-        assert_int_equal(flown.count, COUNT_MOST);
+        assert_int_equal(flown.count, COUNT_MAX);
         State at = start;
         double vv = 0, av = 0, sums[LANE_SUMS], got_vv = 0, got_av = 0, peak = 0;
-        for (size_t i = 0; i < COUNT_MOST; i++) {
+        for (size_t i = 0; i < COUNT_MAX; i++) {
             const double phase = sine.omega * INTERVAL * (double)i;
             const Slice slice = is_sine ? (Slice){1.4 * sin(phase), 1.4 * cos(phase), sine.omega}
                                 : is_still
@@ -109,7 +109,7 @@ static void lanes_agree_with_arcs(void **state) {
 
 static void no_width_of_vector_moves_a_bit(void **state) {
     (void)state;
-    double base[COUNT_MOST + 2];
+    double base[COUNT_MAX + 2];
     make_base(base);
     const Motion motion = structure(0.8);
     for (int kind = 0; kind < 6; kind++) {

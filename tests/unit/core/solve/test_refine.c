@@ -53,10 +53,10 @@ static void a_long_one_stops_soon_when_it_is_told_to(void **state) {
         const Base base = {
             .form = BASE_SAMPLED, .values = knots, .count = MANY, .interval = intervals[i]};
         int looks = 0;
-        const Watch watch = {&looks, stop_at_third};
+        const Progress progress = {&looks, stop_at_third};
         Base fine;
         values[MANY / 4] = 7;
-        assert_int_equal(refine_base(&base, 1000, MANY, values, &watch, &fine, NULL),
+        assert_int_equal(refine_base(&base, 1000, MANY, values, &progress, &fine, NULL),
                          STATUS_CANCELLED);
         assert_int_equal(looks, 3);
         assert_true(values[MANY / 4] == 7); // nothing was made that far behind

@@ -11,8 +11,8 @@
 #include <cmocka.h>
 
 #include "core/excitation/random.h"
-#include "core/math/matrix_exponential.h"
 #include "core/math/fft.h"
+#include "core/math/matrix_exponential.h"
 #include "core/solve/rounding_growth.h"
 #include "tests/support/paper.h"
 
@@ -205,7 +205,7 @@ static double parting(const Outcome *outcome, const PaperBuffer *buffer, int kin
         for (size_t i = 0; i < other->response.count && i < first; i++)
             if (fabs(x[i] - y[i]) > 1e-6 * outcome->summary.peak_displacement)
                 first = i;
-        outcome_drop(other);
+        outcome_unref(other);
     }
     return first == SIZE_MAX ? INFINITY : (double)first / 1000;
 }
@@ -232,7 +232,7 @@ static void the_horizon_is_where_neighbours_part(void **state) {
             } else {
                 assert_true(estimate > 0 && estimate < 1e-6);
             }
-            outcome_drop(outcome);
+            outcome_unref(outcome);
         }
     assert_true(parted >= 10);
 }
@@ -247,7 +247,7 @@ static void a_free_vibration_is_trusted_to_its_end(void **state) {
         assert_true(isnan(outcome->summary.trust_horizon));
         assert_true(outcome->summary.error_estimate > 1e-16);
         assert_true(outcome->summary.error_estimate < 1e-6);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
 }
 
@@ -261,7 +261,7 @@ static void without_a_damper_only_the_phase_drifts(void **state) {
     assert_true(isnan(outcome->summary.trust_horizon));
     assert_true(outcome->summary.error_estimate > 1e-15);
     assert_true(outcome->summary.error_estimate < 1e-12);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void what_does_not_move_has_no_error(void **state) {
@@ -272,7 +272,7 @@ static void what_does_not_move_has_no_error(void **state) {
     Outcome *outcome = outcome_of(&simulation);
     assert_true(isnan(outcome->summary.trust_horizon));
     assert_true(outcome->summary.error_estimate == 0);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 int main(void) {

@@ -10,7 +10,7 @@
 
 #include "core/solve/simd_kernels.h"
 
-enum { MODES = 21, PADDED = 24, COUNT_MOST = 7, ROWS = COUNT_MOST + 1, COLUMNS = 6, LARGE = 72 };
+enum { MODES = 21, PADDED = 24, COUNT_MAX = 7, ROWS = COUNT_MAX + 1, COLUMNS = 6, LARGE = 72 };
 
 typedef struct Results {
     double q[ROWS][PADDED], p[ROWS][PADDED], moved[ROWS][PADDED], sped[ROWS][PADDED];
@@ -22,7 +22,7 @@ typedef struct Results {
 } Results;
 
 typedef struct Given {
-    double gains[8][PADDED], a[COUNT_MOST], b[COUNT_MOST];
+    double gains[8][PADDED], a[COUNT_MAX], b[COUNT_MAX];
     double rows[ROWS][PADDED], others[ROWS][PADDED], weights[2][PADDED];
     double factors[4][ROWS], matrix[COLUMNS][PADDED], y[FRAME_FOUR][COLUMNS];
     double large[LARGE][LARGE], many[LARGE];
@@ -41,8 +41,8 @@ static void fill(double *values, size_t rows, size_t width, size_t used) {
 
 static void make(Given *given) {
     fill(given->gains[0], 8, PADDED, MODES);
-    fill(given->a, 1, COUNT_MOST, COUNT_MOST);
-    fill(given->b, 1, COUNT_MOST, COUNT_MOST);
+    fill(given->a, 1, COUNT_MAX, COUNT_MAX);
+    fill(given->b, 1, COUNT_MAX, COUNT_MAX);
     fill(given->rows[0], ROWS, PADDED, MODES);
     fill(given->others[0], ROWS, PADDED, MODES);
     fill(given->weights[0], 2, PADDED, MODES);
@@ -62,9 +62,9 @@ static void solve(Given *given, const FrameLanes *lanes, Results *out) {
     }
     memcpy(out->q[0], given->rows[0], sizeof out->q[0]);
     memcpy(out->p[0], given->rows[1], sizeof out->p[0]);
-    lanes->fly(&gains, PADDED, COUNT_MOST, given->a, given->b, out->q[0], out->p[0], out->moved[0],
+    lanes->fly(&gains, PADDED, COUNT_MAX, given->a, given->b, out->q[0], out->p[0], out->moved[0],
                out->sped[0]);
-    lanes->sum(PADDED, COUNT_MOST, given->a, given->b, given->rows[0], given->others[0],
+    lanes->sum(PADDED, COUNT_MAX, given->a, given->b, given->rows[0], given->others[0],
                out->sums[0]);
     lanes->mix(PADDED, ROWS, given->weights[0], given->rows[0], given->weights[1], given->others[0],
                out->mixed[0]);
@@ -85,7 +85,7 @@ static void solve(Given *given, const FrameLanes *lanes, Results *out) {
                               .after = out->after,
                               .push = out->push};
     lanes->order(&order);
-    lanes->series(PADDED, COUNT_MOST, given->rows[0], 4, given->factors[0], ROWS, out->series[0]);
+    lanes->series(PADDED, COUNT_MAX, given->rows[0], 4, given->factors[0], ROWS, out->series[0]);
     lanes->square(MODES, PADDED, ROWS, given->rows[0], out->squares[0]);
     for (size_t i = 0; i < PADDED; i++)
         memset(out->squares[i] + i + 1, 0, (PADDED - i - 1) * sizeof(double)); // of no use
@@ -107,7 +107,7 @@ static void rows_are_what_plain_loops_make_of_them(void **state) {
     for (size_t i = 0; i < MODES; i++) {
         double(*g)[PADDED] = given.gains, x = given.rows[0][i], v = given.rows[1][i];
         double sums[FRAME_SUMS] = {0}, series = 0;
-        for (size_t k = 0; k < COUNT_MOST; k++) {
+        for (size_t k = 0; k < COUNT_MAX; k++) {
             const double a = given.a[k], b = given.b[k];
             const double dx = g[0][i] * x + g[1][i] * v + g[2][i] * a + g[3][i] * b;
             const double dv = g[4][i] * x + g[5][i] * v + g[6][i] * a + g[7][i] * b;

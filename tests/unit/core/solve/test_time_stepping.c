@@ -265,8 +265,8 @@ static void every_solver_comes_to_the_exact_ones_answer(void **state) {
             assert_true(fabs(says->peak_contact_force - is->peak_contact_force) <=
                         allowances[k].force * is->peak_contact_force);
             assert_true(says->energy_residual < 0.01);
-            outcome_drop(exact);
-            outcome_drop(other);
+            outcome_unref(exact);
+            outcome_unref(other);
         }
     }
 }
@@ -429,8 +429,8 @@ static void precise_at_a_millisecond_is_wrong_and_says_so(void **state) {
     for (size_t i = 0; i < other->warnings.count; i++)
         is_warned = is_warned || strcmp(other->warnings.at[i].pointer, "/accuracy") == 0;
     assert_true(is_warned);
-    outcome_drop(exact);
-    outcome_drop(other);
+    outcome_unref(exact);
+    outcome_unref(other);
 }
 
 static const Decision *decision(const Outcome *outcome, const char *about) {
@@ -459,11 +459,11 @@ static void the_plan_says_which_step_and_why(void **state) {
         assert_string_equal(step->chose, cases[i].chose);
         assert_true(fabs(step->value - cases[i].step) < 1e-3 * cases[i].step);
         assert_non_null(strstr(decision(outcome, "contact_switching")->why, "first order"));
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     Outcome *outcome = run_scene(&aluminium, &solver_adaptive, 1e-5);
     assert_true(decision(outcome, "tolerance")->value == 1e-5);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 static void what_a_run_costs_is_foretold(void **state) {
@@ -514,10 +514,10 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
         const AccuracyStep step = {.step = 1e-6};
         const AccuracyTolerance tolerance = {.tolerance = 1e-12};
         Watcher watcher = {.stops_at = 3};
-        const Watch watch = {&watcher, look};
+        const Progress progress = {&watcher, look};
         Run run = {.plan = plan,
                    .base = &sine,
-                   .watch = &watch,
+                   .progress = &progress,
                    .accuracy = is_adaptive ? &tolerance.accuracy : &step.accuracy};
         Response response = {0};
         problem_clear(&problem);
@@ -525,7 +525,7 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
         assert_true(watcher.looks <= 4 && watcher.last < 0.9);
         response_clear(&response);
         response = (Response){0};
-        run.watch = NULL;
+        run.progress = NULL;
         run.steps = 0;
         run.steps_most = 30000;
         problem_clear(&problem);

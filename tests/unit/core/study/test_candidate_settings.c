@@ -224,8 +224,8 @@ static void fewer_samples_leave_the_base_as_it_is(void **state) {
                  *y = coarse->response.series.at[0].values;
     for (size_t i = 0; i < 1000; i++)
         assert_true(fabs(x[4 * i] - y[i]) < 1e-9);
-    outcome_drop(whole);
-    outcome_drop(coarse);
+    outcome_unref(whole);
+    outcome_unref(coarse);
     simulation_clear(&target);
     simulation_clear(&simulation);
 }

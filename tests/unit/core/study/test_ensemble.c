@@ -19,13 +19,13 @@
 
 static Problem problem;
 
-static EnsembleStudy *study_of(Inquiry *inquiry) {
+static EnsembleStudy *study_of(StudyRequest *inquiry) {
     return (EnsembleStudy *)(void *)inquiry->study;
 }
 
 // The paper's random scene with seed 5 and an ensemble of so many runs; completed by the caller.
-static Inquiry inquiry_make(double duration, uint64_t runs) {
-    Inquiry inquiry = {0};
+static StudyRequest study_request_make(double duration, uint64_t runs) {
+    StudyRequest inquiry = {0};
     paper_scene(&inquiry.simulation, 0.61, 0.025, duration);
     paper_random(&inquiry.simulation, 1, 5);
     inquiry.study = variant_new(&study_ensemble.kind);
@@ -35,21 +35,21 @@ static Inquiry inquiry_make(double duration, uint64_t runs) {
     return inquiry;
 }
 
-static void complete(Inquiry *inquiry) {
-    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
+static void complete(StudyRequest *inquiry) {
+    if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
 }
 
-static Status run(const Inquiry *inquiry, const Watch *watch, const SimulationLimits *limits,
-                  Workspace *workspace, Ensemble **answer) {
-    const StudyTools tools = {.limits = limits, .watch = watch, .workspace = workspace};
+static Status run(const StudyRequest *inquiry, const Progress *progress,
+                  const SimulationLimits *limits, Workspace *workspace, Ensemble **answer) {
+    const StudyTools tools = {.limits = limits, .progress = progress, .workspace = workspace};
     Variant *made = NULL;
     const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &made, &problem);
     *answer = (Ensemble *)(void *)made;
     return status;
 }
 
-static Ensemble *make(const Inquiry *inquiry, const SimulationLimits *limits) {
+static Ensemble *make(const StudyRequest *inquiry, const SimulationLimits *limits) {
     Ensemble *answer;
     if (run(inquiry, NULL, limits, NULL, &answer) != STATUS_OK)
         fail_msg("%s", problem.detail);
@@ -58,7 +58,7 @@ static Ensemble *make(const Inquiry *inquiry, const SimulationLimits *limits) {
 
 static void each_row_is_the_scene_with_its_seed(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(4, 5);
+    StudyRequest inquiry = study_request_make(4, 5);
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->first_seed, 5); // the scene's own
     Ensemble *answer = make(&inquiry, NULL);
@@ -74,7 +74,7 @@ static void each_row_is_the_scene_with_its_seed(void **state) {
         assert_true(row->seed == 5 + i && row->steps == outcome->steps && row->why == NULL);
         assert_memory_equal(&row->summary, &outcome->summary, sizeof outcome->summary);
         steps += outcome->steps;
-        outcome_drop(outcome);
+        outcome_unref(outcome);
     }
     assert_true(answer->steps == steps);
     assert_true(answer->target.why == NULL && answer->target.predicted_runs == COUNT_ABSENT);
@@ -84,13 +84,13 @@ static void each_row_is_the_scene_with_its_seed(void **state) {
     assert_string_equal(answer->spectra.at[0].channel, "mean_acceleration");
     assert_true(answer->spectra.at[0].low.at[40] < answer->spectra.at[0].mean.at[40]);
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
     (void)state;
     static const double targets[] = {0.5, 0.1, 1e-9};
-    Inquiry inquiry = inquiry_make(4, 60);
+    StudyRequest inquiry = study_request_make(4, 60);
     double made[COUNT(targets)];
     for (int metric = 0; metric <= ENSEMBLE_PSD; metric += ENSEMBLE_PSD) {
         for (size_t i = 0; i < COUNT(targets); i++) {
@@ -108,12 +108,12 @@ static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
         }
         assert_true(made[0] < made[1] && made[1] <= made[2] && made[2] == 60);
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void all_are_made_where_none_differs(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(1, 30);
+    StudyRequest inquiry = study_request_make(1, 30);
     study_of(&inquiry)->target = 0.5;
     study_of(&inquiry)->metric = ENSEMBLE_IMPACTS;
     // Nothing reaches the stops: a rare seed might.
@@ -124,12 +124,12 @@ static void all_are_made_where_none_differs(void **state) {
                 answer->target.estimated_error == 0);
     assert_true(answer->statistics.impacts.mean == 0 && answer->statistics.impacts.high == 0);
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(4, 20);
+    StudyRequest inquiry = study_request_make(4, 20);
     complete(&inquiry);
     Ensemble *whole = make(&inquiry, NULL);
     const SimulationLimits limits = {.impacts = (size_t)whole->statistics.impacts.median};
@@ -153,12 +153,12 @@ static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
     }
     variant_free(&answer->variant);
     variant_free(&whole->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(4, 10);
+    StudyRequest inquiry = study_request_make(4, 10);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
     const SimulationLimits limits = {.impacts = 1};
@@ -168,12 +168,12 @@ static void where_all_fail_the_study_says_so_and_nothing_else(void **state) {
     assert_true(isnan(answer->statistics.rms_displacement.mean) && answer->spectra.count == 0);
     assert_non_null(strstr(answer->target.why, "no run of 10"));
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void what_is_not_known_is_not_told(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(2, 3);
+    StudyRequest inquiry = study_request_make(2, 3);
     paper_model(&inquiry.simulation, "impulse");
     paper_no_psd(&inquiry.simulation);
     complete(&inquiry);
@@ -182,7 +182,7 @@ static void what_is_not_known_is_not_told(void **state) {
     assert_true(answer->statistics.impacts.mean > 0);
     assert_true(answer->spectra.count == 0 && answer->frequency.count == 0);
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 typedef struct Patience {
@@ -200,24 +200,24 @@ static bool lose(void *context, double fraction) {
 
 static void it_tells_its_progress_and_can_be_stopped_wherever_it_is(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(1, 40);
+    StudyRequest inquiry = study_request_make(1, 40);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
     Ensemble *answer;
     Patience patience = {.left = 1 << 30};
-    const Watch watch = {&patience, lose};
-    assert_int_equal(run(&inquiry, &watch, NULL, NULL, &answer), STATUS_OK);
+    const Progress progress = {&patience, lose};
+    assert_int_equal(run(&inquiry, &progress, NULL, NULL, &answer), STATUS_OK);
     const int whole = patience.asked;
     assert_true(whole >= (int)answer->made && patience.last > 0.5);
     variant_free(&answer->variant);
     for (int left = 0; left < whole; left += 1 + whole / 40) {
         patience = (Patience){.left = left};
         problem_clear(&problem);
-        assert_int_equal(run(&inquiry, &watch, NULL, NULL, &answer), STATUS_CANCELLED);
+        assert_int_equal(run(&inquiry, &progress, NULL, NULL, &answer), STATUS_CANCELLED);
         assert_null(answer);
         assert_int_equal(patience.asked, left + 1); // and asks no more
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 typedef struct Taken {
@@ -235,7 +235,7 @@ static void take(void *context, const void *bytes, size_t size) {
 
 static void the_same_study_has_the_same_bytes_in_any_workspace(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(3, 20);
+    StudyRequest inquiry = study_request_make(3, 20);
     study_of(&inquiry)->target = 0.08;
     study_of(&inquiry)->metric = ENSEMBLE_PSD;
     complete(&inquiry);
@@ -254,60 +254,60 @@ static void the_same_study_has_the_same_bytes_in_any_workspace(void **state) {
     for (size_t i = 0; i < 3; i++)
         free(taken[i].bytes);
     workspace_clear(&workspace);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
-static void assert_refused(Inquiry *inquiry, const SimulationLimits *limits, const char *pointer,
-                           const char *says) {
+static void assert_refused(StudyRequest *inquiry, const SimulationLimits *limits,
+                           const char *pointer, const char *says) {
     problem_clear(&problem);
-    assert_int_equal(inquiry_complete(inquiry, limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(inquiry, limits, NULL, &problem), STATUS_INVALID);
     if (!problem_concerns(&problem, pointer) || strstr(problem.faults[0].detail, says) == NULL)
         fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
-    inquiry_clear(inquiry);
+    study_request_clear(inquiry);
 }
 
 static void what_cannot_be_answered_is_refused(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(1, 20);
+    StudyRequest inquiry = study_request_make(1, 20);
     paper_free(&inquiry.simulation, 0.015);
     assert_refused(&inquiry, NULL, "/study/kind", "must be random, is free");
 
-    inquiry = inquiry_make(1, 1);
+    inquiry = study_request_make(1, 1);
     assert_refused(&inquiry, NULL, "/study/runs", "must be within [2, 10000]");
 
-    inquiry = inquiry_make(1, 20);
+    inquiry = study_request_make(1, 20);
     study_of(&inquiry)->target = 0;
     assert_refused(&inquiry, NULL, "/study/target", "must be above 0");
 
-    inquiry = inquiry_make(1, 20);
+    inquiry = study_request_make(1, 20);
     study_of(&inquiry)->first_seed = (UINT64_C(1) << 53) - 19;
     assert_refused(&inquiry, NULL, "/study/first_seed", "must be at most 9007199254740972");
 
-    inquiry = inquiry_make(1, 20);
+    inquiry = study_request_make(1, 20);
     study_of(&inquiry)->target = 0.1;
     study_of(&inquiry)->metric = ENSEMBLE_PEAK_CONTACT_FORCE;
     paper_model(&inquiry.simulation, "impulse");
     assert_refused(&inquiry, NULL, "/study/metric", "impulses have none");
 
-    inquiry = inquiry_make(600, 20);
+    inquiry = study_request_make(600, 20);
     inquiry.simulation.output.psd.segment = 600000;
     assert_refused(&inquiry, NULL, "/output/psd/segment", "takes at most 262144");
 
-    inquiry = inquiry_make(1, 2000);
+    inquiry = study_request_make(1, 2000);
     const SimulationLimits limits = {.steps = 1e5};
     assert_refused(&inquiry, &limits, "/study", "at most 0.03 s are allowed: ask for fewer runs");
 }
 
 static void a_metric_without_a_target_is_left_out(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(1, 20);
+    StudyRequest inquiry = study_request_make(1, 20);
     study_of(&inquiry)->metric = ENSEMBLE_PSD;
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->metric, CHOICE_ABSENT);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->metric, ENSEMBLE_RMS_DISPLACEMENT);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 int main(void) {

@@ -10,20 +10,20 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/model_comparison.h"
 #include "core/study/compare_variants.h"
+#include "core/study/model_comparison.h"
 #include "core/study/study_request.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
 static Problem problem;
 
-static CompareStudy *study_of(Inquiry *inquiry) {
+static CompareStudy *study_of(StudyRequest *inquiry) {
     return (CompareStudy *)(void *)inquiry->study;
 }
 
-static Inquiry inquiry_make(double restitution, double contact_time, double duration) {
-    Inquiry inquiry = {0};
+static StudyRequest study_request_make(double restitution, double contact_time, double duration) {
+    StudyRequest inquiry = {0};
     paper_scene(&inquiry.simulation, restitution, contact_time, duration);
     inquiry.study = variant_new(&study_compare.kind);
     assert_non_null(inquiry.study);
@@ -37,12 +37,12 @@ static void name(Texts *texts, const char *text) {
     assert_non_null(texts->at[texts->count++] = strdup(text));
 }
 
-static void complete(Inquiry *inquiry) {
-    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
+static void complete(StudyRequest *inquiry) {
+    if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
 }
 
-static Comparison *make(const Inquiry *inquiry) {
+static Comparison *make(const StudyRequest *inquiry) {
     const StudyTools tools = {0};
     Variant *made = NULL;
     if (study_run(inquiry->study, &inquiry->simulation, &tools, &made, &problem) != STATUS_OK)
@@ -58,15 +58,15 @@ static const CompareEntry *entry_of(const Comparison *answer, const char *called
     return NULL;
 }
 
-static void clear(Inquiry *inquiry, Comparison *answer) {
+static void clear(StudyRequest *inquiry, Comparison *answer) {
     if (answer != NULL)
         variant_free(&answer->variant);
-    inquiry_clear(inquiry);
+    study_request_clear(inquiry);
 }
 
 static void all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 4);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 4);
     complete(&inquiry);
     assert_true(study_of(&inquiry)->models.count == 8 &&
                 study_of(&inquiry)->separations.count == 2 && study_of(&inquiry)->storey == 1);
@@ -89,7 +89,7 @@ static void all_laws_and_both_rules_are_tried_and_what_cannot_be_says_why(void *
 
 static void the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 4);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 4);
     name(&study_of(&inquiry)->models, "impulse");
     complete(&inquiry);
     Comparison *answer = make(&inquiry);
@@ -101,7 +101,7 @@ static void the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing
     assert_memory_equal(&own->summary, &outcome->summary, sizeof own->summary);
     assert_memory_equal(own->density.at, outcome->spectrum.densities.at[0].values,
                         own->density.count * sizeof(double));
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     assert_true(own->psd.level == 0 && own->psd.difference == 0 && own->displacement.relative == 0);
     assert_true(isnan(own->divergence.time) && own->differences.rms_displacement == 0);
     const CompareEntry *impulse = &answer->entries.at[1];
@@ -115,7 +115,7 @@ static void the_reference_is_the_scenes_own_run_and_apart_from_itself_by_nothing
 
 static void each_variant_is_the_scene_with_that_contact(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 3);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 3);
     name(&study_of(&inquiry)->separations, "zero_force");
     name(&study_of(&inquiry)->models, "flores");
     name(&study_of(&inquiry)->models, "spring_damper");
@@ -132,14 +132,14 @@ static void each_variant_is_the_scene_with_that_contact(void **state) {
     assert_memory_equal(&entry->summary, &outcome->summary, sizeof entry->summary);
     assert_true(entry->derived.at[0].stiffness == outcome->plan.derived.at[0].stiffness);
     assert_true(entry->contacts.energy_lost == outcome->response.energy.contact);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&single);
     clear(&inquiry, answer);
 }
 
 static void impulses_alone_leave_no_contact_time_to_others(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, (double)NAN, 2);
+    StudyRequest inquiry = study_request_make(0.61, (double)NAN, 2);
     complete(&inquiry);
     Comparison *answer = make(&inquiry);
     assert_string_equal(answer->entries.at[0].name, "impulse");
@@ -152,7 +152,7 @@ static void impulses_alone_leave_no_contact_time_to_others(void **state) {
 
 static void aluminium_parts_by_little_in_the_band_of_the_base(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.46, 0.0003, 30);
+    StudyRequest inquiry = study_request_make(0.46, 0.0003, 30);
     paper_random(&inquiry.simulation, 1, 3);
     name(&study_of(&inquiry)->models, "impulse");
     study_of(&inquiry)->band = (Reals){calloc(2, sizeof(double)), 2};
@@ -168,7 +168,7 @@ static void aluminium_parts_by_little_in_the_band_of_the_base(void **state) {
 
 static void a_trace_holds_every_extreme(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 10);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     name(&study_of(&inquiry)->models, "impulse");
     complete(&inquiry);
     Comparison *answer = make(&inquiry);
@@ -186,7 +186,7 @@ static void a_trace_holds_every_extreme(void **state) {
 
 static void a_target_is_set_aside_so_that_no_variant_becomes_another(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.46, 0.0003, 2);
+    StudyRequest inquiry = study_request_make(0.46, 0.0003, 2);
     AccuracyAuto *accuracy = (AccuracyAuto *)(void *)inquiry.simulation.accuracy;
     accuracy->target = 0.1;
     name(&study_of(&inquiry)->models, "impulse");
@@ -204,17 +204,17 @@ static bool stop(void *context, double fraction) {
 
 static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 10);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     complete(&inquiry);
     int calls = 0;
-    const Watch watch = {&calls, stop};
-    const StudyTools tools = {.watch = &watch};
+    const Progress progress = {&calls, stop};
+    const StudyTools tools = {.progress = &progress};
     Variant *made;
     assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &made, &problem),
                      STATUS_CANCELLED);
     assert_null(made);
     Cost cost;
-    assert_int_equal(inquiry_cost(&inquiry, NULL, &cost, NULL), STATUS_OK);
+    assert_int_equal(study_request_cost(&inquiry, NULL, &cost, NULL), STATUS_OK);
     const double alone = simulation_cost(&inquiry.simulation).steps;
     assert_true(cost.steps > 6 * alone && cost.steps < 60 * alone);
     clear(&inquiry, NULL);
@@ -222,27 +222,27 @@ static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
 
 static void faults_are_told_at_their_places(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 1);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     CompareStudy *study = study_of(&inquiry);
     name(&study->models, "hertzz");
     name(&study->models, "auto");
     study->storey = 2;
     study->band = (Reals){calloc(1, sizeof(double)), 1};
-    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_true(problem.count == 4);
     assert_string_equal(problem.faults[0].pointer, "/study/models/0");
     assert_string_equal(problem.faults[0].did_you_mean, "hertz");
     assert_string_equal(problem.faults[1].pointer, "/study/models/1");
     assert_string_equal(problem.faults[2].pointer, "/study/storey");
     assert_string_equal(problem.faults[3].pointer, "/study/band");
-    inquiry_clear(&inquiry);
-    Inquiry bare = {0};
+    study_request_clear(&inquiry);
+    StudyRequest bare = {0};
     scene_without_damper(&bare.simulation);
     bare.study = variant_new(&study_compare.kind);
     problem_clear(&problem);
-    assert_int_equal(inquiry_complete(&bare, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&bare, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/kind");
-    inquiry_clear(&bare);
+    study_request_clear(&bare);
 }
 
 int main(void) {

@@ -10,21 +10,21 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/study_request.h"
-#include "core/study/sensitivity.h"
-#include "core/study/parameter_perturbation.h"
 #include "core/study/input_uncertainty.h"
+#include "core/study/parameter_perturbation.h"
+#include "core/study/sensitivity.h"
+#include "core/study/study_request.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
 static Problem problem;
 
-static SensitivityStudy *study_of(Inquiry *inquiry) {
+static SensitivityStudy *study_of(StudyRequest *inquiry) {
     return (SensitivityStudy *)(void *)inquiry->study;
 }
 
-static Inquiry inquiry_make(double restitution, double contact_time, double duration) {
-    Inquiry inquiry = {0};
+static StudyRequest study_request_make(double restitution, double contact_time, double duration) {
+    StudyRequest inquiry = {0};
     paper_scene(&inquiry.simulation, restitution, contact_time, duration);
     inquiry.study = variant_new(&study_sensitivity.kind);
     assert_non_null(inquiry.study);
@@ -32,12 +32,12 @@ static Inquiry inquiry_make(double restitution, double contact_time, double dura
     return inquiry;
 }
 
-static void complete(Inquiry *inquiry) {
-    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
+static void complete(StudyRequest *inquiry) {
+    if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
 }
 
-static Sensitivity *make(const Inquiry *inquiry) {
+static Sensitivity *make(const StudyRequest *inquiry) {
     const StudyTools tools = {0};
     Variant *made = NULL;
     if (study_run(inquiry->study, &inquiry->simulation, &tools, &made, &problem) != STATUS_OK)
@@ -45,9 +45,9 @@ static Sensitivity *make(const Inquiry *inquiry) {
     return (Sensitivity *)(void *)made;
 }
 
-static void clear(Inquiry *inquiry, Sensitivity *answer) {
+static void clear(StudyRequest *inquiry, Sensitivity *answer) {
     variant_free(&answer->variant);
-    inquiry_clear(inquiry);
+    study_request_clear(inquiry);
 }
 
 static void assert_near(double is, double should, double within) {
@@ -82,7 +82,7 @@ static Derived derive(double restitution, double contact_time, double mass) {
 
 static void closed_forms_are_those_of_a_plans_differences(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 1);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     assert_int_equal(answer->contact.count, 2);
@@ -102,7 +102,7 @@ static void closed_forms_are_those_of_a_plans_differences(void **state) {
 
 static void slopes_are_central_differences_of_the_summary(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 1);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     study_of(&inquiry)->step = 0.02;
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->parameters.count, 4);
@@ -117,7 +117,7 @@ static void slopes_are_central_differences_of_the_summary(void **state) {
         assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &outcome, &problem),
                          STATUS_OK);
         forces[i] = outcome->summary.peak_contact_force;
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&simulation);
     }
     const SensitivitySlope *slope =
@@ -132,7 +132,7 @@ static void slopes_are_central_differences_of_the_summary(void **state) {
 
 static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.46, 0.0003, 40);
+    StudyRequest inquiry = study_request_make(0.46, 0.0003, 40);
     paper_random(&inquiry.simulation, 1, 5);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
@@ -145,7 +145,7 @@ static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
 
 static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.9, 0.025, 1);
+    StudyRequest inquiry = study_request_make(0.9, 0.025, 1);
     SensitivityStudy *study = study_of(&inquiry);
     study->restitution_deviation = 0.02;
     study->contact_time_deviation = 0.1;
@@ -177,12 +177,12 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
         assert_true(member.scene.dampers.at[0].buffer.restitution <= 1);
     }
     simulation_clear(&member);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 // Two stops, each with a material of its own.
-static Inquiry inquiry_of_materials(void) {
-    Inquiry inquiry = inquiry_make(0.6, 0.025, 1);
+static StudyRequest study_request_of_materials(void) {
+    StudyRequest inquiry = study_request_make(0.6, 0.025, 1);
     Damper *damper = &inquiry.simulation.scene.dampers.at[0];
     assert_int_equal(fields_copy(buffer_fields, &damper->buffer, &damper->left_buffer), STATUS_OK);
     buffer_move(&damper->right_buffer, &damper->buffer);
@@ -195,7 +195,7 @@ static Inquiry inquiry_of_materials(void) {
 
 static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_of_materials();
+    StudyRequest inquiry = study_request_of_materials();
     SensitivityStudy *study = study_of(&inquiry);
     study->runs = 40;
     complete(&inquiry);
@@ -223,7 +223,7 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
 
 static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_of_materials();
+    StudyRequest inquiry = study_request_of_materials();
     SensitivityStudy *study = study_of(&inquiry);
     study->restitution_deviation = 0;
     study->contact_time_deviation = 0.01;
@@ -234,12 +234,12 @@ static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
         assert_true(spread_of(study, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
         assert_true(spread_of(study, 0, buffer, SENSITIVITY_CONTACT_TIME) == 0.01);
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 2);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
     SensitivityStudy *study = study_of(&inquiry);
     study->contact_time_deviation = 0.1;
     study->runs = 20;
@@ -255,7 +255,7 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
     assert_int_equal(simulation_run(&simulation, NULL, NULL, NULL, &outcome, &problem), STATUS_OK);
     assert_memory_equal(&draw->summary, &outcome->summary, sizeof draw->summary);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
     simulation_clear(&simulation);
     const SensitivityBand *band = &answer->statistics.at[ENSEMBLE_RMS_DISPLACEMENT];
     assert_true(band->count == 20 && band->q05 <= band->median && band->median <= band->q95);
@@ -278,7 +278,7 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
 static void the_papers_errors_move_the_response_as_it_is_stated(void **state) {
     (void)state;
     // 10 % in T_c with 15 % in e: the peak force moves by 9 to 14 %.
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 10);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 10);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     const double moved =
@@ -290,14 +290,14 @@ static void the_papers_errors_move_the_response_as_it_is_stated(void **state) {
 
 static void what_has_no_closed_form_says_why(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, (double)NAN, 1);
+    StudyRequest inquiry = study_request_make(0.61, (double)NAN, 1);
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     assert_non_null(strstr(answer->contact.at[1].why, "impulses have no stiffness"));
     // Impulses have no force either.
     assert_true(answer->response.at[0].slopes.count + 1 == ENSEMBLE_STATISTICS);
     clear(&inquiry, answer);
-    inquiry = inquiry_make(0.61, 0.025, 1);
+    inquiry = study_request_make(0.61, 0.025, 1);
     paper_model(&inquiry.simulation, "flores");
     complete(&inquiry);
     answer = make(&inquiry);
@@ -307,7 +307,7 @@ static void what_has_no_closed_form_says_why(void **state) {
 
 static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(1, 0.025, 1);
+    StudyRequest inquiry = study_request_make(1, 0.025, 1);
     complete(&inquiry);
     assert_true(change_most(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
     assert_true(change_most(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
@@ -320,7 +320,7 @@ static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
 
 static void changes_begin_at_the_scenes_own_numbers(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 1);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 1);
     complete(&inquiry);
     Simulation member;
     assert_int_equal(fields_copy(simulation_fields, &inquiry.simulation, &member), STATUS_OK);
@@ -335,7 +335,7 @@ static void changes_begin_at_the_scenes_own_numbers(void **state) {
     assert_true(buffer_equals(&a->buffer, &b->buffer));
     assert_non_null(change_refuse(&inquiry.simulation, SENSITIVITY_STIFFNESS));
     simulation_clear(&member);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static bool stop(void *context, double fraction) {
@@ -347,46 +347,46 @@ static bool stop(void *context, double fraction) {
 
 static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, 0.025, 2);
+    StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
     study_of(&inquiry)->contact_time_deviation = 0.1;
     complete(&inquiry);
     double last = 0;
-    const Watch watch = {&last, stop};
-    const StudyTools tools = {.watch = &watch};
+    const Progress progress = {&last, stop};
+    const StudyTools tools = {.progress = &progress};
     Variant *made;
     assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &made, &problem),
                      STATUS_CANCELLED);
     assert_true(made == NULL && last >= 0.5 && last < 0.6);
     Cost cost;
-    assert_int_equal(inquiry_cost(&inquiry, NULL, &cost, NULL), STATUS_OK);
+    assert_int_equal(study_request_cost(&inquiry, NULL, &cost, NULL), STATUS_OK);
     const double runs = cost.steps / simulation_cost(&inquiry.simulation).steps;
     assert_true(runs > 200 && runs < 1 + 225);
     const SimulationLimits limits = {.steps = simulation_cost(&inquiry.simulation).steps * 2};
     problem_clear(&problem);
-    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(problem.faults[0].detail, "fewer runs"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void faults_are_told_at_their_places(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.61, (double)NAN, 1);
+    StudyRequest inquiry = study_request_make(0.61, (double)NAN, 1);
     study_of(&inquiry)->contact_time_deviation = 0.1; // impulses have no contact time
-    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/contact_time_deviation");
-    inquiry_clear(&inquiry);
-    inquiry = inquiry_make(0.61, 0.025, 1);
+    study_request_clear(&inquiry);
+    inquiry = study_request_make(0.61, 0.025, 1);
     study_of(&inquiry)->runs = 10; // of what spread?
-    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/runs");
-    inquiry_clear(&inquiry);
-    inquiry = inquiry_make(0.61, 0.025, 100);
+    study_request_clear(&inquiry);
+    inquiry = study_request_make(0.61, 0.025, 100);
     study_of(&inquiry)->restitution_deviation = 0.1;
     study_of(&inquiry)->runs = 2000;
     inquiry.simulation.output.psd.segment = 65536;
-    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/runs");
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 int main(void) {

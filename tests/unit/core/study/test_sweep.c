@@ -9,16 +9,16 @@
 #include <string.h>
 
 #include "core/study/study_request.h"
-#include "core/study/sweep_validation.h"
 #include "core/study/sweep_run.h"
+#include "core/study/sweep_validation.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
 static Problem problem;
 
 // The paper's scene for 1 s with a sweep that has no axes yet.
-static Inquiry inquiry_make(void) {
-    Inquiry inquiry = {0};
+static StudyRequest study_request_make(void) {
+    StudyRequest inquiry = {0};
     scene_with_damper(&inquiry.simulation, 0.61, 0.025);
     inquiry.simulation.scene.duration = 1;
     inquiry.study = variant_new(&study_sweep.kind);
@@ -27,11 +27,11 @@ static Inquiry inquiry_make(void) {
     return inquiry;
 }
 
-static SweepStudy *study_of(const Inquiry *inquiry) {
+static SweepStudy *study_of(const StudyRequest *inquiry) {
     return (SweepStudy *)(void *)inquiry->study;
 }
 
-static SweepAxis *axis_add(Inquiry *inquiry, const char *pointer) {
+static SweepAxis *axis_add(StudyRequest *inquiry, const char *pointer) {
     SweepAxes *axes = &study_of(inquiry)->axes;
     axes->at = realloc(axes->at, (axes->count + 1) * sizeof *axes->at);
     assert_non_null(axes->at);
@@ -44,7 +44,7 @@ static SweepAxis *axis_add(Inquiry *inquiry, const char *pointer) {
     return axis;
 }
 
-static void range_add(Inquiry *inquiry, const char *pointer, double from, double to,
+static void range_add(StudyRequest *inquiry, const char *pointer, double from, double to,
                       uint64_t count) {
     SweepAxis *axis = axis_add(inquiry, pointer);
     axis->from = from;
@@ -52,14 +52,14 @@ static void range_add(Inquiry *inquiry, const char *pointer, double from, double
     axis->count = count;
 }
 
-static void values_add(Inquiry *inquiry, const char *pointer, size_t count,
+static void values_add(StudyRequest *inquiry, const char *pointer, size_t count,
                        const char *const *values) {
     axis_add(inquiry, pointer)->values = texts_of(count, values);
 }
 
-static SweepPlan *plan_of(Inquiry *inquiry) {
+static SweepPlan *plan_of(StudyRequest *inquiry) {
     SweepPlan *plan = NULL;
-    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK ||
+    if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK ||
         sweep_plan_new(study_of(inquiry), &inquiry->simulation, NULL, &plan, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
     return plan;
@@ -80,7 +80,7 @@ static bool count_look(void *context, double fraction) {
 
 // Points judged where the scene has so many storeys.
 static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     Scene *scene = &inquiry.simulation.scene;
     scene_start(&inquiry.simulation, 0, 0);
     variant_free(scene->structure);
@@ -96,10 +96,10 @@ static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
     study_of(&inquiry)->mode = mode;
     SweepPlan *plan = plan_of(&inquiry);
     size_t looks = 0;
-    const Watch watch = {&looks, count_look};
-    assert_int_equal(sweep_check(plan, scenes, NULL, &watch, &problem), STATUS_OK);
+    const Progress progress = {&looks, count_look};
+    assert_int_equal(sweep_check(plan, scenes, NULL, &progress, &problem), STATUS_OK);
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     return looks;
 }
 
@@ -114,7 +114,7 @@ static void how_many_points_are_judged_at_once_goes_by_what_one_costs(void **sta
     assert_int_equal(judged(40, 100, SIZE_MAX, SWEEP_GRID), 100); // before anything runs: all
 }
 
-// No look at the watch may be far from the next one, whatever a point costs.
+// No look at the progress may be far from the next one, whatever a point costs.
 static void judging_all_points_looks_at_the_watch_before_each(void **state) {
     (void)state;
     assert_int_equal(judged(20, 200, SIZE_MAX, SWEEP_LIST), 200);
@@ -122,7 +122,7 @@ static void judging_all_points_looks_at_the_watch_before_each(void **state) {
 
 static void a_points_scene_follows_from_its_number(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     static const char *const masses[] = {"0.1", "0.2", "0.3"};
     values_add(&inquiry, "/dampers/0/mass", 3, masses);
     range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 5);
@@ -138,25 +138,25 @@ static void a_points_scene_follows_from_its_number(void **state) {
     }
     sweep_plan_free(plan);
     study_of(&inquiry)->mode = SWEEP_LIST;
-    assert_int_equal(inquiry_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes/1"), "has 5 values"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void whole_numbers_of_a_range_stay_whole(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/output/psd/segment", 1, 3000, 3000);
     SweepPlan *plan = plan_of(&inquiry);
     for (size_t i = 0; i < 3000; i++)
         assert_int_equal(plan->axes[0].at[i].whole, i + 1);
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_row_is_its_scenes_own_run(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 4);
     SweepPlan *plan = plan_of(&inquiry);
     const StudyTools tools = {0};
@@ -175,24 +175,24 @@ static void a_row_is_its_scenes_own_run(void **state) {
         assert_true(row[0] == outcome->summary.peak_displacement);
         assert_true(row[1] == outcome->summary.rms_displacement);
         assert_true(row[4] == (double)outcome->summary.impacts);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         simulation_clear(&scene);
     }
     variant_free(answer);
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void faults_stand_at_their_values_and_name_the_point(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     static const char *const clearances[] = {"0.01", "-1", "\"wide\"", "-2"};
     static const char *const masses[] = {"0.1", "0"};
     const SimulationLimits limits = {0};
     values_add(&inquiry, "/dampers/0/clearance", 4, clearances);
     values_add(&inquiry, "/dampers/0/mass", 2, masses);
     values_add(&inquiry, "/dampers/0/mas", 2, masses);
-    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/1"), "is -1"));
     assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/1"), "/dampers/0/clearance"));
     assert_non_null(strstr(detail_at(&problem, "/study/axes/0/values/2"), "is a text"));
@@ -200,40 +200,40 @@ static void faults_stand_at_their_values_and_name_the_point(void **state) {
     assert_non_null(strstr(detail_at(&problem, "/study/axes/1/values/1"), "point "));
     assert_non_null(strstr(detail_at(&problem, "/study/axes/2/pointer"), "mass"));
     assert_int_equal(problem.count, 5);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_fault_of_two_values_together_is_found(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     const SimulationLimits limits = {0};
     range_add(&inquiry, "/dampers/0/clearance", 0.03, 0.01, 3);
     range_add(&inquiry, "/dampers/0/position", 0, 0.008, 5);
-    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes/1"), "point 13"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void too_many_points_or_values_are_refused(void **state) {
     (void)state;
     const SimulationLimits limits = {.points = 100};
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 11);
     range_add(&inquiry, "/dampers/0/mass", 0.1, 0.2, 10);
-    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes"), "110 points, at most 100"));
     study_of(&inquiry)->axes.at[0].count = study_of(&inquiry)->axes.at[1].count = SWEEP_AXIS_VALUES;
     range_add(&inquiry, "/dampers/0/offset", 0.1, 0.2, SWEEP_AXIS_VALUES);
     range_add(&inquiry, "/structure/mass", 0.1, 0.2, SWEEP_AXIS_VALUES);
     problem_clear(&problem);
-    assert_int_equal(inquiry_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(&inquiry, &limits, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes"), "points, at most 100"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void sides_and_materials_are_filled_from_what_is_pinned(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     static const char *const names[] = {"\"sponge@1\"", "\"steel@2\""};
     SweepStudy *study = study_of(&inquiry);
     study->materials.at = calloc(2, sizeof *study->materials.at);
@@ -254,7 +254,7 @@ static void sides_and_materials_are_filled_from_what_is_pinned(void **state) {
     assert_true(damper->right_buffer.restitution == 0.61);
     simulation_clear(&scene);
     sweep_plan_free(plan);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static bool stops(void *context, double fraction) {
@@ -264,16 +264,16 @@ static bool stops(void *context, double fraction) {
 
 static void a_sweep_stops_when_it_is_told_to(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make();
+    StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 50);
     sweep_plan_free(plan_of(&inquiry));
-    const Watch watch = {NULL, stops};
-    const StudyTools tools = {.watch = &watch};
+    const Progress progress = {NULL, stops};
+    const StudyTools tools = {.progress = &progress};
     Variant *answer;
     assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &answer, &problem),
                      STATUS_CANCELLED);
     assert_null(answer);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 int main(void) {

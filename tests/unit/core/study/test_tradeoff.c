@@ -23,13 +23,13 @@ static double cpu(void *context) {
     return *(double *)context += TICK;
 }
 
-static TradeoffStudy *study_of(Inquiry *inquiry) {
+static TradeoffStudy *study_of(StudyRequest *inquiry) {
     return (TradeoffStudy *)(void *)inquiry->study;
 }
 
 // The paper's scene with a study of so many repeats; completed by the caller.
-static Inquiry inquiry_make(double contact_time, double duration, uint64_t repeats) {
-    Inquiry inquiry = {0};
+static StudyRequest study_request_make(double contact_time, double duration, uint64_t repeats) {
+    StudyRequest inquiry = {0};
     paper_scene(&inquiry.simulation, 0.61, contact_time, duration);
     inquiry.study = variant_new(&study_tradeoff.kind);
     assert_non_null(inquiry.study);
@@ -38,15 +38,16 @@ static Inquiry inquiry_make(double contact_time, double duration, uint64_t repea
     return inquiry;
 }
 
-static void complete(Inquiry *inquiry) {
-    if (inquiry_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
+static void complete(StudyRequest *inquiry) {
+    if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
 
-static Status run(const Inquiry *inquiry, const Watch *watch, const SimulationLimits *limits,
-                  Tradeoff **answer) {
+static Status run(const StudyRequest *inquiry, const Progress *progress,
+                  const SimulationLimits *limits, Tradeoff **answer) {
     double now = 0;
-    const StudyTools tools = {.limits = limits, .watch = watch, .cpu = cpu, .cpu_context = &now};
+    const StudyTools tools = {
+        .limits = limits, .progress = progress, .cpu = cpu, .cpu_context = &now};
     Variant *made = NULL;
     const Status status = study_run(inquiry->study, &inquiry->simulation, &tools, &made, &problem);
     *answer = (Tradeoff *)(void *)made;
@@ -61,7 +62,7 @@ static const TradeoffPoint *find(const Tradeoff *answer, const char *name) {
     return NULL;
 }
 
-static void solver_add(Inquiry *inquiry, const char *name) {
+static void solver_add(StudyRequest *inquiry, const char *name) {
     Texts *solvers = &study_of(inquiry)->solvers;
     solvers->at = realloc(solvers->at, (solvers->count + 1) * sizeof *solvers->at);
     assert_non_null(solvers->at);
@@ -70,7 +71,7 @@ static void solver_add(Inquiry *inquiry, const char *name) {
 
 static void every_solver_is_tried_and_the_reference_with_less(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 2, 3);
+    StudyRequest inquiry = study_request_make(0.025, 2, 3);
     Tradeoff *answer;
     complete(&inquiry);
     assert_int_equal(run(&inquiry, NULL, NULL, &answer), STATUS_OK);
@@ -100,12 +101,12 @@ static void every_solver_is_tried_and_the_reference_with_less(void **state) {
     assert_true(exact->is_best && !impulse->is_best);
     assert_int_equal(answer->recommendation.point, 1);
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_point_that_fails_or_is_refused_stands_with_its_reason(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.0003, 2, 1);
+    StudyRequest inquiry = study_request_make(0.0003, 2, 1);
     Tradeoff *answer;
     solver_add(&inquiry, "rk4");
     study_of(&inquiry)->point_steps = 1e6;
@@ -125,7 +126,7 @@ static void a_point_that_fails_or_is_refused_stands_with_its_reason(void **state
     for (size_t i = 0; i < answer->points.count; i++)
         assert_string_equal(answer->points.at[i].solver, "rk4");
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 typedef struct Patience {
@@ -143,29 +144,29 @@ static bool lose(void *context, double fraction) {
 
 static void it_can_be_stopped_wherever_it_is(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 1, 2);
+    StudyRequest inquiry = study_request_make(0.025, 1, 2);
     Tradeoff *answer;
     solver_add(&inquiry, "exact");
     complete(&inquiry);
     Patience patience = {.left = 1 << 30};
-    const Watch watch = {&patience, lose};
-    assert_int_equal(run(&inquiry, &watch, NULL, &answer), STATUS_OK);
+    const Progress progress = {&patience, lose};
+    assert_int_equal(run(&inquiry, &progress, NULL, &answer), STATUS_OK);
     variant_free(&answer->variant);
     const int whole = patience.asked;
     assert_true(whole > 8);
     for (int left = 0; left < whole; left += 1 + whole / 40) {
         patience = (Patience){.left = left};
         problem_clear(&problem);
-        assert_int_equal(run(&inquiry, &watch, NULL, &answer), STATUS_CANCELLED);
+        assert_int_equal(run(&inquiry, &progress, NULL, &answer), STATUS_CANCELLED);
         assert_null(answer);
         assert_int_equal(patience.asked, left + 1); // and asks no more
     }
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void the_same_study_has_the_same_errors(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.004, 2, 1);
+    StudyRequest inquiry = study_request_make(0.004, 2, 1);
     Tradeoff *a, *b;
     complete(&inquiry);
     assert_int_equal(run(&inquiry, NULL, NULL, &a), STATUS_OK);
@@ -178,7 +179,7 @@ static void the_same_study_has_the_same_errors(void **state) {
     }
     variant_free(&a->variant);
     variant_free(&b->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 typedef struct Taken {
@@ -195,50 +196,50 @@ static void take(void *context, const void *bytes, size_t size) {
 
 static void without_a_study_an_inquiry_is_its_scene_to_the_byte(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 2, 3);
+    StudyRequest inquiry = study_request_make(0.025, 2, 3);
     Taken scene = {.count = 0}, whole = {.count = 0}, studied = {.count = 0};
     complete(&inquiry);
     canonical_write(simulation_fields, &inquiry.simulation, take, &scene);
-    canonical_write(inquiry_fields, &inquiry, take, &studied);
+    canonical_write(study_request_fields, &inquiry, take, &studied);
     variant_free(inquiry.study);
     inquiry.study = NULL;
-    canonical_write(inquiry_fields, &inquiry, take, &whole);
+    canonical_write(study_request_fields, &inquiry, take, &whole);
     assert_int_equal(scene.count, whole.count);
     assert_memory_equal(scene.bytes, whole.bytes, scene.count);
     assert_true(studied.count > whole.count);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
-static void assert_refused(Inquiry *inquiry, const SimulationLimits *limits, const char *pointer,
-                           const char *says) {
+static void assert_refused(StudyRequest *inquiry, const SimulationLimits *limits,
+                           const char *pointer, const char *says) {
     problem_clear(&problem);
-    assert_int_equal(inquiry_complete(inquiry, limits, NULL, &problem), STATUS_INVALID);
+    assert_int_equal(study_request_complete(inquiry, limits, NULL, &problem), STATUS_INVALID);
     if (!problem_concerns(&problem, pointer) || strstr(problem.faults[0].detail, says) == NULL)
         fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
-    inquiry_clear(inquiry);
+    study_request_clear(inquiry);
 }
 
 static void what_cannot_be_answered_is_refused(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 2, 3);
+    StudyRequest inquiry = study_request_make(0.025, 2, 3);
     study_of(&inquiry)->metric = METRIC_PSD;
     paper_no_psd(&inquiry.simulation);
     assert_refused(&inquiry, NULL, "/study/metric", "psd needs spectra");
 
-    inquiry = inquiry_make(0.025, 2, 3);
+    inquiry = study_request_make(0.025, 2, 3);
     study_of(&inquiry)->metric = METRIC_PEAK_FORCE;
     paper_model(&inquiry.simulation, "impulse");
     assert_refused(&inquiry, NULL, "/study/metric", "impulses have none");
 
-    inquiry = inquiry_make(0.025, 2, 3);
+    inquiry = study_request_make(0.025, 2, 3);
     solver_add(&inquiry, "exact");
     solver_add(&inquiry, "rk5");
     assert_refused(&inquiry, NULL, "/study/solvers/1", "must be one of exact");
 
-    inquiry = inquiry_make(0.025, 2, 0);
+    inquiry = study_request_make(0.025, 2, 0);
     assert_refused(&inquiry, NULL, "/study/repeats", "must be within [1, 1000]");
 
-    inquiry = inquiry_make(0.025, 2, 1000);
+    inquiry = study_request_make(0.025, 2, 1000);
     const SimulationLimits limits = {.steps = 1e6};
     assert_refused(&inquiry, &limits, "/study", "s of CPU in all, at most 0.3 s are allowed");
 }
@@ -247,17 +248,17 @@ static void the_usual_error_is_the_metrics(void **state) {
     (void)state;
     static const double usual[] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
     for (int metric = 0; metric < METRICS; metric++) {
-        Inquiry inquiry = inquiry_make(0.025, 2, 3);
+        StudyRequest inquiry = study_request_make(0.025, 2, 3);
         study_of(&inquiry)->metric = metric;
         complete(&inquiry);
         assert_true(study_of(&inquiry)->error == usual[metric]);
-        inquiry_clear(&inquiry);
+        study_request_clear(&inquiry);
     }
 }
 
 static void every_storey_of_a_frame_is_compared(void **state) {
     (void)state;
-    Inquiry inquiry = inquiry_make(0.025, 1, 1);
+    StudyRequest inquiry = study_request_make(0.025, 1, 1);
     Variant **structure = &inquiry.simulation.scene.structure;
     scene_choose(structure, &structure_kinds, "frame");
     StructureFrame *frame = (StructureFrame *)(void *)*structure;
@@ -286,7 +287,7 @@ static void every_storey_of_a_frame_is_compared(void **state) {
     assert_true(point->errors.displacement > 0 && point->errors.displacement < 1);
     assert_true(find(answer, "exact")->errors.mean_acceleration == 0);
     variant_free(&answer->variant);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 int main(void) {

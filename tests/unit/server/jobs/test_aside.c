@@ -28,7 +28,7 @@ static void rest(void) {
     nanosleep(&pause, NULL);
 }
 
-static void task_run(void *context, const Watch *watch) {
+static void task_run(void *context, const Progress *watch) {
     Task *task = context;
     while (!atomic_load(&task->may_end) && !task->was_stopped) {
         task->was_stopped = !watch->advance(watch->context, 0);

@@ -41,7 +41,7 @@ static void long_documents_stop_soon_when_they_are_told_to(void **state) {
                                .densities = {.at = &column, .count = 1, .rows = 2 * MANY}};
     Bytes bytes = {0};
     int looks = 0;
-    const Watch watch = {&looks, stop_at_third};
+    const Progress watch = {&looks, stop_at_third};
     assert_false(document_impacts(&bytes, &response, &watch));
     assert_int_equal(looks, 3);
     looks = 0;

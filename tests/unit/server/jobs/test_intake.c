@@ -307,8 +307,8 @@ static void a_series_that_is_gone_is_computed_again_with_the_same_bytes(void **s
     Outcome *none = NULL;
     assert_int_equal(intake_outcome(room.intake, "r-none", &waker, &none, &problem),
                      STATUS_NOT_FOUND);
-    outcome_drop(kept);
-    outcome_drop(anew);
+    outcome_unref(kept);
+    outcome_unref(anew);
     job_show_clear(&now);
     job_drop(job);
     room_end(&room);
@@ -413,7 +413,7 @@ static void a_study_is_stopped_with_its_job_and_goes_on_after_a_restart(void **s
 static void names_are_resolved_and_all_faults_told(void **state) {
     (void)state;
     Room room = room_make(1);
-    Inquiry inquiry;
+    StudyRequest inquiry;
     Warnings warnings = {NULL, 0};
     char text[1024];
     scene_text(text, 0.015, 1, "spnge");
@@ -424,7 +424,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/dampers/0/buffer");
     assert_string_equal(problem.faults[0].did_you_mean, "sponge");
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     static const struct {
         const char *buffer, *pointer, *did_you_mean;
@@ -452,7 +452,7 @@ static void names_are_resolved_and_all_faults_told(void **state) {
         for (size_t k = 0; k < problem.count; k++)
             if (strncmp(problem.faults[k].pointer, "/dampers", 8) == 0)
                 assert_string_equal(problem.faults[k].did_you_mean, cases[i].did_you_mean);
-        inquiry_clear(&inquiry);
+        study_request_clear(&inquiry);
         warnings_clear(&warnings);
     }
     room_end(&room);
@@ -607,8 +607,8 @@ static void a_dear_series_is_kept_and_outlasts_its_engine(void **state) {
     assert_non_null(strstr(now.summary, "\"impacts\": "));
     job_show_clear(&now);
     job_drop(again);
-    outcome_drop(before);
-    outcome_drop(after);
+    outcome_unref(before);
+    outcome_unref(after);
     room_end(&room);
 }
 
@@ -657,7 +657,7 @@ static void *hammer(void *context) {
         }
         if (rand_r(&own->seed) % 8 == 0)
             store_catalogue_changed(own->room->store);
-        outcome_drop(outcome);
+        outcome_unref(outcome);
         job_show_clear(&now);
         job_drop(job);
         job_drop(gone);
@@ -991,7 +991,8 @@ int main(void) {
         cmocka_unit_test(a_dear_series_is_kept_and_outlasts_its_engine),
         cmocka_unit_test(many_clients_at_once_leave_nothing_behind),
         cmocka_unit_test_teardown(a_result_that_there_is_no_room_for_waits_for_it, lift_limit),
-        cmocka_unit_test_teardown(a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, lift_limit),
+        cmocka_unit_test_teardown(
+            a_result_that_there_is_no_room_for_is_computed_again_after_a_restart, lift_limit),
         cmocka_unit_test_teardown(a_job_that_cannot_be_kept_never_was, lift_limit),
         cmocka_unit_test(a_job_that_is_done_before_it_was_written_is_written_once),
         cmocka_unit_test(whoever_waits_for_a_job_to_be_kept_is_woken),

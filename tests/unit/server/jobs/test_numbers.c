@@ -62,8 +62,8 @@ static void an_outcomes_numbers_come_back(void **state) {
     assert_memory_equal(bytes.at, again.at, bytes.count);
     bytes_clear(&bytes);
     bytes_clear(&again);
-    outcome_drop(outcome);
-    outcome_drop(read);
+    outcome_unref(outcome);
+    outcome_unref(read);
 }
 
 static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
@@ -89,7 +89,7 @@ static void what_is_cut_or_has_wild_counts_is_not_read(void **state) {
     bytes.at[0] = 'x';
     assert_null(numbers_read(bytes.at, bytes.count));
     bytes_clear(&bytes);
-    outcome_drop(outcome);
+    outcome_unref(outcome);
 }
 
 int main(void) {

@@ -19,7 +19,7 @@
 
 static Store *store;
 static Problem problem;
-static Inquiry inquiry;
+static StudyRequest inquiry;
 static Warnings warnings;
 
 static int set_up(void **state) {
@@ -29,7 +29,7 @@ static int set_up(void **state) {
 }
 
 static void clear(void) {
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     warnings_clear(&warnings);
     problem_clear(&problem);
 }

@@ -51,7 +51,7 @@ static void add(const char *name, double first) {
     assert_int_equal(store_record_add(store, &row, &samples, &is_there, &problem), STATUS_OK);
 }
 
-static Status prepare(const char *excitation, const char *study, Inquiry *inquiry) {
+static Status prepare(const char *excitation, const char *study, StudyRequest *inquiry) {
     char text[2048];
     Warnings warnings = {NULL, 0};
     snprintf(text, sizeof text,
@@ -65,24 +65,24 @@ static Status prepare(const char *excitation, const char *study, Inquiry *inquir
     return status;
 }
 
-static const ExcitationRecord *record_in(const Inquiry *inquiry) {
+static const ExcitationRecord *record_in(const StudyRequest *inquiry) {
     return (const ExcitationRecord *)(const void *)inquiry->simulation.scene.excitation;
 }
 
 static void scenes_share_the_samples_of_the_record_they_name(void **state) {
     (void)state;
-    Inquiry one, two;
+    StudyRequest one, two;
     char ids[2][72];
     assert_int_equal(prepare("\"name\": \"a\"", "", &one), STATUS_OK);
     assert_int_equal(prepare("\"name\": \"a\", \"scale\": 2", "", &two), STATUS_OK);
     assert_ptr_equal(record_in(&one)->named, record_in(&two)->named);
-    inquiry_clear(&two);
+    study_request_clear(&two);
     // What it has been prepared as is prepared to the same.
     Bytes scene = {0}, again = {0};
     Warnings warnings = {NULL, 0};
     document_scene(&scene, &one);
     intake_result_id(&one, ids[0]);
-    inquiry_clear(&one);
+    study_request_clear(&one);
     assert_int_equal(intake_prepare(store, scene.at, scene.count, NULL, &two, &warnings, &problem),
                      STATUS_OK);
     document_scene(&again, &two);
@@ -93,12 +93,12 @@ static void scenes_share_the_samples_of_the_record_they_name(void **state) {
     bytes_clear(&scene);
     bytes_clear(&again);
     warnings_clear(&warnings);
-    inquiry_clear(&two);
+    study_request_clear(&two);
 }
 
 static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
     (void)state;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     Bytes uses = {0};
     assert_int_equal(
         prepare("\"name\": \"a\"",
@@ -113,12 +113,12 @@ static void a_sweep_pins_the_records_of_its_axes_once_each(void **state) {
     prepare_record_uses(&inquiry, &uses);
     assert_string_equal(uses.at, "record:a\nrecord:b\nrecord:a\n");
     bytes_clear(&uses);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void samples_are_let_go_of_and_had_again(void **state) {
     (void)state;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     RecordUses uses;
     add("gone", 5);
     assert_int_equal(
@@ -145,13 +145,13 @@ static void samples_are_let_go_of_and_had_again(void **state) {
     assert_int_equal(prepare_records_again(store, &inquiry, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/records/1/digest");
     assert_int_equal(store_record_delete(store, "gone", &uses, &problem), STATUS_OK);
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
 }
 
 static void a_sweep_holds_only_so_many_samples(void **state) {
     (void)state;
     NamedRecord *large[5];
-    Inquiry inquiry;
+    StudyRequest inquiry;
     for (size_t i = 0; i < COUNT(large); i++) {
         Reals samples;
         char name[8];
@@ -169,7 +169,7 @@ static void a_sweep_holds_only_so_many_samples(void **state) {
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/study/axes/0/values/4");
     assert_non_null(strstr(problem.faults[0].detail, "16777216 samples"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     for (size_t i = 0; i < COUNT(large); i++)
         shared_drop(&large[i]->shared);
 }
@@ -181,7 +181,7 @@ static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(vo
                                           {"/dampers/0/buffer", "spong"}};
     for (size_t k = 0; k < COUNT(axes); k++) {
         char text[NAMES * 24 + 512];
-        Inquiry inquiry;
+        StudyRequest inquiry;
         Warnings warnings = {NULL, 0};
         int size =
             snprintf(text, sizeof text,
@@ -204,7 +204,7 @@ static void unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred(vo
         assert_non_null(strstr(problem.faults[99].detail, "is called"));
         assert_null(strstr(problem.faults[99].detail, "there are"));
         assert_string_equal(problem.faults[99].pointer, "/study/axes/0/values/99");
-        inquiry_clear(&inquiry);
+        study_request_clear(&inquiry);
         warnings_clear(&warnings);
     }
 }
@@ -227,7 +227,7 @@ static void faults_stand_where_the_name_or_the_digest_does(void **state) {
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char study[512] = "";
-        Inquiry inquiry;
+        StudyRequest inquiry;
         if (cases[i].values != NULL)
             snprintf(study, sizeof study, axis, cases[i].values, cases[i].pinned);
         assert_int_equal(prepare(cases[i].excitation, study, &inquiry), STATUS_INVALID);
@@ -240,14 +240,14 @@ static void faults_stand_where_the_name_or_the_digest_does(void **state) {
                      problem.faults[0].detail);
         else
             assert_string_equal(fault->did_you_mean, cases[i].did_you_mean);
-        inquiry_clear(&inquiry);
+        study_request_clear(&inquiry);
     }
 }
 
 static void without_a_daemon_there_are_no_records(void **state) {
     (void)state;
     Store *own, *kept = store;
-    Inquiry inquiry;
+    StudyRequest inquiry;
     assert_int_equal(store_open(NULL, &own, &problem), STATUS_OK);
     store = own;
     const Status status = prepare("\"name\": \"a\"", "", &inquiry);
@@ -256,7 +256,7 @@ static void without_a_daemon_there_are_no_records(void **state) {
     assert_int_equal(problem.count, 1);
     assert_string_equal(problem.faults[0].pointer, "/excitation/name");
     assert_non_null(strstr(problem.faults[0].detail, "impactd import"));
-    inquiry_clear(&inquiry);
+    study_request_clear(&inquiry);
     store_close(own);
 }
 

@@ -52,7 +52,7 @@ static JobRow job_row(unsigned long number) {
     return row;
 }
 
-static Status copy(const Watch *watch, Backup *backup) {
+static Status copy(const Progress *watch, Backup *backup) {
     char path[SCRATCH_SIZE + 16];
     snprintf(path, sizeof path, "%s/impactd.db", target);
     problem_clear(&problem);
@@ -143,7 +143,7 @@ static void stopped_at_any_moment_it_leaves_nothing(void **state) {
     for (; status == STATUS_CANCELLED && moment < 10000; moment++) {
         int left = moment;
         Backup backup;
-        status = copy(&(Watch){&left, stop_at}, &backup);
+        status = copy(&(Progress){&left, stop_at}, &backup);
         if (status == STATUS_CANCELLED) {
             assert_int_equal(files_in(target), 0);
             assert_int_equal(backup.jobs, 0);
