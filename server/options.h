@@ -25,7 +25,7 @@ typedef struct Options {
 
 // Reads argv[0 ... argc - 1], the arguments behind the command's name, into `item`, which holds its
 // defaults. Row "queue_most" is --queue-most N, and -q if it is the first row with that letter;
-// "--" ends the flags. With `prefix` ("IMPACTD_"; NULL: flags only) it is also PREFIX_QUEUE_MOST of
+// "--" ends the flags. With `prefix` ("IMPACTD_"; NULL: flags only) it is also PREFIX_QUEUE_MAX of
 // the environment and, where a TEXT row "config" names a file, its line "queue_most = N". Adds all
 // faults, under the name that was typed.
 Status options_read(const Field *fields, void *item, int argc, char *const *argv,

@@ -84,7 +84,7 @@ typedef struct Range {
 // Braces alone, no compound literals: those are no constants in ISO C.
 // clang-format off
 #define ABOVE(x) {(x), (double)INFINITY, true}
-#define AT_LEAST(x) {(x), (double)INFINITY, false}
+#define AT_MIN(x) {(x), (double)INFINITY, false}
 #define WITHIN(a, b) {(a), (b), false}
 #define ANY {(double)-INFINITY, (double)INFINITY, false}
 // clang-format on

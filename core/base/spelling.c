@@ -5,7 +5,7 @@
 
 #include "core/base/field.h"
 
-enum { NAME_MOST = 48 }; // longer ones are no slips of the pen
+enum { NAME_MAX = 48 }; // longer ones are no slips of the pen
 
 static int lower(char c) {
     return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : (unsigned char)c;
@@ -16,7 +16,7 @@ static size_t least(size_t a, size_t b) {
 }
 
 static size_t distance(const char *a, size_t a_length, const char *b, size_t b_length) {
-    size_t rows[3][NAME_MOST + 1];
+    size_t rows[3][NAME_MAX + 1];
     size_t *before = rows[0], *last = rows[1], *now = rows[2];
     for (size_t j = 0; j <= b_length; j++)
         last[j] = j;
@@ -48,12 +48,12 @@ typedef struct Nearest {
 
 static bool nearest_start(Nearest *nearest, const char *meant) {
     *nearest = (Nearest){meant, strlen(meant), NULL, SIZE_MAX};
-    return nearest->length > 0 && nearest->length <= NAME_MOST;
+    return nearest->length > 0 && nearest->length <= NAME_MAX;
 }
 
 static void nearest_try(Nearest *nearest, const char *name) {
     const size_t length = strlen(name);
-    if (length > NAME_MOST)
+    if (length > NAME_MAX)
         return;
     const size_t d = distance(nearest->meant, nearest->length, name, length);
     const size_t longer = length > nearest->length ? length : nearest->length;

@@ -8,7 +8,7 @@
 #include "core/base/status.h"
 
 bool sentence(char **target, const char *format, ...) {
-    char text[2 * SENTENCE_MOST], cut[SENTENCE_MOST];
+    char text[2 * SENTENCE_MAX], cut[SENTENCE_MAX];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);

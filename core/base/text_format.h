@@ -5,9 +5,9 @@
 
 #include <stdbool.h>
 
-enum { SENTENCE_MOST = 500 };
+enum { SENTENCE_MAX = 500 };
 
-// Replaces what *target owns; cut at SENTENCE_MOST. False without memory, and then it has none.
+// Replaces what *target owns; cut at SENTENCE_MAX. False without memory, and then it has none.
 bool sentence(char **target, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 #endif

@@ -72,7 +72,7 @@ ContactParameters contact_freeze(const ContactStop *stop, double approach_speed)
     }
     if (stop->law->form != CONTACT_POWER)
         return frozen;
-    frozen.speed = fmax(approach_speed, CONTACT_SPEED_LEAST);
+    frozen.speed = fmax(approach_speed, CONTACT_SPEED_MIN);
     if (!isnan(contact_time))
         frozen.stiffness = stop->mass * pow(duration / contact_time, frozen.exponent + 1) *
                            pow(frozen.speed, 1 - frozen.exponent);

@@ -50,9 +50,9 @@ ContactStop contact_prepare(const ContactLaw *law, int separation, double mass, 
 ContactRow contact_row(const ContactRows *rows, double approach_speed);
 
 // Parameters of an impact that begins with this approach speed. Power laws, which divide by it,
-// take no less than CONTACT_SPEED_LEAST.
+// take no less than CONTACT_SPEED_MIN.
 ContactParameters contact_freeze(const ContactStop *stop, double approach_speed);
 
-#define CONTACT_SPEED_LEAST 1e-6 // [m/s]
+#define CONTACT_SPEED_MIN 1e-6 // [m/s]
 
 #endif

@@ -10,7 +10,7 @@
 
 #include "core/drop_test/force_trace.h"
 
-enum { PARTS = 16, PART_LEAST = 16, TERMS = 3 };
+enum { PARTS = 16, PART_MIN = 16, TERMS = 3 };
 
 static int by_value(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -183,7 +183,7 @@ static Status find_baseline(const Reals *force, TraceFound *found) {
     memcpy(scratch, force->at, n * sizeof *scratch);
     level[0] = densest(scratch, n, &width);
     bool is_line = false;
-    if (n >= PARTS * PART_LEAST) {
+    if (n >= PARTS * PART_MIN) {
         line_through_parts(force->at, n, scratch, line);
         take_off(found, force, line);
         memcpy(scratch, found->force, n * sizeof *scratch);
@@ -211,7 +211,7 @@ static Status find_baseline(const Reals *force, TraceFound *found) {
 }
 
 static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
-    if (found->count == TRACE_CONTACTS_MOST) {
+    if (found->count == TRACE_CONTACTS_MAX) {
         found->is_full = true;
         return true;
     }

@@ -15,7 +15,7 @@
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
-enum { POINTER_SIZE = sizeof((Fault){0}.pointer), TEXT_MOST = 1000, NOTE_MOST = 10000 };
+enum { POINTER_SIZE = sizeof((Fault){0}.pointer), TEXT_MAX = 1000, NOTE_MAX = 10000 };
 
 // By how much a speed may differ from what its height gives: air and friction slow a fall.
 static const double height_tolerance = 0.2;
@@ -23,42 +23,42 @@ static const double height_tolerance = 0.2;
 // clang-format off
 static const Field drop_fields[] = {
     FIELD_REAL(Drop, drop_height, "m", ABOVE(0), OPTIONAL, "from which the impactor fell, above the buffer at rest"),
-    FIELD_REAL(Drop, rebound_height, "m", AT_LEAST(0), OPTIONAL, "to which it rose again"),
+    FIELD_REAL(Drop, rebound_height, "m", AT_MIN(0), OPTIONAL, "to which it rose again"),
     FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "relative to the base, just before contact"),
-    FIELD_REAL(Drop, rebound_speed, "m/s", AT_LEAST(0), OPTIONAL, "relative to the base, just after contact"),
+    FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "relative to the base, just after contact"),
     FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "how long the contact lasted"),
-    FIELD_TEXT(Drop, excluded, TEXT_MOST, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
-    FIELD_TEXT(Drop, note, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of this drop"),
+    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this drop"),
     FIELD_END
 };
 
 static const Field trace_fields[] = {
     FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "from one sample to the next"),
-    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MOST, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
-    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MOST, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
-    FIELD_TEXT(Trace, excluded, TEXT_MOST, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
-    FIELD_TEXT(Trace, note, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of this trace"),
+    FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
+    FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
+    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this trace"),
     FIELD_END
 };
 
 const Field drop_test_fields[] = {
-    FIELD_TEXT(DropTest, impactor, TEXT_MOST, PRESENCE_OPTIONAL, 0, "what fell: \"steel ball, 30 mm\""),
+    FIELD_TEXT(DropTest, impactor, TEXT_MAX, PRESENCE_OPTIONAL, 0, "what fell: \"steel ball, 30 mm\""),
     FIELD_REAL(DropTest, impactor_mass, "kg", ABOVE(0), OPTIONAL, "its mass"),
     FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
     FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
-    FIELD_TEXT(DropTest, geometry, TEXT_MOST, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
+    FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
     FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out; heights count by 9.80665 whatever is said here"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
-    FIELD_TEXT(DropTest, instrument, TEXT_MOST, PRESENCE_OPTIONAL, 0, "that it was read with"),
+    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "that it was read with"),
     FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "when it was done: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
-    FIELD_TEXT(DropTest, person, TEXT_MOST, PRESENCE_OPTIONAL, 0, "or lab that did it"),
-    FIELD_TEXT(DropTest, source, TEXT_MOST, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
-    FIELD_TEXT(DropTest, notes, NOTE_MOST, PRESENCE_OPTIONAL, 0, "whatever else there is to say"),
-    FIELD_REAL(DropTest, height_uncertainty, "m", AT_LEAST(0), OPTIONAL, "standard uncertainty of one height"),
-    FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one speed"),
-    FIELD_REAL(DropTest, time_uncertainty, "s", AT_LEAST(0), OPTIONAL, "standard uncertainty of one contact time"),
-    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MOST, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
-    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MOST, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
+    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "or lab that did it"),
+    FIELD_TEXT(DropTest, source, TEXT_MAX, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
+    FIELD_TEXT(DropTest, notes, NOTE_MAX, PRESENCE_OPTIONAL, 0, "whatever else there is to say"),
+    FIELD_REAL(DropTest, height_uncertainty, "m", AT_MIN(0), OPTIONAL, "standard uncertainty of one height"),
+    FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_MIN(0), OPTIONAL, "standard uncertainty of one speed"),
+    FIELD_REAL(DropTest, time_uncertainty, "s", AT_MIN(0), OPTIONAL, "standard uncertainty of one contact time"),
+    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MAX, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
     FIELD_END
 };
 // clang-format on
@@ -208,11 +208,11 @@ static Status check_traces(const DropTest *test, const char *pointer, Problem *p
             status = STATUS_INVALID;
     }
     const size_t samples = drop_test_samples(test);
-    if (samples > TRACE_SAMPLES_MOST)
+    if (samples > TRACE_SAMPLES_MAX)
         status = problem_add(problem, STATUS_INVALID, traces,
                              "must have at most %d samples in all, have %zu: cut them to the "
                              "contacts, or send them as several measurements",
-                             TRACE_SAMPLES_MOST, samples);
+                             TRACE_SAMPLES_MAX, samples);
     return status;
 }
 

@@ -6,8 +6,8 @@
 
 #include "core/base/field.h"
 
-enum { DROPS_MOST = 1000, TRACES_MOST = 100 };
-enum { TRACE_SAMPLES_MOST = 1 << 20 }; // in all traces of a test
+enum { DROPS_MAX = 1000, TRACES_MAX = 100 };
+enum { TRACE_SAMPLES_MAX = 1 << 20 }; // in all traces of a test
 
 // By which a height is worth a speed, whatever pulls during contact [m/s^2].
 #define STANDARD_GRAVITY 9.80665

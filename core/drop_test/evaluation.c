@@ -12,9 +12,9 @@ const char *const trend_verdict_names[] = {"constant", "not_constant", "undecide
 
 // clang-format off
 static const Field row_fields[] = {
-    FIELD_COUNT(EvaluationRow, measurement, NULL, AT_LEAST(1), OPTIONAL, "number of the measurement"),
+    FIELD_COUNT(EvaluationRow, measurement, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
     FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "which drop, or which contact of which trace, from 1"),
-    FIELD_COUNT(EvaluationRow, trace, NULL, AT_LEAST(1), OPTIONAL, "which trace of its measurement, from 1; null: a drop"),
+    FIELD_COUNT(EvaluationRow, trace, NULL, AT_MIN(1), OPTIONAL, "which trace of its measurement, from 1; null: a drop"),
     FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as read, else sqrt(2 g h)"),
     FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
     FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
@@ -48,7 +48,7 @@ static const Field ranges_fields[] = {
 };
 
 static const Field trend_fields[] = {
-    FIELD_COUNT(Trend, count, NULL, AT_LEAST(0), OPTIONAL, "readings with a speed"),
+    FIELD_COUNT(Trend, count, NULL, AT_MIN(0), OPTIONAL, "readings with a speed"),
     FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
     FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
     FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "which the line goes through"),
@@ -67,7 +67,7 @@ static const Field trend_fields[] = {
 };
 
 static const Field statistic_fields[] = {
-    FIELD_COUNT(Statistic, count, NULL, AT_LEAST(0), OPTIONAL, "readings that count"),
+    FIELD_COUNT(Statistic, count, NULL, AT_MIN(0), OPTIONAL, "readings that count"),
     FIELD_REAL(Statistic, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
     FIELD_REAL(Statistic, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
     FIELD_REAL(Statistic, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
@@ -79,7 +79,7 @@ static const Field statistic_fields[] = {
     FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
     FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "the middle one"),
     FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "the largest one"),
-    FIELD_COUNT(Statistic, outliers, NULL, AT_LEAST(0), OPTIONAL, "readings that lie far off; they are in the mean"),
+    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "readings that lie far off; they are in the mean"),
     FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
     FIELD_TEXT(Statistic, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
     FIELD_ITEM(Statistic, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
@@ -182,11 +182,11 @@ size_t evaluation_samples(const Measurement *tests, size_t count) {
 // They are all in memory.
 static Status check_size(const Measurement *tests, size_t count, Problem *problem) {
     const size_t samples = evaluation_samples(tests, count);
-    if (samples <= EVALUATION_SAMPLES_MOST)
+    if (samples <= EVALUATION_SAMPLES_MAX)
         return STATUS_OK;
     return problem_set(problem, STATUS_LIMIT,
                        "more than %d samples in traces, %zu: evaluate fewer measurements at a time",
-                       EVALUATION_SAMPLES_MOST, samples);
+                       EVALUATION_SAMPLES_MAX, samples);
 }
 
 Status evaluation_make(const Measurement *tests, size_t count, Separation separation,

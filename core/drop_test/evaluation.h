@@ -8,7 +8,7 @@
 #include "core/drop_test/force_trace.h"
 #include "core/plan/plan.h"
 
-enum { EVALUATION_ROWS_MOST = 20000, EVALUATION_SAMPLES_MOST = 4 * TRACE_SAMPLES_MOST };
+enum { EVALUATION_ROWS_MAX = 20000, EVALUATION_SAMPLES_MAX = 4 * TRACE_SAMPLES_MAX };
 #define EVALUATION_CONFIDENCE 0.95
 
 // One test, by its number of the material; COUNT_ABSENT: it has none yet. Borrowed.

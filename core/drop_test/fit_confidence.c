@@ -24,10 +24,10 @@ enum { CONTACT_TIME = TRACE_PARTS, FIGURES };
 
 // A form that tells T_c as well as this needs no gaps. What drawing to their middle may be wrong
 // by, over the noise that remains; and where T_c is told worse than so, by how much it may.
-static const double good = 0.01, bias_most = 0.35, bad = 0.04, bias_most_of_bad = 0.6;
+static const double good = 0.01, bias_max = 0.35, bad = 0.04, bias_most_of_bad = 0.6;
 
 // Of the contact, to which the pulse changes evenly with its start.
-static const double step_most = 0.1;
+static const double step_max = 0.1;
 
 // What one pair of gaps says: normal distributions.
 typedef struct Piece {
@@ -114,7 +114,7 @@ static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit
     if (!slopes(window, &fit->at, &T, piece->slope[CONTACT_TIME]))
         return false;
     // A step leads no further than a part of the contact: there the pulse is another.
-    curvature[START][START] += variance / pow(1 + step_most * T, 2);
+    curvature[START][START] += variance / pow(1 + step_max * T, 2);
     if (!invert(curvature, inverse, &det))
         return false;
     piece->mean[CONTACT_TIME] = T;
@@ -204,7 +204,7 @@ static void settle(Piece *piece, const Gaps gaps_told[2], bool is_form_sure) {
         const Drawn time = draw(piece, gaps_told, CONTACT_TIME, exp(middle));
         const Drawn decay = draw(piece, gaps_told, DECAY, exp(middle));
         const double most =
-            time.noise > bad * piece->mean[CONTACT_TIME] ? bias_most_of_bad : bias_most;
+            time.noise > bad * piece->mean[CONTACT_TIME] ? bias_most_of_bad : bias_max;
         const bool is_fair = time.noise >= enough && time.bias <= most * time.noise &&
                              decay.bias <= most * decay.noise;
         *(is_fair ? &high : &low) = middle;

@@ -12,7 +12,7 @@
 #include "core/drop_test/contact_detection.h"
 #include "core/drop_test/fit_confidence.h"
 
-enum { SAMPLES_LEAST = 5, TRACE_LEAST = 8 };
+enum { SAMPLES_MIN = 5, TRACE_MIN = 8 };
 
 // An interval this wide over T_c is no figure, nor is one that reaches to so high an L.
 static const double widest = 0.5, faintest = 4.2;
@@ -27,7 +27,7 @@ const Field trace_seen_fields[] = {
     FIELD_REAL(TraceSeen, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
     FIELD_REAL(TraceSeen, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
     FIELD_REAL(TraceSeen, last, "s", ANY, OPTIONAL, "the last such sample"),
-    FIELD_COUNT(TraceSeen, samples, NULL, AT_LEAST(0), OPTIONAL, "how many samples these are"),
+    FIELD_COUNT(TraceSeen, samples, NULL, AT_MIN(0), OPTIONAL, "how many samples these are"),
     FIELD_REAL(TraceSeen, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
     FIELD_REAL(TraceSeen, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
     FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
@@ -43,7 +43,7 @@ const Field trace_seen_fields[] = {
 // clang-format on
 
 __attribute__((format(printf, 2, 3))) static Status tell(char **why, const char *format, ...) {
-    char text[TRACE_WHY_MOST];
+    char text[TRACE_WHY_MAX];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
@@ -102,7 +102,7 @@ static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) 
 static void fill_window(const TraceFound *found, const TraceRun *run, const Stretch *stretch,
                         int separation, TraceWindow *window) {
     const size_t samples = stretch->to - stretch->from;
-    const size_t m = (samples + TRACE_BLOCKS_MOST - 1) / TRACE_BLOCKS_MOST;
+    const size_t m = (samples + TRACE_BLOCKS_MAX - 1) / TRACE_BLOCKS_MAX;
     *window = (TraceWindow){
         .blocks = samples / m,
         .per_block = m,
@@ -235,7 +235,7 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     contact->seen.misfit_share = left_over(window, fit, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
-    if (contact->seen.samples < SAMPLES_LEAST)
+    if (contact->seen.samples < SAMPLES_MIN)
         return tell(&contact->why,
                     "only %d samples are in contact, and pulses of very different length fit so "
                     "few: 5 are the least, 20 are better",
@@ -338,7 +338,7 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    TraceFit fits[TRACE_FITS_MOST];
+    TraceFit fits[TRACE_FITS_MAX];
     bool is_settled = true;
     const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
                                                        window, fits, &is_settled)
@@ -358,9 +358,9 @@ Status trace_check(double interval, const Reals *force, const char *pointer, Pro
     if (!(interval > 0) || !isfinite(interval))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "its interval must be above 0 s, is %g", interval);
-    if (force->count < TRACE_LEAST)
+    if (force->count < TRACE_MIN)
         return problem_add(problem, STATUS_INVALID, pointer,
-                           "must have at least %d samples, has %zu", TRACE_LEAST, force->count);
+                           "must have at least %d samples, has %zu", TRACE_MIN, force->count);
     for (size_t i = 0; i < force->count; i++)
         if (!(fabs(force->at[i]) < 1e150))
             return problem_add(problem, STATUS_INVALID, pointer,
@@ -396,8 +396,7 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
             status =
                 tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
         if (status == STATUS_OK && found.is_full)
-            status =
-                tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MOST);
+            status = tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MAX);
     }
     trace_found_clear(&found);
     free(window);

@@ -8,7 +8,7 @@
 #include "core/base/progress.h"
 #include "core/contact/contact.h"
 
-enum { TRACE_CONTACTS_MOST = 200, TRACE_WHY_MOST = 400, TRACE_PULSE = 33 };
+enum { TRACE_CONTACTS_MAX = 200, TRACE_WHY_MAX = 400, TRACE_PULSE = 33 };
 
 // How a trace is read.
 typedef struct TraceWay {

@@ -9,7 +9,7 @@
 
 const char *const proposal_form_names[] = {"constant", "table", NULL};
 
-enum { SOURCE_MOST = 1000 };
+enum { SOURCE_MAX = 1000 };
 
 static bool has(double value) {
     return !isnan(value);
@@ -102,7 +102,7 @@ static bool stands_before(const Measurement *tests, size_t index) {
 
 // Their sources, else their numbers.
 static Status take_source(const Behind *behind, Material *material) {
-    char text[SOURCE_MOST + 1] = "", number[32];
+    char text[SOURCE_MAX + 1] = "", number[32];
     const Measurement *tests = behind->tests;
     const size_t count = behind->test_count;
     for (size_t i = 0; i < count; i++)

@@ -124,7 +124,7 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
 // INFINITY as sum where there is no such contact, or one of the other sign.
 static TraceResidue residue_at(const TraceWindow *window, const TracePoint *point,
                                const TraceBox *box) {
-    double f[TRACE_BLOCKS_MOST];
+    double f[TRACE_BLOCKS_MAX];
     long first, last;
     size_t from, to;
     if (!members(window, point, box, &first, &last) ||
@@ -136,7 +136,7 @@ static TraceResidue residue_at(const TraceWindow *window, const TracePoint *poin
 // Slope and curvature of half the sum of squares, by differences of the pulse with the same samples
 // in contact; what size and baseline take up is projected out.
 static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
-    double f[TRACE_BLOCKS_MOST], above[TRACE_BLOCKS_MOST], d[TRACE_PARTS][TRACE_BLOCKS_MOST];
+    double f[TRACE_BLOCKS_MAX], above[TRACE_BLOCKS_MAX], d[TRACE_PARTS][TRACE_BLOCKS_MAX];
     long first, last;
     size_t from, to;
     if (!members(window, &fit->at, box, &first, &last) ||
@@ -338,17 +338,17 @@ static size_t insert(TraceFit *fits, size_t count, const TraceFit *fit) {
     return count + 1;
 }
 
-size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]) {
-    static const double decays[TRACE_FITS_MOST] = {0.02, 0.3, 0.7, 1.3, 2, 3};
+size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MAX]) {
+    static const double decays[TRACE_FITS_MAX] = {0.02, 0.3, 0.7, 1.3, 2, 3};
     const TraceBox wide = {
         .least = {(double)window->least_start - 1, (double)window->last, least_decay},
         .most = {(double)window->first, (double)window->most_end + 1, most_decay},
         .first = window->least_start,
         .last = window->most_end,
     };
-    TraceFit seeds[TRACE_FITS_MOST];
+    TraceFit seeds[TRACE_FITS_MAX];
     size_t seeded = 0, count = 0;
-    for (size_t i = 0; i < TRACE_FITS_MOST; i++) {
+    for (size_t i = 0; i < TRACE_FITS_MAX; i++) {
         TraceFit fit;
         if (!seek(window, decays[i], &fit))
             continue;

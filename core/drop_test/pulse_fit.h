@@ -8,11 +8,11 @@
 
 #include <stddef.h>
 
-enum { TRACE_BLOCKS_MOST = 512, TRACE_PARTS = 3, TRACE_FITS_MOST = 6 };
+enum { TRACE_BLOCKS_MAX = 512, TRACE_PARTS = 3, TRACE_FITS_MAX = 6 };
 
 // The stretch, in means of so many samples each; samples count from its beginning.
 typedef struct TraceWindow {
-    double mean[TRACE_BLOCKS_MOST]; // [peak]
+    double mean[TRACE_BLOCKS_MAX]; // [peak]
     size_t blocks, per_block;
     double sum, square; // of the means, and of their squares
     // What the rest of the trace says of the noise: sum of squares and degrees of freedom.
@@ -60,7 +60,7 @@ bool trace_point_shape(const TraceWindow *window, const TracePoint *point, Trace
 void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit);
 
 // From pulses of every form, the best first; how many there are.
-size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MOST]);
+size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MAX]);
 
 // From a fit on that was made under another pull.
 void trace_refit(const TraceWindow *window, TraceFit *fit);

@@ -19,7 +19,7 @@
 
 static const double rounding = 1e-12;    // of a mean: no spread at all
 static const double implausible = 0.001; // the chance of so little spread
-enum { WEIGHTED_LEAST = 4, HALVINGS = 100 };
+enum { WEIGHTED_MIN = 4, HALVINGS = 100 };
 
 // 95 % quantiles of the largest score among so many normal readings, of 30,000 to 400,000 samples.
 static const struct {
@@ -85,7 +85,7 @@ static double weigh(Reading *readings, size_t count, double scatter) {
 
 // Fills the weights where there are any.
 static void make_weights(Reading *readings, size_t count, Statistic *quantity) {
-    bool is_weighted = count >= WEIGHTED_LEAST;
+    bool is_weighted = count >= WEIGHTED_MIN;
     for (size_t i = 0; i < count; i++)
         is_weighted = is_weighted && readings[i].uncertainty > 0;
     if (!is_weighted)

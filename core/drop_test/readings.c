@@ -30,10 +30,10 @@ static Status row_new(const Measurement *of, size_t index, Evaluation *evaluatio
                       EvaluationRow **row, Problem *problem) {
     EvaluationRows *rows = &evaluation->rows;
     const size_t count = rows->count;
-    if (count == EVALUATION_ROWS_MOST)
+    if (count == EVALUATION_ROWS_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
-                           EVALUATION_ROWS_MOST);
+                           EVALUATION_ROWS_MAX);
     if (count == 0 || (count >= 16 && (count & (count - 1)) == 0)) {
         const size_t room = count == 0 ? 16 : 2 * count;
         EvaluationRow *at = realloc(rows->at, room * sizeof *at);

@@ -8,7 +8,7 @@
 
 typedef enum BaseForm { BASE_STILL, BASE_SAMPLED, BASE_SINE, BASE_PIECES } BaseForm;
 
-enum { BASE_PIECES_MOST = 4 };
+enum { BASE_PIECES_MAX = 4 };
 
 // From `time` on, t seconds later: value + slope t or, where the base has an omega, value cos(omega
 // t) + slope sin(omega t).
@@ -26,7 +26,7 @@ typedef struct Base {
     double interval;  // [s]
     double amplitude; // BASE_SINE: a_g = amplitude * sin(omega t) [m/s^2]
     double omega;     // of all that turns: BASE_SINE, and BASE_PIECES (0: they are linear) [rad/s]
-    BasePiece pieces[BASE_PIECES_MOST]; // BASE_PIECES: by time; still before the first one
+    BasePiece pieces[BASE_PIECES_MAX]; // BASE_PIECES: by time; still before the first one
     size_t piece_count;
 } Base;
 

@@ -12,13 +12,13 @@
 
 #define PI 3.14159265358979323846264338328L
 
-enum { KNOTS_A_CYCLE = 200, KNOTS_MOST = 1 << 25, KNOTS_WATCHED = 1 << 16 };
+enum { KNOTS_A_CYCLE = 200, KNOTS_MAX = 1 << 25, KNOTS_WATCHED = 1 << 16 };
 
 // clang-format off
 static const Field chirp_fields[] = {
     FIELD_BASE(ExcitationChirp, excitation, excitation_fields),
-    FIELD_REAL(ExcitationChirp, start_frequency, "Hz",    AT_LEAST(0), REQUIRED, "frequency of the base's motion at the start"),
-    FIELD_REAL(ExcitationChirp, end_frequency,   "Hz",    AT_LEAST(0), REQUIRED, "frequency at the end of the sweep; linear in time between"),
+    FIELD_REAL(ExcitationChirp, start_frequency, "Hz",    AT_MIN(0), REQUIRED, "frequency of the base's motion at the start"),
+    FIELD_REAL(ExcitationChirp, end_frequency,   "Hz",    AT_MIN(0), REQUIRED, "frequency at the end of the sweep; linear in time between"),
     FIELD_REAL(ExcitationChirp, amplitude,       "m/s^2", ANY,         REQUIRED, "amplitude of the base's acceleration"),
     FIELD_REAL(ExcitationChirp, sweep_time,      "s",     ABOVE(0),    OPTIONAL, "length of the sweep, the base is still after it; the duration if absent"),
     FIELD_REAL(ExcitationChirp, rate,            "Hz",    ABOVE(0),    OPTIONAL, "knots of the base's acceleration per second, linear between them: within (2 pi f / rate)^2 / 12 of the amplitude; the least multiple of sample_rate with 200 in the shortest cycle if absent"),
@@ -63,7 +63,7 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     if (isnan(chirp->rate))
         chirp->rate =
             span->sample_rate * fmax(ceil(KNOTS_A_CYCLE * highest(chirp) / span->sample_rate), 1);
-    const size_t most = span->most != 0 && span->most < KNOTS_MOST ? span->most : KNOTS_MOST;
+    const size_t most = span->most != 0 && span->most < KNOTS_MAX ? span->most : KNOTS_MAX;
     pointer_join(place, sizeof place, pointer, "rate");
     if (highest(chirp) > chirp->rate / 2)
         return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
@@ -91,9 +91,9 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const P
     const ExcitationChirp *chirp = chirp_of(excitation);
     *base = (Base){0};
     const double wanted = knot_count(chirp, span);
-    if (!(wanted <= KNOTS_MOST + 2))
+    if (!(wanted <= KNOTS_MAX + 2))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d knots, not %.0f",
-                           KNOTS_MOST, wanted);
+                           KNOTS_MAX, wanted);
     const size_t count = (size_t)wanted;
     double *values = malloc(count * sizeof *values);
     if (values == NULL)

@@ -4,7 +4,7 @@
 const Field pulse_fields[] = {
     FIELD_BASE(ExcitationPulse, excitation, excitation_fields),
     FIELD_REAL(ExcitationPulse, amplitude, "m/s^2", ANY,         REQUIRED, "base acceleration at the middle of the pulse"),
-    FIELD_REAL(ExcitationPulse, start,     "s",     AT_LEAST(0), 0,        "when the pulse begins; the base is still before"),
+    FIELD_REAL(ExcitationPulse, start,     "s",     AT_MIN(0), 0,        "when the pulse begins; the base is still before"),
     FIELD_REAL(ExcitationPulse, length,    "s",     ABOVE(0),    REQUIRED, "how long the pulse lasts; the base moves on evenly after"),
     FIELD_END
 };

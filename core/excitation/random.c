@@ -28,14 +28,14 @@
 #include "core/math/sparse_spectrum_synthesis.h"
 
 #define PI 3.14159265358979323846264338328
-#define RATE_LEAST 1e-9 // [Hz]
+#define RATE_MIN 1e-9 // [Hz]
 
 enum {
-    BLOCK_LEAST = 1 << 12,
-    BLOCK_MOST = 1 << 22,
+    BLOCK_MIN = 1 << 12,
+    BLOCK_MAX = 1 << 22,
     BINS_WANTED = 256,
-    BINS_LEAST = 8,
-    SAMPLES_MOST = 1 << 25,
+    BINS_MIN = 8,
+    SAMPLES_MAX = 1 << 25,
     PART = 1 << 10, // of a block, read at once
 };
 
@@ -43,11 +43,11 @@ enum {
 static const Field random_fields[] = {
     FIELD_BASE(ExcitationRandom, start, excitation_fields),
     //          struct            member  unit     range                   default   meaning
-    FIELD_REALS(ExcitationRandom, band,   "Hz",    AT_LEAST(0), 2, PRESENCE_REQUIRED,
+    FIELD_REALS(ExcitationRandom, band,   "Hz",    AT_MIN(0), 2, PRESENCE_REQUIRED,
                 "[f0, f1]: the one-sided density is rms^2 / (f1 - f0) between them and none outside"),
     FIELD_REAL(ExcitationRandom,  rms,    "m/s^2", WITHIN(0, 1e9),         REQUIRED, "rms of the base's acceleration, as a process"),
     FIELD_COUNT(ExcitationRandom, seed,   NULL,    WITHIN(0, 0x1p53 - 1),  0,        "which of the many motions"),
-    FIELD_REAL(ExcitationRandom,  rate,   "Hz",    AT_LEAST(RATE_LEAST),   OPTIONAL, "samples of the base's acceleration per second, linear between them; sample_rate if absent"),
+    FIELD_REAL(ExcitationRandom,  rate,   "Hz",    AT_MIN(RATE_MIN),   OPTIONAL, "samples of the base's acceleration per second, linear between them; sample_rate if absent"),
     FIELD_END
 };
 // clang-format on
@@ -58,8 +58,8 @@ static const ExcitationRandom *random_of(const Excitation *excitation) {
 
 RandomBlocks random_blocks(const ExcitationRandom *random) {
     const double f0 = random->band.at[0] / random->rate, f1 = random->band.at[1] / random->rate;
-    RandomBlocks blocks = {.length = BLOCK_LEAST};
-    while (blocks.length < BLOCK_MOST && (f1 - f0) * (double)blocks.length < BINS_WANTED)
+    RandomBlocks blocks = {.length = BLOCK_MIN};
+    while (blocks.length < BLOCK_MAX && (f1 - f0) * (double)blocks.length < BINS_WANTED)
         blocks.length *= 2;
     const double length = (double)blocks.length;
     const double first = fmax(ceil(f0 * length), 1);
@@ -78,9 +78,9 @@ static double sample_count(const ExcitationRandom *random, const Span *span) {
 // Whether the rate is one to judge the band by; says so where the base would have too many samples.
 static bool check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
                        Problem *problem) {
-    if (!(random->rate >= RATE_LEAST) || !isfinite(random->rate))
+    if (!(random->rate >= RATE_MIN) || !isfinite(random->rate))
         return false; // the row's fault, or the sample rate's
-    const size_t most = span->most != 0 && span->most < SAMPLES_MOST ? span->most : SAMPLES_MOST;
+    const size_t most = span->most != 0 && span->most < SAMPLES_MAX ? span->most : SAMPLES_MAX;
     // The one sample past the end is not counted: a run of just the samples allowed has its base.
     if (!isfinite(span->duration) || sample_count(random, span) - 1 <= (double)most)
         return true;
@@ -115,7 +115,7 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     const double f0 = random->band.at[0], f1 = random->band.at[1];
     if (!(f0 >= 0) || !isfinite(f0) || !isfinite(f1))
         return STATUS_INVALID; // the row has said so
-    const double narrowest = random->rate * BINS_LEAST / BLOCK_MOST;
+    const double narrowest = random->rate * BINS_MIN / BLOCK_MAX;
     if (!(f0 < f1))
         status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
                                   "must be above the lowest frequency, %s Hz, is %s",
@@ -197,9 +197,9 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
     if (random->rms == 0)
         return STATUS_OK; // still
     const double wanted = sample_count(random, span);
-    if (!(wanted >= 2 && wanted <= SAMPLES_MOST + 1))
+    if (!(wanted >= 2 && wanted <= SAMPLES_MAX + 1))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d samples, not %.0f",
-                           SAMPLES_MOST, wanted);
+                           SAMPLES_MAX, wanted);
     const RandomBlocks blocks = random_blocks(random);
     const size_t hop = blocks.length / 2;
     Synthesis *synthesis =

@@ -8,7 +8,7 @@
 
 #include "core/formats/import_text.h"
 
-enum { UNIT_MOST = 12 };              // bytes; what is longer is no unit
+enum { UNIT_MAX = 12 };               // bytes; what is longer is no unit
 static const double unevenness = 0.3; // of an interval, that a printed time may be off
 
 typedef struct TraceColumns {
@@ -45,7 +45,7 @@ static Status check_header(const TextLine *line, Problem *problem) {
             end++;
         const ptrdiff_t size = end - begin;
         const bool is_right = size == 1 && (*begin == 's' || *begin == 'N');
-        if (is_right || size > UNIT_MOST)
+        if (is_right || size > UNIT_MAX)
             continue;
         return problem_add(problem, STATUS_UNREADABLE, text_place(place, line->number, 0),
                            "must have times in [s] and forces in [N], tells [%.*s]", (int)size,
@@ -78,9 +78,9 @@ static Status read_row(const TextLine *line, TraceColumns *rows, Problem *proble
                            count > 2 ? "a time and its force, or the force alone"
                                      : "as many numbers as the rows above",
                            count);
-    if (rows->count == TRACE_SAMPLES_MOST)
+    if (rows->count == TRACE_SAMPLES_MAX)
         return problem_add(problem, STATUS_TOO_LARGE, text_place(place, line->number, 0),
-                           "must have at most %d samples up to here", TRACE_SAMPLES_MOST);
+                           "must have at most %d samples up to here", TRACE_SAMPLES_MAX);
     if (rows->count == rows->room && !grow(rows))
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a trace");
     rows->times[rows->count] = numbers[0];

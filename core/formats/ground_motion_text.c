@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excitation/recorded_motion.h"
 #include "core/formats/import_header.h"
 #include "core/formats/import_text.h"
-#include "core/excitation/recorded_motion.h"
 
-enum { VALUES_MOST = 2 * RECORD_SAMPLES };
+enum { VALUES_MAX = 2 * RECORD_SAMPLES };
 
 const char *const import_unit_names[] = {
     [IMPORT_G] = "g", [IMPORT_METRES] = "m/s^2", [IMPORT_CENTIMETRES] = "cm/s^2", NULL};
@@ -33,10 +33,10 @@ typedef struct Numbers {
 } Numbers;
 
 static Status numbers_add(Numbers *numbers, double value, size_t line, Problem *problem) {
-    if (numbers->count == VALUES_MOST) {
+    if (numbers->count == VALUES_MAX) {
         char place[64];
         return problem_add(problem, STATUS_TOO_LARGE, text_place(place, line, 0),
-                           "must hold at most %d numbers up to here", VALUES_MOST);
+                           "must hold at most %d numbers up to here", VALUES_MAX);
     }
     if (numbers->count == numbers->room) {
         const size_t room = numbers->room > 0 ? 2 * numbers->room : 4096;

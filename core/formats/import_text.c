@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WORD_MOST = 63 }; // bytes of a number
+enum { WORD_MAX = 63 }; // bytes of a number
 
 static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
@@ -63,9 +63,9 @@ static const char *number_end(const char *at, const char *end) {
 }
 
 bool text_number(const TextWord *word, double *value) {
-    char copy[WORD_MOST + 1];
+    char copy[WORD_MAX + 1];
     const size_t length = (size_t)(word->end - word->at);
-    if (length > WORD_MOST || number_end(word->at, word->end) != word->end)
+    if (length > WORD_MAX || number_end(word->at, word->end) != word->end)
         return false;
     memcpy(copy, word->at, length);
     copy[length] = '\0';
@@ -124,8 +124,8 @@ static const char *garbage_name(const TextWord *word) {
         return "must be a number; stars stand for one that was too long for its field";
     const char *end = number_end(word->at, word->end);
     if (end == word->end)
-        return length > WORD_MOST ? "must be a number of at most 63 characters"
-                                  : "must be a number that a double can hold";
+        return length > WORD_MAX ? "must be a number of at most 63 characters"
+                                 : "must be a number that a double can hold";
     if (end != NULL && number_end(end, word->end) != NULL)
         return "must be one number; these have run together";
     if (memchr(word->at, ',', length) != NULL)

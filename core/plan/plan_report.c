@@ -22,7 +22,7 @@ const Field decision_fields[] = {
 };
 
 const Field derived_fields[] = {
-    FIELD_COUNT(Derived, damper, NULL, AT_LEAST(1), OPTIONAL, "number of the damper"),
+    FIELD_COUNT(Derived, damper, NULL, AT_MIN(1), OPTIONAL, "number of the damper"),
     FIELD_CHOICE(Derived, side, side_names, OPTIONAL, "side of the damper"),
     FIELD_TEXT(Derived, material, 0, PRESENCE_OPTIONAL, 0, "where the numbers come from"),
     FIELD_REAL(Derived, restitution, NULL, ANY, OPTIONAL, "coefficient of restitution e"),

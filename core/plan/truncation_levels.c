@@ -151,7 +151,7 @@ static void random_level(Level *level, Wave *wave, const Mode *mode, const Excit
     const double draws = 1 + decay, cycles = fmax(f1 * mode->time, 1);
     const double most = sqrt(2 * log(draws / RARE));
     const double least = sqrt(-2 * log1p(-pow(RARE, 1 / draws)));
-    const double wave_most = sqrt(2 * log(cycles / RARE));
+    const double wave_max = sqrt(2 * log(cycles / RARE));
     const double behind = sqrt(share * follows) * base->rms; // rms of what follows
     // A short run has an rms of its own.
     const double chance = 0.7 / sqrt(draws);
@@ -161,17 +161,17 @@ static void random_level(Level *level, Wave *wave, const Mode *mode, const Excit
     const double lasts =
         is_reached || is_beyond ? 1 : behind / fmax(hypot(behind, sqrt(mean)), 1e-300);
     level->sure = fmin(level->sure, lasts * (1 - chance) / (1 + chance));
-    wave->rms = 1 / wave_most;
-    wave->least = sqrt(-2 * log1p(-pow(RARE, 1 / cycles))) / wave_most;
+    wave->rms = 1 / wave_max;
+    wave->least = sqrt(-2 * log1p(-pow(RARE, 1 / cycles))) / wave_max;
     wave->accelerated = sqrt(fourth);
     if (is_beyond)
-        level->pushed[0] = -mode->share / fabs(mode->share + 1e-300) * behind * wave_most;
-    level->peak += hypot(most * sqrt(last), is_beyond ? 0 : wave_most * behind);
+        level->pushed[0] = -mode->share / fabs(mode->share + 1e-300) * behind * wave_max;
+    level->peak += hypot(most * sqrt(last), is_beyond ? 0 : wave_max * behind);
     level->rms = hypot(level->rms, rms);
     level->accelerated =
         hypot(level->accelerated, square(omega) * mean_of(omega, mode->interval) * rms);
     level->least = fmax(
-        level->least, hypot(is_reached ? least * sqrt(last) : 0, wave->least * wave_most * behind));
+        level->least, hypot(is_reached ? least * sqrt(last) : 0, wave->least * wave_max * behind));
 }
 
 static void chirp(Level *level, Wave *wave, const Mode *mode, const ExcitationChirp *base) {

@@ -76,8 +76,8 @@ static double between(double a, double b, double part) {
 }
 
 void levels_of_record(const Plan *plan, const ExcitationRecord *base, Level *levels, Wave *wave) {
-    static const double steps_most = 2e6; // about what the modes themselves take to be found
-    static const double doubt = 1.5;      // of what lies between
+    static const double steps_max = 2e6; // about what the modes themselves take to be found
+    static const double doubt = 1.5;     // of what lies between
     const size_t n = plan->modes.count;
     const double interval = record_interval(base);
     const Reals *samples = record_samples(base);
@@ -87,7 +87,7 @@ void levels_of_record(const Plan *plan, const ExcitationRecord *base, Level *lev
         sum += square(samples->at[i] * base->scale) * interval;
     }
     *wave = (Wave){highest > 0 ? fmin(sqrt(sum / plan->duration) / highest, 1) : 0, 1, 0};
-    const double fit = steps_most / (double)samples->count;
+    const double fit = steps_max / (double)samples->count;
     const size_t stride = fit < (double)n ? (size_t)ceil((double)n / fmax(fit, 6)) : 1;
     size_t from = 0;
     Mode mode = mode_of(plan, 0);

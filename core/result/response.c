@@ -14,7 +14,7 @@ const Field impact_fields[] = {
     FIELD_CHOICE(Impact, kind, impact_kind_names, IMPACT_IMPACT, "an impact, or an interval of persistent contact"),
     FIELD_REAL(Impact, start, "s", ANY, OPTIONAL, "when the contact begins"),
     FIELD_REAL(Impact, end, "s", ANY, OPTIONAL, "when it ends; unknown where it is open at the end of the run"),
-    FIELD_COUNT(Impact, damper, NULL, AT_LEAST(1), OPTIONAL, "number of the damper"),
+    FIELD_COUNT(Impact, damper, NULL, AT_MIN(1), OPTIONAL, "number of the damper"),
     FIELD_CHOICE(Impact, side, side_names, OPTIONAL, "the stop that was met"),
     FIELD_REAL(Impact, approach_speed, "m/s", ANY, OPTIONAL, "relative speed at the start"),
     FIELD_REAL(Impact, separation_speed, "m/s", ANY, OPTIONAL, "relative speed at the end"),

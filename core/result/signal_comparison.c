@@ -10,7 +10,7 @@
 const Field likeness_fields[] = {
     FIELD_REAL(Likeness, from, "s", ANY, OPTIONAL, "the common span begins here"),
     FIELD_REAL(Likeness, to, "s", ANY, OPTIONAL, "and ends here"),
-    FIELD_COUNT(Likeness, samples, NULL, AT_LEAST(0), 0, "compared in it, at the rate of the coarser one"),
+    FIELD_COUNT(Likeness, samples, NULL, AT_MIN(0), 0, "compared in it, at the rate of the coarser one"),
     FIELD_REAL(Likeness, rms, NULL, ANY, OPTIONAL, "of the reference within it"),
     FIELD_REAL(Likeness, other_rms, NULL, ANY, OPTIONAL, "of the other"),
     FIELD_REAL(Likeness, peak, NULL, ANY, OPTIONAL, "largest value of the reference within it"),
@@ -239,11 +239,11 @@ Status likeness_shift(const Signal *reference, const Signal *other, double most,
                       1;
     if (counts[0] < 2 || counts[1] < 2)
         return problem_set(problem, STATUS_LIMIT, "too few samples to find a shift");
-    if (counts[0] + counts[1] > LIKENESS_SHIFT_MOST)
+    if (counts[0] + counts[1] > LIKENESS_SHIFT_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "%zu samples are too many to find a shift, at most %d: give the shift, "
                            "or fewer samples",
-                           counts[0] + counts[1], LIKENESS_SHIFT_MOST);
+                           counts[0] + counts[1], LIKENESS_SHIFT_MAX);
     while (size < counts[0] + counts[1])
         size *= 2;
     Fourier *forward = fourier_new(size, FOURIER_FORWARD);

@@ -38,7 +38,7 @@ Likeness likeness_measure(const Signal *reference, const Signal *other, double p
 Status likeness_pair(const Signal *reference, const Signal *other, size_t least, Columns *pair,
                      double *rate, Problem *problem);
 
-enum { LIKENESS_SHIFT_MOST = 1 << 22 }; // samples of both, at the coarser one's rate
+enum { LIKENESS_SHIFT_MAX = 1 << 22 }; // samples of both, at the coarser one's rate
 
 // The shift [s] within [-most, most] that `other` must be moved by to correlate best with the
 // reference, by cross-correlation with at least half of the shorter one in common.

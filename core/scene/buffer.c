@@ -10,7 +10,7 @@
 
 // clang-format off
 static const Field row_fields[] = {
-    FIELD_REAL(ContactRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
+    FIELD_REAL(ContactRow, approach_speed, "m/s", AT_MIN(0), REQUIRED, "at which these were measured, rising from row to row"),
     FIELD_REAL(ContactRow, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
     FIELD_REAL(ContactRow, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
     FIELD_END
@@ -32,7 +32,7 @@ const Field buffer_fields[] = {
     FIELD_REAL(Buffer, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
     FIELD_LIST(Buffer, table, row_fields, BUFFER_ROWS, PRESENCE_OPTIONAL, "restitution and contact time over approach speed, linear between the rows and constant beyond them"),
     FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b; k in N/m^n beside a restitution under a power law"),
-    FIELD_REAL(Buffer, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"),
+    FIELD_REAL(Buffer, damping, "N s/m", AT_MIN(0), OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Buffer, exponent, NULL, WITHIN(1, 10), OPTIONAL, "exponent n of a power law, 1.5 if not given"),
     FIELD_BASE(Buffer, test, test_fields),
     FIELD_END

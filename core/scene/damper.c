@@ -18,11 +18,11 @@ static const Field rig_fields[] = {
 
 const Field damper_fields[] = {
     FIELD_REAL(Damper, mass, "kg", ABOVE(0), REQUIRED, "free mass m"),
-    FIELD_REAL(Damper, clearance, "m", AT_LEAST(0), REQUIRED, "total clearance d between the stops"),
+    FIELD_REAL(Damper, clearance, "m", AT_MIN(0), REQUIRED, "total clearance d between the stops"),
     FIELD_REAL(Damper, offset, "m", ANY, 0, "of the stops' middle, relative to the structure"),
     FIELD_REAL(Damper, position, "m", ANY, 0, "initial, of the free mass relative to the stops' middle"),
     FIELD_REAL(Damper, velocity, "m/s", ANY, 0, "initial, of the free mass relative to the structure"),
-    FIELD_COUNT(Damper, storey, NULL, AT_LEAST(1), OPTIONAL, "where it stands, from 1 at the ground; the top one if not given"),
+    FIELD_COUNT(Damper, storey, NULL, AT_MIN(1), OPTIONAL, "where it stands, from 1 at the ground; the top one if not given"),
     FIELD_ITEM(Damper, buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at both stops"),
     FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
     FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),

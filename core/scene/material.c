@@ -11,21 +11,21 @@
 const char *const material_base_names[] = {
     [MATERIAL_BASE_FIXED] = "fixed", [MATERIAL_BASE_FREE] = "free", NULL};
 
-enum { TAG_MOST = 60 };
+enum { TAG_MAX = 60 };
 
 // clang-format off
 static const Field row_fields[] = {
-    FIELD_REAL(MaterialRow, approach_speed, "m/s", AT_LEAST(0), REQUIRED, "at which these were measured, rising from row to row"),
+    FIELD_REAL(MaterialRow, approach_speed, "m/s", AT_MIN(0), REQUIRED, "at which these were measured, rising from row to row"),
     FIELD_REAL(MaterialRow, restitution, NULL, WITHIN(0, 1), REQUIRED, "coefficient of restitution e"),
     FIELD_REAL(MaterialRow, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
-    FIELD_REAL(MaterialRow, restitution_deviation, NULL, AT_LEAST(0), OPTIONAL, "standard deviation of restitution"),
-    FIELD_REAL(MaterialRow, contact_time_deviation, "s", AT_LEAST(0), OPTIONAL, "standard deviation of contact_time"),
+    FIELD_REAL(MaterialRow, restitution_deviation, NULL, AT_MIN(0), OPTIONAL, "standard deviation of restitution"),
+    FIELD_REAL(MaterialRow, contact_time_deviation, "s", AT_MIN(0), OPTIONAL, "standard deviation of contact_time"),
     FIELD_END
 };
 
 #define TAGS FIELD_TEXTS(Material, tags, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "words to find it by, of at most 60 bytes")
 #define TABLE FIELD_LIST(Material, table, row_fields, MATERIAL_ROWS, PRESENCE_OPTIONAL, "restitution and contact_time over approach speed, in place of the two; linear between the rows, constant beyond them")
-#define MEASUREMENTS FIELD_REALS(Material, measurements, NULL, AT_LEAST(1), 1000, PRESENCE_OPTIONAL, "numbers of this material's measurements that restitution and contact_time were taken from")
+#define MEASUREMENTS FIELD_REALS(Material, measurements, NULL, AT_MIN(1), 1000, PRESENCE_OPTIONAL, "numbers of this material's measurements that restitution and contact_time were taken from")
 
 const Field material_fields[] = {
     FIELD_TEXT(Material, name, 200, PRESENCE_REQUIRED, 0, "its name for people"),
@@ -36,15 +36,15 @@ const Field material_fields[] = {
     FIELD_TEXT(Material, notes, 4000, PRESENCE_OPTIONAL, 0, "whatever else one should know"),
     TAGS,
     FIELD_REAL(Material, restitution, NULL, WITHIN(0, 1), OPTIONAL, "coefficient of restitution e, for every approach speed"),
-    FIELD_REAL(Material, restitution_deviation, NULL, AT_LEAST(0), OPTIONAL, "standard deviation of restitution"),
+    FIELD_REAL(Material, restitution_deviation, NULL, AT_MIN(0), OPTIONAL, "standard deviation of restitution"),
     FIELD_REAL(Material, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact, for every approach speed"),
-    FIELD_REAL(Material, contact_time_deviation, "s", AT_LEAST(0), OPTIONAL, "standard deviation of contact_time"),
+    FIELD_REAL(Material, contact_time_deviation, "s", AT_MIN(0), OPTIONAL, "standard deviation of contact_time"),
     TABLE,
     FIELD_CHOICE(Material, separation, separation_names, OPTIONAL, "the rule by which the end of a contact was told, where contact_time was fitted to a force trace"),
-    FIELD_REAL(Material, least_speed, "m/s", AT_LEAST(0), OPTIONAL, "least approach speed that was measured"),
-    FIELD_REAL(Material, most_speed, "m/s", AT_LEAST(0), OPTIONAL, "largest approach speed that was measured"),
-    FIELD_REAL(Material, least_temperature, "degC", AT_LEAST(-273.15), OPTIONAL, "lowest temperature at which it was measured"),
-    FIELD_REAL(Material, most_temperature, "degC", AT_LEAST(-273.15), OPTIONAL, "highest temperature at which it was measured"),
+    FIELD_REAL(Material, least_speed, "m/s", AT_MIN(0), OPTIONAL, "least approach speed that was measured"),
+    FIELD_REAL(Material, most_speed, "m/s", AT_MIN(0), OPTIONAL, "largest approach speed that was measured"),
+    FIELD_REAL(Material, least_temperature, "degC", AT_MIN(-273.15), OPTIONAL, "lowest temperature at which it was measured"),
+    FIELD_REAL(Material, most_temperature, "degC", AT_MIN(-273.15), OPTIONAL, "highest temperature at which it was measured"),
     FIELD_TEXT(Material, impactor, 200, PRESENCE_OPTIONAL, 0, "what struck it in the test"),
     FIELD_REAL(Material, impactor_mass, "kg", ABOVE(0), OPTIONAL, "mass of the impactor"),
     FIELD_CHOICE(Material, base, material_base_names, OPTIONAL, "what it lay on in the test"),
@@ -63,7 +63,7 @@ static bool has(double value) {
 
 bool material_slug_is_good(const char *slug) {
     const size_t size = strlen(slug);
-    return size > 0 && size <= MATERIAL_SLUG_MOST &&
+    return size > 0 && size <= MATERIAL_SLUG_MAX &&
            strspn(slug, "abcdefghijklmnopqrstuvwxyz0123456789_-") == size;
 }
 
@@ -194,12 +194,12 @@ static Status check_tags(const Material *material, const char *pointer, Problem 
         const char *tag = material->tags.at[i];
         char list[sizeof((Fault){0}.pointer)], place[sizeof((Fault){0}.pointer)];
         const size_t size = strlen(tag);
-        if (size <= TAG_MOST && tag[strspn(tag, " \t\r\n")] != '\0')
+        if (size <= TAG_MAX && tag[strspn(tag, " \t\r\n")] != '\0')
             continue;
         pointer_join(list, sizeof list, pointer, "tags");
         pointer_index(place, sizeof place, list, i);
-        status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s",
-                             TAG_MOST, size > TAG_MOST ? "is longer" : "is empty");
+        status = problem_add(problem, STATUS_INVALID, place, "must have 1 to %d bytes, %s", TAG_MAX,
+                             size > TAG_MAX ? "is longer" : "is empty");
     }
     return status;
 }

@@ -6,7 +6,7 @@
 
 #include "core/base/field.h"
 
-enum { MATERIAL_ROWS = 1000, MATERIAL_SLUG_MOST = 63 };
+enum { MATERIAL_ROWS = 1000, MATERIAL_SLUG_MAX = 63 };
 
 // What was measured at one approach speed; deviations are standard deviations, NAN: not known.
 typedef struct MaterialRow {
@@ -51,7 +51,7 @@ typedef struct Material {
 extern const Field material_fields[];
 extern const Field material_list_fields[]; // of them only those that are lists
 
-// Whether `slug` may name a material: [a-z0-9_-]+, at most MATERIAL_SLUG_MOST of them.
+// Whether `slug` may name a material: [a-z0-9_-]+, at most MATERIAL_SLUG_MAX of them.
 bool material_slug_is_good(const char *slug);
 
 // All faults that rows cannot see, and the rows', below `pointer`. STATUS_OK or STATUS_INVALID.

@@ -55,7 +55,7 @@ static bool is_sound(const ContactLaw *law, int separation, double mass,
     if (law->form == CONTACT_POWER) {
         const double n = numbers->exponent, T_c = numbers->contact_time;
         return is_positive(mass * pow(1 / T_c, n + 1) * pow(1e3, 1 - n)) &&
-               is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_LEAST, 1 - n));
+               is_positive(mass * pow(1e3 / T_c, n + 1) * pow(CONTACT_SPEED_MIN, 1 - n));
     }
     const Identified found = identify_measured(mass, numbers->restitution, numbers->contact_time,
                                                (Separation)separation);

@@ -4,8 +4,8 @@
 // clang-format off
 static const Field sdof_fields[] = {
     FIELD_REAL(StructureSdof, mass, "kg", ABOVE(0), REQUIRED, "mass M"),
-    FIELD_REAL(StructureSdof, stiffness, "N/m", AT_LEAST(0), REQUIRED, "stiffness K"),
-    FIELD_REAL(StructureSdof, damping, "N s/m", AT_LEAST(0), OPTIONAL, "damping C; 0 if no damping is given"),
+    FIELD_REAL(StructureSdof, stiffness, "N/m", AT_MIN(0), REQUIRED, "stiffness K"),
+    FIELD_REAL(StructureSdof, damping, "N s/m", AT_MIN(0), OPTIONAL, "damping C; 0 if no damping is given"),
     FIELD_BASE(StructureSdof, structure, structure_fields),
     FIELD_END
 };

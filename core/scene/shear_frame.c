@@ -8,8 +8,8 @@
 // clang-format off
 static const Field frame_fields[] = {
     FIELD_REALS(StructureFrame, masses, "kg", ABOVE(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the storeys, from the ground up"),
-    FIELD_REALS(StructureFrame, stiffnesses, "N/m", AT_LEAST(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the springs below the storeys, from the ground up"),
-    FIELD_REALS(StructureFrame, dampings, "N s/m", AT_LEAST(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers beside those springs; 0 if no damping is given"),
+    FIELD_REALS(StructureFrame, stiffnesses, "N/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the springs below the storeys, from the ground up"),
+    FIELD_REALS(StructureFrame, dampings, "N s/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers beside those springs; 0 if no damping is given"),
     FIELD_BASE(StructureFrame, structure, structure_fields),
     FIELD_END
 };

@@ -7,7 +7,7 @@
 
 // clang-format off
 const Field structure_fields[] = {
-    FIELD_REAL(Structure, damping_ratio, NULL, AT_LEAST(0), OPTIONAL, "damping ratio xi of every mode, in place of C; of one mass C = 2 xi sqrt(K M)"),
+    FIELD_REAL(Structure, damping_ratio, NULL, AT_MIN(0), OPTIONAL, "damping ratio xi of every mode, in place of C; of one mass C = 2 xi sqrt(K M)"),
     FIELD_END
 };
 // clang-format on

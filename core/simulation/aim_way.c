@@ -29,11 +29,11 @@ static const double gains[METRICS] = {1, 200, 30, 10, 5000, 1};
 static const double spectrum_gain = 10;
 
 // Tolerances worth their own run: below, rounding's edge costs hardly more.
-static const double tolerance_most = 0.1, tolerance_least = 1e-12;
+static const double tolerance_max = 0.1, tolerance_min = 1e-12;
 static const double contact_share = 0.2; // error of displacement per error of a contact
 static const double impacts_a_period = 2;
 static const double growth_a_period = 0.2; // natural logarithm, where a base drives the mass
-static const double growth_most = 40;
+static const double growth_max = 40;
 // less than they do, with them it may be many times less.
 static const double modes_margin = 0.7, dampers_margin = 0.4;
 // Of 150 random frames one in a hundred had more than the second of these in an impulse run.
@@ -126,7 +126,7 @@ Status aim_make(Aim *aim, const Simulation *simulation, Problem *problem) {
     const double periods = aim->plan->report.modes.at[0].frequency * scene->duration;
     const bool is_driven = excitation_kind(scene_excitation(scene)) != excitations[0];
     aim->impacts = 1 + impacts_a_period * periods * (double)scene->dampers.count;
-    aim->growth = is_driven ? exp(fmin(growth_a_period * periods, growth_most)) : 1;
+    aim->growth = is_driven ? exp(fmin(growth_a_period * periods, growth_max)) : 1;
     aim->strike_error = foretell_strike(aim);
     return foretell_modes(aim, problem);
 }
@@ -182,8 +182,8 @@ Way aim_whole(const Aim *aim) {
 // The loosest decade that keeps `error`; NAN: none is worth while.
 static double choose_tolerance(const Aim *aim, double error) {
     const double most = error / metric_error(aim, contact_error(aim, ROUNDING), NULL) * ROUNDING;
-    const double tolerance = pow(10, floor(log10(fmin(most, tolerance_most)) + 1e-9));
-    return tolerance >= tolerance_least * (1 - 1e-9) ? tolerance : (double)NAN;
+    const double tolerance = pow(10, floor(log10(fmin(most, tolerance_max)) + 1e-9));
+    return tolerance >= tolerance_min * (1 - 1e-9) ? tolerance : (double)NAN;
 }
 
 static double modes_share(const Aim *aim) {

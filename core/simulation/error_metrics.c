@@ -23,7 +23,7 @@ const Field error_fields[] = {
 const Field yardstick_fields[] = {
     FIELD_REAL(Yardstick, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
     FIELD_REAL(Yardstick, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
-    FIELD_COUNT(Yardstick, impacts, NULL, AT_LEAST(0), OPTIONAL, "its impacts within the horizon"),
+    FIELD_COUNT(Yardstick, impacts, NULL, AT_MIN(0), OPTIONAL, "its impacts within the horizon"),
     FIELD_REAL(Yardstick, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),
     FIELD_REAL(Yardstick, largest, "m", ANY, OPTIONAL, "its largest displacement"),
     FIELD_REAL(Yardstick, psd_from, "Hz", ANY, OPTIONAL, "its spectra are compared from here"),

@@ -19,7 +19,7 @@
 #include "core/simulation/choice.h"
 #include "core/simulation/closeup_points.h"
 
-enum { FINE_MOST = 1 << 22 }; // samples of the fine run
+enum { FINE_MAX = 1 << 22 }; // samples of the fine run
 
 static const double states_most = 1e9; // bytes of the first run's columns
 
@@ -281,7 +281,7 @@ static Status set_clock(Shot *shot, size_t points, Problem *problem) {
     if (plan->duration == left)
         plan->sample_rate = ceil(left * plan->sample_rate) / left;
     const double samples = plan->duration * plan->sample_rate * (1 + 1e-12) + 1;
-    if (samples > FINE_MOST)
+    if (samples > FINE_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "so short a contact, %.3g s, cannot be shown at %zu points from where a "
                            "run can begin, %.3g s before it: ask for fewer points",
@@ -308,8 +308,8 @@ static Status run_finely(Shot *shot, const SimulationLimits *limits, const Progr
                .workspace = workspace,
                .columns = columns,
                .column_count = COUNT(columns),
-               .impacts_most = limits == NULL ? 0 : limits->impacts,
-               .steps_most = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps};
+               .impacts_max = limits == NULL ? 0 : limits->impacts,
+               .steps_max = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps};
     TRY(solver_exact.run(&run, &shot->response, problem));
     const Impacts *impacts = &shot->response.impacts;
     const double wanted = shot->impact->start - shot->start;

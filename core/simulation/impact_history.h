@@ -9,8 +9,8 @@
 
 enum {
     CLOSEUP_POINTS = 401, // unless others are asked for
-    CLOSEUP_POINTS_LEAST = 5,
-    CLOSEUP_POINTS_MOST = 100001,
+    CLOSEUP_POINTS_MIN = 5,
+    CLOSEUP_POINTS_MAX = 100001,
 };
 
 typedef struct Closeup {

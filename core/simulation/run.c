@@ -263,8 +263,8 @@ static Status travel(Journey *journey, Problem *problem) {
                .accuracy = choice_settings(simulation),
                .workspace = journey->workspace,
                .statistics_from = simulation->output.statistics_from,
-               .impacts_most = journey->limits == NULL ? 0 : journey->limits->impacts,
-               .steps_most =
+               .impacts_max = journey->limits == NULL ? 0 : journey->limits->impacts,
+               .steps_max =
                    journey->limits == NULL ? 0 : SIMULATION_PATIENCE * journey->limits->steps};
     journey->wanted =
         calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,

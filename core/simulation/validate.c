@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "core/simulation/accuracy_target.h"
-#include "core/simulation/input_warnings.h"
 #include "core/simulation/channel_names.h"
+#include "core/simulation/input_warnings.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solvers.h"
 
@@ -19,8 +19,8 @@ static const char *const usual[] = {CHANNEL_USUAL, NULL};
 // clang-format off
 static const Field psd_fields[] = {
     FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels of which a spectrum is wanted; usual: mean_acceleration of the top storey"),
-    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_LEAST(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
-    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_LEAST(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
+    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_MIN(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
+    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_MIN(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
     FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
     FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "what is taken off each segment"),
     FIELD_END
@@ -31,7 +31,7 @@ static const Field output_fields[] = {
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
     FIELD_FLAG(Output, impacts, true, "whether the ledger of impacts is kept; false: they are counted, and their peaks and energies summed, but not listed"),
     FIELD_RARE_FLAG(Output, reduction, "whether the summary tells by how much the dampers lower peaks and rms; the scene without them is run beside it"),
-    FIELD_REAL(Output, statistics_from, "s", AT_LEAST(0), 0, "time from which rms and peaks are taken"),
+    FIELD_REAL(Output, statistics_from, "s", AT_MIN(0), 0, "time from which rms and peaks are taken"),
     FIELD_END
 };
 
@@ -49,7 +49,7 @@ const Field summary_fields[] = {
     FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
     FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events, of all storeys"),
     FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
-    FIELD_COUNT(Summary, impacts, NULL, AT_LEAST(0), OPTIONAL, "number of impacts"),
+    FIELD_COUNT(Summary, impacts, NULL, AT_MIN(0), OPTIONAL, "number of impacts"),
     FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
     FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),

@@ -12,7 +12,7 @@
 #include "core/solve/contact_events.h"
 #include "core/solve/steps_run.h"
 
-enum { STILL_MOST = 1000 };
+enum { STILL_MAX = 1000 };
 static const double POISED = 1e-4; // of a step
 static const double JUMP = 1e-9;   // of a_g, from the end of a step to the start of the next
 
@@ -80,7 +80,7 @@ static bool find_beyond(Frame *frame, bool has_moved, FrameEvent *event) {
 }
 
 static Status happen(Frame *frame, const FrameEvent *event) {
-    const size_t most = STILL_MOST * frame->dampers;
+    const size_t most = STILL_MAX * frame->dampers;
     frame->events++;
     if (++frame->still_events > most)
         return problem_set(frame->problem, STATUS_UNSTABLE,

@@ -17,7 +17,7 @@
 #include <math.h>
 
 // Only rounding could make so many rounds of a few dampers.
-enum { ROUNDS_MOST = 100000 };
+enum { ROUNDS_MAX = 100000 };
 
 void frame_push(Frame *frame, const double *impulses) {
     for (size_t d = 0; d < frame->dampers; d++) {
@@ -154,7 +154,7 @@ void frame_collide(Frame *frame) {
     solve(frame);
     (void)approach(frame); // these may pull
     FrameDamper *next = NULL;
-    for (size_t i = 0; i < ROUNDS_MOST && (next = find_lacking(frame)) != NULL; i++)
+    for (size_t i = 0; i < ROUNDS_MAX && (next = find_lacking(frame)) != NULL; i++)
         join(frame, next);
     for (size_t d = 0; d < frame->dampers; d++) {
         const FrameDamper *damper = &frame->damper[d];

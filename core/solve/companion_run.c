@@ -91,7 +91,7 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     neighbour->run = (Run){.plan = frame->plan,
                            .base = frame->run->base,
                            .progress = frame->run->progress,
-                           .steps_most = frame->run->steps_most};
+                           .steps_max = frame->run->steps_max};
     neighbour->response.is_unlisted = true;
     Frame *own = &neighbour->engine.frame;
     neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);

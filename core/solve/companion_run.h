@@ -6,7 +6,7 @@
 
 #include "core/solve/frame_engine.h"
 
-enum { NEIGHBOUR_SAMPLES = TRAIL_MOST };
+enum { NEIGHBOUR_SAMPLES = TRAIL_MAX };
 
 // All zero is empty.
 typedef struct FrameNeighbour {

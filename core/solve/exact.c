@@ -75,9 +75,9 @@ static Status keep_going(Exact *exact) {
         return problem_set(exact->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",
                            exact_time(exact));
-    if (exact->run->steps_most > 0 && exact->run->steps > exact->run->steps_most)
+    if (exact->run->steps_max > 0 && exact->run->steps > exact->run->steps_max)
         return problem_set(exact->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           exact->run->steps_most, exact->run->steps_most * SOLVER_STEP,
+                           exact->run->steps_max, exact->run->steps_max * SOLVER_STEP,
                            exact_time(exact), exact->plan->duration);
     if (!progress_advance(exact->run->progress, exact_time(exact) / exact->plan->duration))
         return problem_set(exact->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
@@ -270,8 +270,8 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     trust_start(&exact->trust, &exact->flying, exact->touching, &exact->resting, &exact->state,
                 exact->damper->clearance, run->base->form == BASE_SINE, plan->duration);
     const EnergyState energy = exact_energy(exact);
-    ledger_start(&exact->ledger, response, run->impacts_most, &energy);
-    exact->ledger.gain_most = LEDGER_GAIN_EXACT;
+    ledger_start(&exact->ledger, response, run->impacts_max, &energy);
+    exact->ledger.gain_max = LEDGER_GAIN_EXACT;
     recorder_start(&exact->recorder, run, response);
     TRY(exact_stride_start(exact));
     if (exact->lanes.run == NULL && !exact->has_flight) {

@@ -50,10 +50,10 @@ static inline State flight_step(const Flight *flight, const State *start, const 
 }
 
 // The most |r''| can be over the interval [m/s^2].
-static inline double flight_curvature(const Flight *flight, const State *start, double base_most) {
+static inline double flight_curvature(const Flight *flight, const State *start, double base_max) {
     const double speed = (start->v < 0 ? -start->v : start->v) +
                          flight->omega * (start->x < 0 ? -start->x : start->x) +
-                         flight->length * base_most;
+                         flight->length * base_max;
     return flight->curvature * speed;
 }
 

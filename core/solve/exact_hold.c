@@ -17,7 +17,7 @@ enum { X, V, R, W, A, B, SUM_A, SUM_N, SIZE };
 enum { DECOUPLE_STEPS = 60, SEPARATION = 30 };
 
 // Of |n|: what a fast part may still add to a peak without being looked at.
-static const double ripple_most = 1e-12;
+static const double ripple_max = 1e-12;
 
 typedef double Square[2][2];
 
@@ -188,7 +188,7 @@ static State transit(const HoldLevel *level, const State *start, const Slice *sl
 // a_g and its first two derivatives over a stretch: a_g and a_g' at its start, and bounds of all.
 typedef struct BaseBounds {
     double a, rate;
-    double a_most, rate_most, bend_most;
+    double a_max, rate_max, bend_max;
 } BaseBounds;
 
 static BaseBounds base_bounds(const Slice *slice, double length) {
@@ -227,9 +227,9 @@ static Split split(const Hold *hold, const State *state, const BaseBounds *base)
 
 // What can be said of r and n over a stretch of contact.
 typedef struct Foresight {
-    bool lasts;        // surely
-    double force_most; // |n| is not larger
-    double ripple;     // the fast part's share of n is not larger
+    bool lasts;       // surely
+    double force_max; // |n| is not larger
+    double ripple;    // the fast part's share of n is not larger
 } Foresight;
 
 static Foresight foresee(const Hold *hold, const Split *at, const BaseBounds *base, double length,
@@ -244,13 +244,13 @@ static Foresight foresee(const Hold *hold, const Split *at, const BaseBounds *ba
     const double kappa_rate = mix[0] * hold->quasi_rate[0] + mix[1] * hold->quasi_rate[1];
     const double drive = hypot(hold->quasi_rate[0], hold->quasi_rate[1] / hold->fast_omega);
     const double fast = hypot(mix[0], mix[1] * hold->fast_omega) *
-                        (at->fast + length * drive * base->bend_most) *
+                        (at->fast + length * drive * base->bend_max) *
                         exp(hold->fast_growth * length);
     // The slow part at the start, and the most it can change: Omega |Z1| + |Z2| bounds what Z
     // becomes.
     const double slow =
         L1[0] * at->Z[0] + L1[1] * at->Z[1] - kappa * base->a - kappa_rate * base->rate;
-    const double reach = (omega * fabs(at->Z[0]) + fabs(at->Z[1]) + length * base->a_most) *
+    const double reach = (omega * fabs(at->Z[0]) + fabs(at->Z[1]) + length * base->a_max) *
                          exp(hold->slow_growth * length);
     const double slope1 = L1[0] * hold->slow[0][0] + L1[1] * hold->slow[1][0];
     const double slope2 = L1[0] * hold->slow[0][1] + L1[1] * hold->slow[1][1];
@@ -259,12 +259,12 @@ static Foresight foresee(const Hold *hold, const Split *at, const BaseBounds *ba
                          L1[1] * (hold->H[1][0] * hold->L[0][1] + hold->H[1][1] * hold->L[1][1]);
     const double change =
         length * ((omega > 0 ? fabs(slope1) / omega : 0) * reach + fabs(slope2) * reach +
-                  fabs(entry) * base->a_most + fabs(kappa) * base->rate_most +
-                  fabs(kappa_rate) * base->bend_most);
+                  fabs(entry) * base->a_max + fabs(kappa) * base->rate_max +
+                  fabs(kappa_rate) * base->bend_max);
     const double ripple = (m->contact_omega2 + m->contact_damping * hold->fast_omega) * fast;
     return (Foresight){.lasts = sign * slow - change > fast,
-                       .force_most = m->contact_omega2 * (fabs(slow) + change) +
-                                     m->contact_damping * change / length + ripple,
+                       .force_max = m->contact_omega2 * (fabs(slow) + change) +
+                                    m->contact_damping * change / length + ripple,
                        .ripple = ripple};
 }
 
@@ -289,12 +289,12 @@ const HoldLevel *hold_step(const Hold *hold, const State *start, const Slice *sl
         if (!seen.lasts)
             continue;
         *end = transit(level, start, slice);
-        if (seen.force_most <= peak)
+        if (seen.force_max <= peak)
             return level;
         // A new peak may lie inside, unless the ripple has died and what is left only rises or only
         // falls.
         const double n = fabs(hold_force(&hold->motion, start));
-        if (seen.ripple <= ripple_most * n &&
+        if (seen.ripple <= ripple_max * n &&
             force_rate(&hold->motion, start) * force_rate(&hold->motion, end) >= 0)
             return level;
     }

@@ -12,7 +12,7 @@
 // buffers are not for this.
 static const double STEP = 0.6;
 static const double LONG_STEP = 2;
-static const double STEPS_MOST = 1024;
+static const double STEPS_MAX = 1024;
 enum { RIDE_AGAIN = 8, SEARCH_STEPS = 12 };
 
 // Angles of the fast oscillation: the square of the first is below rounding; what the second leaves

@@ -106,7 +106,7 @@ INLINE unsigned mark(const Press *press, const Ride *ride) {
         {1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15}};
     const Exact *exact = press->exact;
     const Pulse *p = press->pulse;
-    const double h = exact->interval, sway = p->sway * exact->stretch.base_most;
+    const double h = exact->interval, sway = p->sway * exact->stretch.base_max;
     double d[4][RIDE], bends[RIDE], bend[RIDE], r[RIDE], before[RIDE], w[RIDE], w_before[RIDE];
     double rate[RIDE], marks[RIDE];
     Eight shifted, here;
@@ -375,7 +375,7 @@ INLINE size_t run(Press *press, size_t most, BaseKind kind) {
 INLINE size_t run_any(Press *press, size_t most) {
     if (press->pulse->base_omega > 0)
         return run(press, most, SINE);
-    return press->exact->stretch.base_most > 0 ? run(press, most, LINEAR) : run(press, most, STILL);
+    return press->exact->stretch.base_max > 0 ? run(press, most, LINEAR) : run(press, most, STILL);
 }
 
 #ifdef __x86_64__

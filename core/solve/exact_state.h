@@ -170,7 +170,7 @@ static inline double exact_turned(const Slice *slice, double t) {
 // The base from this instant on, to the next sample; for strides alone, where the grids coincide.
 static inline void exact_slice(Exact *exact, Slice *slice) {
     const Base *base = exact->run->base;
-    if (exact->stretch.base_most == 0 ||
+    if (exact->stretch.base_max == 0 ||
         (base->form == BASE_SAMPLED && exact->sample + 1 >= base->count)) {
         *slice = (Slice){0, 0, 0};
     } else if (base->form == BASE_SAMPLED) {

@@ -9,12 +9,12 @@
 #include "core/solve/exact_press.h"
 
 enum {
-    PENDING_MOST = 1024,     // samples between two looks at the energy balance
+    PENDING_MAX = 1024,      // samples between two looks at the energy balance
     WATCH_SAMPLES = 1 << 16, // made ready between two looks at the progress
 };
 
 // Of energies, over all samples of a contact: times DBL_EPSILON, what its closed form may lose.
-static const double APART_MOST = 4e4;
+static const double APART_MAX = 4e4;
 
 // The largest of |values|, and of how far each is from the one before.
 INLINE void measure(const double *values, size_t count, double *most, double *step) {
@@ -87,13 +87,13 @@ Status exact_stride_start(Exact *exact) {
     if (base->form == BASE_SAMPLED) {
         double step;
         if (wide_is_at_hand())
-            measure_wide(base->values, base->count, &stretch->base_most, &step);
+            measure_wide(base->values, base->count, &stretch->base_max, &step);
         else
-            measure(base->values, base->count, &stretch->base_most, &step);
+            measure(base->values, base->count, &stretch->base_max, &step);
         exact->base_slope = step * exact->plan->sample_rate;
     }
     if (is_sine)
-        stretch->base_most = exact->base_slope = fabs(base->amplitude);
+        stretch->base_max = exact->base_slope = fabs(base->amplitude);
     stretch->base = &exact->base;
     memcpy(stretch->columns, columns, sizeof stretch->columns);
     stretch->left = stretch->right = INFINITY;
@@ -155,7 +155,7 @@ static size_t fly(Exact *exact, size_t most) {
     exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
     exact_count_flight(exact, count);
     exact->recorder.last_velocity = s->v;
-    if (exact->pending >= PENDING_MOST)
+    if (exact->pending >= PENDING_MAX)
         exact_stride_enter(exact);
     return count;
 }
@@ -180,7 +180,7 @@ typedef struct Pull {
 
 INLINE void see_pull(const Exact *exact, double length, Pull *pull) {
     const Lanes *lanes = &exact->lanes;
-    const double base = exact->stretch.base_most, speed = fabs(exact->state.v);
+    const double base = exact->stretch.base_max, speed = fabs(exact->state.v);
     pull->most = (lanes->damping + lanes->omega) *
                  (speed + lanes->omega * fabs(exact->state.x) + length * base);
     const double drive = pull->most + base; // |x''| is not larger
@@ -303,13 +303,13 @@ static void make_pulse(Exact *exact, Side side) {
 // would hold it, each sample anew, and beside a soft structure that may be far from where it is.
 static double keeps_digits(const Exact *exact, const Pulse *pulse) {
     const double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
-    const double most = exact->stretch.base_most, slope = exact->base_slope;
+    const double most = exact->stretch.base_max, slope = exact->base_slope;
     const double x = fabs(a[PULSE_X]) * most + fabs(s[PULSE_X]) * slope;
     const double v = fabs(a[PULSE_V]) * most + fabs(s[PULSE_V]) * slope;
     const double apart = exact->plan->mass[0] * (v * v + exact->flying.omega2 * x * x);
     const EnergyState now = exact_energy(exact);
     const double held = ledger_larger(exact->ledger.largest_energy, now.kinetic + now.strain);
-    return apart > 0 ? APART_MOST * held / apart : INFINITY;
+    return apart > 0 ? APART_MAX * held / apart : INFINITY;
 }
 
 size_t exact_stride_press(Exact *exact, size_t most) {

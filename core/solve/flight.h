@@ -4,10 +4,10 @@
 #ifndef CORE_SOLVE_FLIGHT_H
 #define CORE_SOLVE_FLIGHT_H
 
+#include "core/solve/frame_trail.h"
+#include "core/solve/modal_state.h"
 #include "core/solve/taylor_step.h"
 #include "core/solve/transition.h"
-#include "core/solve/modal_state.h"
-#include "core/solve/frame_trail.h"
 
 typedef struct FrameFlight {
     double length;    // of the interval [s]; 0: there are no such steps
@@ -26,7 +26,7 @@ typedef struct FrameFlight {
 Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem);
 void frame_flight_clear(FrameFlight *flight);
 
-// Moves the state over so many of `count` intervals, at most TRAIL_MOST, as no stop can be reached
+// Moves the state over so many of `count` intervals, at most TRAIL_MAX, as no stop can be reached
 // in, returns how many, leaves their samples in the trail, and says what they add up to, if `work`
 // is not NULL. 0: it must go by arcs, and nothing has changed.
 size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,

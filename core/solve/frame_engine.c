@@ -34,9 +34,9 @@ Status frame_engine_check(FrameEngine *engine) {
         return problem_set(frame->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",
                            frame_time(frame));
-    if (frame->run->steps_most > 0 && frame->run->steps > frame->run->steps_most)
+    if (frame->run->steps_max > 0 && frame->run->steps > frame->run->steps_max)
         return problem_set(frame->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           frame->run->steps_most, frame->run->steps_most * SOLVER_STEP,
+                           frame->run->steps_max, frame->run->steps_max * SOLVER_STEP,
                            frame_time(frame), frame->plan->duration);
     if (!progress_advance(frame->run->progress, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
@@ -128,7 +128,7 @@ static Status happen(Frame *frame, const FrameEvent *event) {
 }
 
 // The longest arc: a half-sine of the base is fast only while it lasts.
-static double arc_most(const Frame *frame, const Slice *slice) {
+static double arc_max(const Frame *frame, const Slice *slice) {
     return 1 / fmax(frame_rate(frame), slice->omega);
 }
 
@@ -199,7 +199,7 @@ static Status advance(FrameEngine *engine, double length) {
         return count_steps(engine, each(engine, FRAME_WORK_HOLD));
     const bool stays = is_stalled(frame);
     const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
-    frame_arc_make(arc, frame, &slice, fmin(most, arc_most(frame, &slice)));
+    frame_arc_make(arc, frame, &slice, fmin(most, arc_max(frame, &slice)));
     frame->run->work.arcs++;
     FrameEvent event;
     const bool is_event = frame_find_event(frame, arc, &event) &&
@@ -251,14 +251,14 @@ static size_t find_slices(const Frame *frame, size_t count, Slice *slices) {
 static size_t fly(FrameEngine *engine, size_t until) {
     Frame *frame = &engine->frame;
     FrameRecord *record = &engine->record;
-    Slice slices[TRAIL_MOST];
+    Slice slices[TRAIL_MAX];
     FrameWork work;
     for (size_t d = 0; d < frame->dampers; d++)
         if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
             return 0;
     size_t count = until - frame->sample;
-    if (count > TRAIL_MOST)
-        count = TRAIL_MOST;
+    if (count > TRAIL_MAX)
+        count = TRAIL_MAX;
     // Statistics begin with a stretch.
     if (frame->sample + 1 < record->statistics_start &&
         frame->sample + count >= record->statistics_start)
@@ -292,7 +292,7 @@ Status frame_engine_settle(FrameEngine *engine) {
         Slice slice;
         FrameEvent event;
         (void)base_cursor_slice(&frame->base, 0, 0, &slice);
-        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, arc_most(frame, &slice)));
+        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, arc_max(frame, &slice)));
         is_event = frame_find_event(frame, &engine->arc, &event) && event.s == 0 &&
                    frame->damper[event.damper].phase == FRAME_FLIGHT;
         if (is_event)
@@ -327,7 +327,7 @@ static void track(FrameEngine *engine, size_t flown) {
     const FrameTrail *trail = &engine->trail;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
         const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
-        memcpy(engine->track + (sample - 1) % TRAIL_MOST * frame->padded,
+        memcpy(engine->track + (sample - 1) % TRAIL_MAX * frame->padded,
                flown > 0 ? trail->q + k * trail->padded : frame->q,
                frame->mode_count * sizeof *engine->track);
     }
@@ -362,9 +362,9 @@ Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Respon
     TRY(frame_trail_make(&engine->trail, frame, problem));
     TRY(frame_record_start(&engine->record, &engine->trail, frame, response, problem));
     const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    ledger_start(&frame->ledger, response, run->impacts_max, &energy);
     // What contacts may be wrong by each, of many of them.
-    frame->ledger.gain_most =
+    frame->ledger.gain_max =
         fmax(LEDGER_GAIN_EXACT, tolerance > FRAME_ODE_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
     return STATUS_OK;
 }
@@ -380,7 +380,7 @@ Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run,
     engine->trail = of->trail;
     frame->is_shadow = true;
     const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    ledger_start(&frame->ledger, response, run->impacts_max, &energy);
     return STATUS_OK;
 }
 

@@ -23,7 +23,7 @@ typedef struct FrameEngine {
     FrameRecord record;
     double work;   // since the progress was asked
     size_t idle;   // steps of contact in a row that took no time
-    double *track; // of the last TRAIL_MOST samples, all modes: sample k at (k - 1) % TRAIL_MOST;
+    double *track; // of the last TRAIL_MAX samples, all modes: sample k at (k - 1) % TRAIL_MAX;
                    // NULL: not wanted
 } FrameEngine;
 

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { ROOTS = 4, POWER_MOST = 18 };
+enum { ROOTS = 4, POWER_MAX = 18 };
 
 static bool is_near_whole(double value) {
     return fabs(value - nearbyint(value)) <= 1e-12 * value;
@@ -25,7 +25,7 @@ void series_law_make(SeriesLaw *law, const ContactTerms *terms) {
     *law = (SeriesLaw){.exponents = {n, own}, .count = 2, .power = {0, 1}};
     for (law->root = 1; law->root <= ROOTS; law->root++)
         if (is_near_whole(law->root * n) && is_near_whole(law->root * own) &&
-            law->root * n <= POWER_MOST)
+            law->root * n <= POWER_MAX)
             break;
     law->is_whole = law->root <= ROOTS;
     if (!law->is_whole)

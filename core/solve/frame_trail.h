@@ -6,7 +6,7 @@
 
 #include "core/solve/modal_state.h"
 
-enum { TRAIL_MOST = 16, TRAIL_ROWS = TRAIL_MOST + 1 };
+enum { TRAIL_MAX = 16, TRAIL_ROWS = TRAIL_MAX + 1 };
 
 // Row 0 is where the stretch begins, row k what is k samples on; all modes in each row.
 typedef struct FrameTrail {

@@ -133,12 +133,12 @@ Status ledger_status(const Ledger *ledger, Problem *problem) {
     if (ledger->status == STATUS_NO_MEMORY)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for more than %zu impacts",
                            ledger->response->impacts.count);
-    if (ledger->gain_most > 0 && ledger->largest_gain > ledger->gain_most * ledger->largest_energy)
+    if (ledger->gain_max > 0 && ledger->largest_gain > ledger->gain_max * ledger->largest_energy)
         return problem_set(problem, STATUS_UNSTABLE,
                            "the motion gained %.3g J that neither the base nor the start gave it, "
                            "more than %.3g of its largest energy, %.3g J: its numbers are too far "
                            "apart for double precision",
-                           ledger->largest_gain, ledger->gain_most, ledger->largest_energy);
+                           ledger->largest_gain, ledger->gain_max, ledger->largest_energy);
     return STATUS_OK;
 }
 

@@ -38,7 +38,7 @@ typedef struct Ledger {
     Energy energy;
     double largest_energy, largest_balance;
     double largest_gain; // energy held that nothing accounts for [J]
-    double gain_most;    // of largest_gain over largest_energy; above it the run fails; 0: any
+    double gain_max;     // of largest_gain over largest_energy; above it the run fails; 0: any
 } Ledger;
 
 // fmax is a call into the C library; this is one instruction, and sees every sample. NaN is caught
@@ -113,7 +113,7 @@ static inline void ledger_acceleration(Ledger *ledger, double acceleration) {
 void ledger_count(const Ledger *ledger, Work *work);
 
 // STATUS_LIMIT or STATUS_NO_MEMORY once a row could not be kept, STATUS_UNSTABLE once more energy
-// came out of nothing than gain_most allows.
+// came out of nothing than gain_max allows.
 Status ledger_status(const Ledger *ledger, Problem *problem);
 // Lists the open ones of `rows`, puts all into order (by start, then damper, then left before
 // right) and writes the energies into the response.

@@ -41,8 +41,8 @@ INLINE double size(double a) {
 }
 
 // |r''| over `count` samples is not larger [m/s^2]: |v| + Omega |x| grows by the base alone.
-INLINE double push_bound(const Lanes *t, double x, double v, size_t count, double base_most) {
-    const double reach = size(v) + t->omega * size(x) + (double)count * t->interval * base_most;
+INLINE double push_bound(const Lanes *t, double x, double v, size_t count, double base_max) {
+    const double reach = size(v) + t->omega * size(x) + (double)count * t->interval * base_max;
     return (t->damping + t->omega) * reach;
 }
 

@@ -32,7 +32,7 @@ typedef struct Stretch {
     double z;                       // velocity of the free mass relative to the base [m/s]
     double left, right;             // r stays within (-left, right); INFINITY without a damper
     double middle;                  // displacement of the free mass less x and r [m]
-    double base_most;               // |a_g| is not larger over the whole run [m/s^2]
+    double base_max;                // |a_g| is not larger over the whole run [m/s^2]
     const BaseCursor *base;         // of a sine
     double *columns[CHANNEL_COUNT]; // those that flight fills, from sample 0; NULL: not wanted
     _Alignas(64) double sums[LANE_SUMS][LANES], most[LANE_PEAKS][LANES];

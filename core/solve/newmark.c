@@ -17,7 +17,7 @@
 
 #include "core/solve/steps_run.h"
 
-enum { NEWTON_MOST = 60 };
+enum { NEWTON_MAX = 60 };
 
 typedef struct Newmark {
     double length;   // of the step that the tables are for [s]
@@ -173,7 +173,7 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
     bool is_any = false;
     for (size_t d = 0; d < m; d++)
         is_any = is_any || frame->damper[d].phase == FRAME_CONTACT;
-    for (int round = 0; is_any && round < NEWTON_MOST; round++) {
+    for (int round = 0; is_any && round < NEWTON_MAX; round++) {
         for (size_t d = 0; d < m; d++) {
             double pull = own->bare[d];
             for (size_t e = 0; e < m; e++) {

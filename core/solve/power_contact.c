@@ -17,7 +17,7 @@
 
 #include "core/solve/frame_ode_step.h"
 
-enum { ORDER_MOST = 22 };
+enum { ORDER_MAX = 22 };
 
 static const double STEP_PART = 0.1; // of a contact's tolerance, what a step may be wrong by
 static const double ROUNDING = DBL_EPSILON / 4;
@@ -30,7 +30,7 @@ Status frame_ode_make(FrameOde *ode, Frame *frame, double tolerance, Problem *pr
     ode->tolerance = tolerance;
     ode->error = fmax(STEP_PART * tolerance, ROUNDING);
     const double order = ORDER_BASE - ORDER_RISE * log(ode->error);
-    ode->order = order > ORDER_MOST ? ORDER_MOST : (size_t)order;
+    ode->order = order > ORDER_MAX ? ORDER_MAX : (size_t)order;
     if (frame->plan->form != CONTACT_POWER || frame->dampers == 0)
         return STATUS_OK;
     const size_t n = frame->mode_count, m = frame->dampers;

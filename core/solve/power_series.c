@@ -20,7 +20,7 @@ typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
 #define TWO(values) (*(const Two *)(values))
 #define PUT_TWO(values, two) (*(Two *)(values) = (two))
 
-enum { GAP_LEAST = 3 };
+enum { GAP_MIN = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
 Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *problem) {
@@ -255,11 +255,10 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
     const SeriesLaw *law = leader->law;
     const Series *pace = &series->powers[series->root == 1 ? 0 : law->pace];
     // From Y = 0 only each so-manieth order has anything in it.
-    const size_t gap = leader->is_felt && law->is_whole
-                           ? (size_t)(law->power[law->spring] + law->root)
-                           : GAP_LEAST;
+    const size_t gap =
+        leader->is_felt && law->is_whole ? (size_t)(law->power[law->spring] + law->root) : GAP_MIN;
     const size_t window =
-        series->powers[1].now * scale->per_root > NEAR || gap < GAP_LEAST ? GAP_LEAST : gap;
+        series->powers[1].now * scale->per_root > NEAR || gap < GAP_MIN ? GAP_MIN : gap;
     const size_t order = scale->order > window ? scale->order : window + 1;
     size_t small = 0; // orders in a row
     double size[SERIES_ROW];

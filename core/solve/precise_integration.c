@@ -14,8 +14,8 @@
 #include "core/solve/steps_run.h"
 
 // Tables that are kept: so many at most, and of so many values each at least two.
-enum { TABLES_MOST = 64 };
-static const size_t VALUES_MOST = (size_t)1 << 20;
+enum { TABLES_MAX = 64 };
+static const size_t VALUES_MAX = (size_t)1 << 20;
 
 typedef struct Table {
     double *key;    // step, then stiffness and damping of each damper in contact, else zeros
@@ -32,7 +32,7 @@ typedef struct Precise {
     double *from; // (y, g, s) before the step
     double *y, *force, *rate;
     double *block;
-    Table tables[TABLES_MOST];
+    Table tables[TABLES_MAX];
 } Precise;
 
 static Status no_memory(const Steps *steps) {
@@ -49,8 +49,8 @@ static Status precise_make(Steps *steps) {
         return no_memory(steps);
     own->wide = size + 2;
     own->key_size = 1 + 2 * m;
-    const size_t fit = VALUES_MOST / (own->wide * own->wide);
-    own->most = fit < 2 ? 2 : fit > TABLES_MOST ? TABLES_MOST : fit;
+    const size_t fit = VALUES_MAX / (own->wide * own->wide);
+    own->most = fit < 2 ? 2 : fit > TABLES_MAX ? TABLES_MAX : fit;
     own->block = calloc(own->key_size + own->wide + 2 * size + m, sizeof *own->block);
     if (own->block == NULL)
         return no_memory(steps);

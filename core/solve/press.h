@@ -41,7 +41,7 @@ INLINE double press_bend(const Press *press) {
     const Pulse *p = press->pulse;
     const Four d = press->d;
     return p->size2[0] * (fabs(d[0]) + fabs(d[1])) + p->size2[1] * (fabs(d[2]) + fabs(d[3])) +
-           p->sway * press->exact->stretch.base_most;
+           p->sway * press->exact->stretch.base_max;
 }
 
 // The integrals' parts that hang on the present instant alone, `sign` times; under a sine with what

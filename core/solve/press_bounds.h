@@ -21,7 +21,7 @@ INLINE double press_surely_lasts(const Press *press) {
     const double omega = exact->lanes.omega;
     const double own =
         (m->damping + omega) * (fabs(exact->state.v) + omega * fabs(exact->state.x) + w);
-    const double bend = 2 * (own + exact->stretch.base_most) + m->share * force;
+    const double bend = 2 * (own + exact->stretch.base_max) + m->share * force;
     const double rate = m->omega2 * (fabs(exact->state.v) + bend * T) + m->damping * bend;
     const double push = press->sign * exact_push(exact) - rate * T;
     const double pull = push < 0 ? -push * pulse->growth : 0;
@@ -66,7 +66,7 @@ INLINE bool press_is_pressed(const Press *press, const Four *end, double length)
     const double fast = fabs(d[2]) + fabs(d[3]), slow = fabs(d[0]) + fabs(d[1]);
     const double from = press->sign * (d[0] + a[PULSE_R] * press->a + s[PULSE_R] * press->slope);
     const double to = press->sign * ((*end)[0] + a[PULSE_R] * last + s[PULSE_R] * slope);
-    const double bend = p->size2[0] * slow + p->sway * press->exact->stretch.base_most;
+    const double bend = p->size2[0] * slow + p->sway * press->exact->stretch.base_max;
     return (from < to ? from : to) > fast + bend * length * length / 8;
 }
 
@@ -86,7 +86,7 @@ INLINE bool press_is_known(const Press *press, const Four *end, double length) {
     pulse_see(p, PULSE_N, &d, press->a, press->slope, &from);
     pulse_see(p, PULSE_N, end, last, slope, &to);
     const double one = fabs(from[0]), other = fabs(to[0]);
-    const double bend = p->size2[0] * slow + p->n_sway * press->exact->stretch.base_most;
+    const double bend = p->size2[0] * slow + p->n_sway * press->exact->stretch.base_max;
     const double most = (one > other ? one : other) + 2 * fast + bend * length * length / 8;
     if (exact_effective_mass(press->exact) * most <=
         ledger_least_force(&press->exact->ledger, &press->exact->row))

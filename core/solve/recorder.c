@@ -29,15 +29,15 @@ Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Fr
     const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
     record->block =
-        calloc(2 * (square + TRAIL_MOST * padded) + columns * (1 + padded), sizeof *record->block);
+        calloc(2 * (square + TRAIL_MAX * padded) + columns * (1 + padded), sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     record->trail = trail;
     for (size_t k = 0; k < 2; k++) {
         record->squares[k] = record->block + k * square;
-        record->batch[k] = record->block + 2 * square + k * TRAIL_MOST * padded;
+        record->batch[k] = record->block + 2 * square + k * TRAIL_MAX * padded;
     }
-    record->shapes = record->batch[1] + TRAIL_MOST * padded;
+    record->shapes = record->batch[1] + TRAIL_MAX * padded;
     record->last_velocity = record->shapes + columns * padded;
     for (size_t i = 0; i < columns; i++) {
         const RunColumn *column = &frame->run->columns[i];
@@ -143,7 +143,7 @@ static void add_batch(FrameRecord *record, const Frame *frame, size_t count) {
 
 // Of accelerations the sign does not matter.
 static void add_squares(FrameRecord *record, const Frame *frame, size_t row) {
-    const size_t padded = record->trail->padded, at = record->count++ % TRAIL_MOST;
+    const size_t padded = record->trail->padded, at = record->count++ % TRAIL_MAX;
     double *restrict pull = record->batch[1] + at * padded;
     memcpy(record->batch[0] + at * padded, record->trail->q + row * padded, padded * sizeof *pull);
     memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
@@ -152,8 +152,8 @@ static void add_squares(FrameRecord *record, const Frame *frame, size_t row) {
         for (size_t i = 0; i < frame->mode_count && force != 0; i++)
             pull[i] -= shape[i] * force;
     }
-    if (at + 1 == TRAIL_MOST)
-        add_batch(record, frame, TRAIL_MOST);
+    if (at + 1 == TRAIL_MAX)
+        add_batch(record, frame, TRAIL_MAX);
 }
 
 void frame_record_take(FrameRecord *record, Frame *frame, size_t count) {
@@ -186,7 +186,7 @@ static double largest_sum(const FrameRecord *record, const double *squares, cons
 }
 
 void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response) {
-    add_batch(record, frame, record->count % TRAIL_MOST);
+    add_batch(record, frame, record->count % TRAIL_MAX);
     response->sum_squares_displacement = largest_sum(record, record->squares[0], frame);
     response->sum_squares_acceleration = largest_sum(record, record->squares[1], frame);
     response->statistics_count = record->count;
@@ -274,7 +274,7 @@ static double rise(const Frame *frame, const double *rows, size_t count, double 
 void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count) {
     const FrameTrail *trail = record->trail;
     const Peaks *peaks = &frame->ledger.response->peaks;
-    double far[TRAIL_MOST], most[TRAIL_MOST];
+    double far[TRAIL_MAX], most[TRAIL_MAX];
     Moment at = {
         .v = rise(frame, trail->p, count, peaks->velocity, most),
         .acceleration = rise(frame, trail->elastic, count, peaks->acceleration, most),

@@ -55,8 +55,8 @@ typedef struct Run {
     const RunColumn *columns; // what is wanted, each once
     size_t column_count;
     double statistics_from; // [s]
-    size_t impacts_most;    // ledger rows; 0: no limit
-    double steps_most;      // solver steps; 0: no limit
+    size_t impacts_max;     // ledger rows; 0: no limit
+    double steps_max;       // solver steps; 0: no limit
     bool is_clear;          // no mass comes to a stop: none has to be searched for
     double steps;           // out: work counted, in solver steps of SOLVER_STEP
     Work work;              // out: what was done, kind by kind, but for what is not the solver's

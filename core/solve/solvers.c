@@ -4,7 +4,7 @@
 
 // clang-format off
 const Field accuracy_fields[] = {
-    FIELD_COUNT(Accuracy, modes, NULL, AT_LEAST(1), OPTIONAL, "natural modes of a structure with several storeys that move, the slowest; all if absent"),
+    FIELD_COUNT(Accuracy, modes, NULL, AT_MIN(1), OPTIONAL, "natural modes of a structure with several storeys that move, the slowest; all if absent"),
     FIELD_END
 };
 // clang-format on

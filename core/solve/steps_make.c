@@ -74,7 +74,7 @@ Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, 
         TRY(frame_record_start(&steps->record, &steps->trail, frame, response, problem));
     }
     const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_most, &energy);
+    ledger_start(&frame->ledger, response, run->impacts_max, &energy);
     double making = 0;
     (void)stepper->cost(frame->mode_count, frame->dampers, frame->diagonal == NULL, &making);
     run->steps += making;

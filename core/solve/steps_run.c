@@ -17,7 +17,7 @@
 
 // Parts of the fastest period and of the shortest contact that a step is of by itself.
 static const double PARTS = 30;
-static const double SHARE_MOST = 1e12;
+static const double SHARE_MAX = 1e12;
 static const double FINER = 10; // tolerance
 static const double CHANCE = 6; // what the difference is taken for with contacts
 static const double TURN = 6.28318530717958647693;
@@ -116,11 +116,11 @@ Status steps_decide(const Accuracy *accuracy, const Stepper *stepper, double bas
                     Plan *plan, Problem *problem) {
     const Choice choice = choose(plan, accuracy, base_interval);
     Decisions *decisions = &plan->report.decisions;
-    if (!(choice.share <= SHARE_MOST))
+    if (!(choice.share <= SHARE_MAX))
         return problem_add_real(problem, STATUS_INVALID, "/accuracy/step",
                                 1 / (plan->sample_rate * choice.share), "s",
                                 "must be at least %.3g s, a 1e12th of the sample interval",
-                                1 / (plan->sample_rate * SHARE_MOST));
+                                1 / (plan->sample_rate * SHARE_MAX));
     TRY(decisions_add(decisions, "step", choice.chose, 1 / (plan->sample_rate * choice.share), "s",
                       "%s; %.0f to a sample interval", choice.why, choice.share));
     if (plan->damper_count > 0)
@@ -243,7 +243,7 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
     pair->near_run = (Run){.plan = &pair->plan,
                            .base = frame->run->base,
                            .progress = frame->run->progress,
-                           .steps_most = frame->run->steps_most,
+                           .steps_max = frame->run->steps_max,
                            .is_clear = frame->run->is_clear};
     pair->near_response.is_unlisted = true;
     pair->apart = malloc(frame->mode_count * sizeof *pair->apart);
@@ -376,11 +376,11 @@ Status steps_run(Run *run, const Stepper *stepper, Response *response, Problem *
     const Base *base = run->base;
     const Choice choice =
         choose(run->plan, run->accuracy, base->form == BASE_SAMPLED ? base->interval : 0);
-    if (!(choice.share <= SHARE_MOST))
+    if (!(choice.share <= SHARE_MAX))
         return problem_set(problem, STATUS_LIMIT,
                            "the scene moves too fast for %s: %.3g steps to a sample interval, at "
                            "most %.3g are possible",
-                           stepper->name, choice.share, SHARE_MOST);
+                           stepper->name, choice.share, SHARE_MAX);
     if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
         return problem_set(problem, STATUS_INVALID,
                            "%s serves linear contact and impulses, not a power law", stepper->name);

@@ -23,7 +23,7 @@ enum { FEW_STOREYS = 24, SOFT_LEVEL = 1 };
 static const double SHORT_ARC = 0.25; // steps beyond SOFT_LEVEL are no shorter, over the rate
 
 // Of N: what a mass that rides on a stiff stop may add to a peak without being looked at.
-static const double RIPPLE_MOST = 1e-9;
+static const double RIPPLE_MAX = 1e-9;
 
 Status frame_press_make(FramePress *press, const Frame *frame, Problem *problem) {
     const size_t n = frame->mode_count, size = frame_lanes_padded(2 * (n + 1) + 2);
@@ -203,7 +203,7 @@ static bool stiff_lasts(const FramePressStop *stop, const Frame *frame, const Fr
     // A force that may be the largest so far is to be seen where it is so: at an end, once the mass
     // merely rides and S only rises or falls.
     if (!frame->is_shadow && at->force > ledger_least_force(&frame->ledger, &damper->row) &&
-        !(hard * astray <= RIPPLE_MOST * largest && fabs(slope) > h * bent))
+        !(hard * astray <= RIPPLE_MAX * largest && fabs(slope) > h * bent))
         return false;
     if (frame->plan->separation == SEPARATION_ZERO_FORCE)
         return fmin(sign * rides[0], sign * rides[1]) > hard * stirred;

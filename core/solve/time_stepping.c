@@ -180,10 +180,10 @@ Status steps_check(Steps *steps) {
     Frame *frame = &steps->frame;
     const Run *run = frame->run;
     steps->watched = 0;
-    if (run->steps_most > 0 && run->steps > run->steps_most)
+    if (run->steps_max > 0 && run->steps > run->steps_max)
         return problem_set(frame->problem, STATUS_LIMIT,
                            SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
-                           run->steps_most, run->steps_most * SOLVER_STEP, frame_time(frame),
+                           run->steps_max, run->steps_max * SOLVER_STEP, frame_time(frame),
                            frame->plan->duration, steps->length);
     if (!progress_advance(run->progress, frame_time(frame) / frame->plan->duration))
         return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",

@@ -5,7 +5,7 @@
 
 #include "core/solve/exact_state.h"
 
-enum { KEPT_MOST = 1 << 18 }; // values
+enum { KEPT_MAX = 1 << 18 }; // values
 
 double *workspace_values(Workspace *workspace, size_t count) {
     if (count > workspace->room) {
@@ -20,7 +20,7 @@ double *workspace_values(Workspace *workspace, size_t count) {
 }
 
 void workspace_tidy(Workspace *workspace) {
-    if (workspace->room <= KEPT_MOST)
+    if (workspace->room <= KEPT_MAX)
         return;
     free(workspace->values);
     workspace->values = NULL;

@@ -11,15 +11,15 @@
 #include "core/solve/solvers.h"
 
 enum {
-    DECADES = 8,        // of steps at most, from the sample interval down
-    SEGMENT_LEAST = 16, // samples of a segment
+    DECADES = 8,      // of steps at most, from the sample interval down
+    SEGMENT_MIN = 16, // samples of a segment
     RATES = 3,
     SHARES = 2,
-    STOREYS_LEAST = 4, // of a structure whose modes are worth leaving out
+    STOREYS_MIN = 4, // of a structure whose modes are worth leaving out
 };
 // The finest step wanted: this part of the shortest contact, or of a radian of the fastest mode.
 static const double contact_part = 3e-3, radian_part = 1e-3;
-static const double tolerance_most = 1e-3, tolerance_least = 1e-14, tolerance_factor = 1e-2;
+static const double tolerance_max = 1e-3, tolerance_min = 1e-14, tolerance_factor = 1e-2;
 static const double rate_divisors[RATES] = {2, 4, 8}; // powers of 2, so that samples coincide
 static const uint64_t spectrum_divisors[SHARES] = {4, 16};
 static const double duration_divisors[SHARES] = {2, 4};
@@ -98,8 +98,8 @@ static bool add_steps(TradeoffPoints *points, const Kind *solver, const Simulati
 }
 
 static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Range *range) {
-    for (double tolerance = fmin(tolerance_most, range->most);
-         tolerance >= fmax(range->least, tolerance_least) * (1 - 1e-9);
+    for (double tolerance = fmin(tolerance_max, range->most);
+         tolerance >= fmax(range->least, tolerance_min) * (1 - 1e-9);
          tolerance *= tolerance_factor) {
         TradeoffPoint *point = add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
         if (point == NULL)
@@ -116,7 +116,7 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
     TradeoffPoint *point;
     for (size_t i = 0; i < RATES; i++) {
         const double rate = scene->sample_rate / rate_divisors[i];
-        if (rate * scene->duration < SEGMENT_LEAST)
+        if (rate * scene->duration < SEGMENT_MIN)
             break;
         if ((point = add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate)) == NULL)
             return false;
@@ -124,7 +124,7 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
     }
     for (size_t i = 0; i < SHARES && psd->channels.count > 0; i++) {
         const uint64_t segment = psd->segment / spectrum_divisors[i];
-        if (segment < SEGMENT_LEAST)
+        if (segment < SEGMENT_MIN)
             break;
         if ((point = add(points, solver, "%s, segments of %llu", solver->name,
                          (unsigned long long)segment)) == NULL)
@@ -145,7 +145,7 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
 // Half the modes, and half of these, down to one.
 static bool add_modes(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    for (size_t modes = storeys / 2; storeys >= STOREYS_LEAST && modes > 0; modes /= 2) {
+    for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2) {
         TradeoffPoint *point =
             add(points, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s");
         if (point == NULL)

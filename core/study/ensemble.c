@@ -2,9 +2,9 @@
 #include "core/study/ensemble.h"
 
 #include "core/excitation/random.h"
+#include "core/study/candidate_settings.h"
 #include "core/study/ensemble_run.h"
 #include "core/study/spectrum_accumulator.h"
-#include "core/study/candidate_settings.h"
 
 enum { RUNS = 10000 };
 
@@ -30,7 +30,7 @@ static const Field study_fields[] = {
 
 static const Field statistic_fields[] = {
     FIELD_TEXT(EnsembleStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of all that follows"),
-    FIELD_COUNT(EnsembleStatistic, count, NULL, AT_LEAST(0), 0, "runs that know it"),
+    FIELD_COUNT(EnsembleStatistic, count, NULL, AT_MIN(0), 0, "runs that know it"),
     FIELD_REAL(EnsembleStatistic, mean, NULL, ANY, OPTIONAL, "mean over those"),
     FIELD_REAL(EnsembleStatistic, standard_deviation, NULL, ANY, OPTIONAL, "of one run"),
     FIELD_REAL(EnsembleStatistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
@@ -43,8 +43,8 @@ static const Field statistic_fields[] = {
     FIELD_REAL(EnsembleStatistic, q75, NULL, ANY, OPTIONAL, "75 % are"),
     FIELD_REAL(EnsembleStatistic, q95, NULL, ANY, OPTIONAL, "95 % are"),
     FIELD_REAL(EnsembleStatistic, maximum, NULL, ANY, OPTIONAL, "the largest"),
-    FIELD_COUNT(EnsembleStatistic, minimum_seed, NULL, AT_LEAST(0), OPTIONAL, "seed of the smallest, the first of equal ones"),
-    FIELD_COUNT(EnsembleStatistic, maximum_seed, NULL, AT_LEAST(0), OPTIONAL, "seed of the largest"),
+    FIELD_COUNT(EnsembleStatistic, minimum_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the smallest, the first of equal ones"),
+    FIELD_COUNT(EnsembleStatistic, maximum_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the largest"),
     FIELD_END
 };
 
@@ -59,9 +59,9 @@ static const Field statistics_fields[] = {
 };
 
 static const Field trust_fields[] = {
-    FIELD_COUNT(EnsembleTrust, whole, NULL, AT_LEAST(0), 0, "runs whose trajectory is their scene's own to the end"),
-    FIELD_COUNT(EnsembleTrust, beyond, NULL, AT_LEAST(0), 0, "runs that go on beyond their trust horizon: there only statistics hold"),
-    FIELD_COUNT(EnsembleTrust, unknown, NULL, AT_LEAST(0), 0, "runs whose error nothing estimates"),
+    FIELD_COUNT(EnsembleTrust, whole, NULL, AT_MIN(0), 0, "runs whose trajectory is their scene's own to the end"),
+    FIELD_COUNT(EnsembleTrust, beyond, NULL, AT_MIN(0), 0, "runs that go on beyond their trust horizon: there only statistics hold"),
+    FIELD_COUNT(EnsembleTrust, unknown, NULL, AT_MIN(0), 0, "runs whose error nothing estimates"),
     FIELD_REAL(EnsembleTrust, shortest_horizon, "s", ANY, OPTIONAL, "of those that have one"),
     FIELD_REAL(EnsembleTrust, largest_error_estimate, NULL, ANY, OPTIONAL, "of those that have one"),
     FIELD_REAL(EnsembleTrust, largest_energy_residual, NULL, ANY, OPTIONAL, "of all that came to an end"),
@@ -70,8 +70,8 @@ static const Field trust_fields[] = {
 
 static const Field failure_fields[] = {
     FIELD_TEXT(EnsembleFailure, reason, 0, PRESENCE_OPTIONAL, 0, "in a word"),
-    FIELD_COUNT(EnsembleFailure, count, NULL, AT_LEAST(1), 0, "runs that failed so"),
-    FIELD_COUNT(EnsembleFailure, first_seed, NULL, AT_LEAST(0), OPTIONAL, "the first of their seeds"),
+    FIELD_COUNT(EnsembleFailure, count, NULL, AT_MIN(1), 0, "runs that failed so"),
+    FIELD_COUNT(EnsembleFailure, first_seed, NULL, AT_MIN(0), OPTIONAL, "the first of their seeds"),
     FIELD_TEXT(EnsembleFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
     FIELD_END
 };
@@ -87,7 +87,7 @@ static const Field spectrum_fields[] = {
 };
 
 static const Field run_fields[] = {
-    FIELD_COUNT(EnsembleRun, seed, NULL, AT_LEAST(0), OPTIONAL, "the scene with this seed gives this row"),
+    FIELD_COUNT(EnsembleRun, seed, NULL, AT_MIN(0), OPTIONAL, "the scene with this seed gives this row"),
     FIELD_TEXT(EnsembleRun, why, 0, PRESENCE_OPTIONAL, 0, "it failed for this reason"),
     FIELD_REAL(EnsembleRun, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
     FIELD_BASE(EnsembleRun, summary, summary_fields),
@@ -98,8 +98,8 @@ static const Field kept_fields[] = {
     FIELD_REAL(EnsembleTarget, error, NULL, ANY, OPTIONAL, "relative error wanted of the mean, against the mean of all runs asked for"),
     FIELD_CHOICE(EnsembleTarget, metric, ensemble_metric_names, OPTIONAL, "of what"),
     FIELD_REAL(EnsembleTarget, confidence, NULL, ANY, OPTIONAL, "that the error is no larger than estimated"),
-    FIELD_COUNT(EnsembleTarget, pilot, NULL, AT_LEAST(0), OPTIONAL, "runs that were made before any were foretold"),
-    FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_LEAST(0), OPTIONAL, "runs foretold after those to keep the target, themselves among them"),
+    FIELD_COUNT(EnsembleTarget, pilot, NULL, AT_MIN(0), OPTIONAL, "runs that were made before any were foretold"),
+    FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_MIN(0), OPTIONAL, "runs foretold after those to keep the target, themselves among them"),
     FIELD_REAL(EnsembleTarget, estimated_error, NULL, ANY, OPTIONAL, "of the mean of the runs made; 0 where all were"),
     FIELD_FLAG(EnsembleTarget, is_kept, false, "the estimated error is within the one wanted"),
     FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "in words"),
@@ -107,10 +107,10 @@ static const Field kept_fields[] = {
 };
 
 static const Field answer_fields[] = {
-    FIELD_COUNT(Ensemble, runs, NULL, AT_LEAST(1), OPTIONAL, "runs asked for"),
-    FIELD_COUNT(Ensemble, first_seed, NULL, AT_LEAST(0), OPTIONAL, "seed of the first"),
-    FIELD_COUNT(Ensemble, made, NULL, AT_LEAST(0), 0, "runs made"),
-    FIELD_COUNT(Ensemble, failed, NULL, AT_LEAST(0), 0, "those of them that failed; the others alone are counted in all that follows"),
+    FIELD_COUNT(Ensemble, runs, NULL, AT_MIN(1), OPTIONAL, "runs asked for"),
+    FIELD_COUNT(Ensemble, first_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the first"),
+    FIELD_COUNT(Ensemble, made, NULL, AT_MIN(0), 0, "runs made"),
+    FIELD_COUNT(Ensemble, failed, NULL, AT_MIN(0), 0, "those of them that failed; the others alone are counted in all that follows"),
     FIELD_REAL(Ensemble, steps, NULL, ANY, 0, "solver steps of all, counted"),
     FIELD_REAL(Ensemble, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
     FIELD_ITEM_OR_NULL(Ensemble, target, kept_fields, PRESENCE_OPTIONAL, "what became of the target"),

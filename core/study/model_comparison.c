@@ -17,13 +17,13 @@ static const Field study_fields[] = {
     FIELD_TEXTS(CompareStudy, models, NULL, NULL, NAMES, PRESENCE_OPTIONAL, 0, "contact models; if absent the scene's own where separations are named, else all"),
     FIELD_TEXTS(CompareStudy, separations, separation_names, NULL, 2, PRESENCE_OPTIONAL, 0, "rules by which linear contacts end; if absent the scene's own where models are named, else both"),
     FIELD_REAL(CompareStudy, part, NULL, WITHIN(1e-6, 1), 0.01, "the motions have parted where their displacements differ by this part of the largest displacement"),
-    FIELD_REALS(CompareStudy, band, "Hz", AT_LEAST(0), 2, PRESENCE_OPTIONAL, "from where to where the spectra are compared; if absent where the scene's own has 99.9 % of its power"),
-    FIELD_COUNT(CompareStudy, storey, NULL, AT_LEAST(1), OPTIONAL, "whose displacement and mean_acceleration are compared; the first damper's if absent"),
+    FIELD_REALS(CompareStudy, band, "Hz", AT_MIN(0), 2, PRESENCE_OPTIONAL, "from where to where the spectra are compared; if absent where the scene's own has 99.9 % of its power"),
+    FIELD_COUNT(CompareStudy, storey, NULL, AT_MIN(1), OPTIONAL, "whose displacement and mean_acceleration are compared; the first damper's if absent"),
     FIELD_END
 };
 
 const Field compare_contacts_fields[] = {
-    FIELD_COUNT(CompareContacts, resting, NULL, AT_LEAST(0), OPTIONAL, "intervals of persistent contact"),
+    FIELD_COUNT(CompareContacts, resting, NULL, AT_MIN(0), OPTIONAL, "intervals of persistent contact"),
     FIELD_REAL(CompareContacts, mean_duration, "s", ANY, OPTIONAL, "of the impacts that ended"),
     FIELD_REAL(CompareContacts, mean_approach_speed, "m/s", ANY, OPTIONAL, "of the impacts"),
     FIELD_REAL(CompareContacts, largest_approach_speed, "m/s", ANY, OPTIONAL, "of them"),
@@ -76,13 +76,13 @@ const Field compare_entry_fields[] = {
 };
 
 static const Field answer_fields[] = {
-    FIELD_COUNT(Comparison, storey, NULL, AT_LEAST(1), OPTIONAL, "whose displacement and mean_acceleration are compared"),
+    FIELD_COUNT(Comparison, storey, NULL, AT_MIN(1), OPTIONAL, "whose displacement and mean_acceleration are compared"),
     FIELD_REAL(Comparison, part, NULL, ANY, OPTIONAL, "of the largest displacement, by which motions have parted"),
     FIELD_TEXT(Comparison, channel, 0, PRESENCE_OPTIONAL, 0, "of the spectra"),
     FIELD_TEXT(Comparison, unit, 0, PRESENCE_OPTIONAL, 0, "of the densities"),
     FIELD_REALS(Comparison, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
     FIELD_REAL(Comparison, trace_rate, "Hz", ANY, OPTIONAL, "buckets a second of the traces"),
-    FIELD_COUNT(Comparison, trace_samples, NULL, AT_LEAST(1), OPTIONAL, "samples in each bucket"),
+    FIELD_COUNT(Comparison, trace_samples, NULL, AT_MIN(1), OPTIONAL, "samples in each bucket"),
     FIELD_LIST(Comparison, entries, compare_entry_fields, 0, PRESENCE_DEFAULT, "the variants; the first is the reference, the scene as it is"),
     FIELD_END
 };

@@ -83,7 +83,7 @@ const char *change_refuse(const Simulation *simulation, int parameter) {
     return NULL;
 }
 
-double change_most(const Simulation *simulation, int parameter, double step) {
+double change_max(const Simulation *simulation, int parameter, double step) {
     return parameter == SENSITIVITY_RESTITUTION
                ? fmax(0, fmin(step, 1 / largest(simulation, parameter) - 1))
                : step;

@@ -9,7 +9,7 @@
 const char *change_refuse(const Simulation *simulation, int parameter);
 
 // The largest relative step up that a parameter allows, at most `step`: e ends at 1.
-double change_most(const Simulation *simulation, int parameter, double step);
+double change_max(const Simulation *simulation, int parameter, double step);
 
 // Sets `member`, a copy of `simulation`, to it with `factor` times the parameter.
 void change_apply(const Simulation *simulation, int parameter, double factor, Simulation *member);

@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/input_uncertainty.h"
+#include "core/study/parameter_perturbation.h"
+#include "core/study/sensitivity_run.h"
 #include "core/study/spectrum_accumulator.h"
 #include "core/study/study_run.h"
 #include "core/study/uncertainty_bands.h"
-#include "core/study/parameter_perturbation.h"
-#include "core/study/sensitivity_run.h"
-#include "core/study/input_uncertainty.h"
 
 enum { RUNS = 2000, RUNS_USUAL = 200, SPREADS = 1000 };
 
@@ -18,7 +18,7 @@ static const char *const buffer_names[] = {
     [SENSITIVITY_BOTH] = "buffer", [SENSITIVITY_LEFT] = "left_buffer", [SENSITIVITY_RIGHT] = "right_buffer", NULL};
 
 const Field sensitivity_spread_fields[] = {
-    FIELD_COUNT(SensitivitySpread, damper, NULL, AT_LEAST(1), REQUIRED, "number of the damper, from 1"),
+    FIELD_COUNT(SensitivitySpread, damper, NULL, AT_MIN(1), REQUIRED, "number of the damper, from 1"),
     FIELD_CHOICE(SensitivitySpread, buffer, buffer_names, 0, "which of its buffers"),
     FIELD_TEXT(SensitivitySpread, source, 160, PRESENCE_OPTIONAL, 0, "the material and revision that tells it"),
     FIELD_REAL(SensitivitySpread, restitution, NULL, WITHIN(0, 1), OPTIONAL, "relative standard deviation of its restitution; sure if absent"),
@@ -38,7 +38,7 @@ static const Field study_fields[] = {
 };
 
 static const Field stop_fields[] = {
-    FIELD_COUNT(SensitivityStop, damper, NULL, AT_LEAST(1), OPTIONAL, "number of the damper, from 1"),
+    FIELD_COUNT(SensitivityStop, damper, NULL, AT_MIN(1), OPTIONAL, "number of the damper, from 1"),
     FIELD_CHOICE(SensitivityStop, side, side_names, OPTIONAL, "its stop"),
     FIELD_REAL(SensitivityStop, restitution, NULL, ANY, OPTIONAL, "e"),
     FIELD_REAL(SensitivityStop, contact_time, "s", ANY, OPTIONAL, "T_c"),
@@ -77,7 +77,7 @@ static const Field row_fields[] = {
 static const Field band_fields[] = {
     FIELD_CHOICE(SensitivityBand, metric, ensemble_metric_names, OPTIONAL, "the summary's number of this name"),
     FIELD_TEXT(SensitivityBand, unit, 0, PRESENCE_OPTIONAL, 0, "of all that follows"),
-    FIELD_COUNT(SensitivityBand, count, NULL, AT_LEAST(0), 0, "runs that know it"),
+    FIELD_COUNT(SensitivityBand, count, NULL, AT_MIN(0), 0, "runs that know it"),
     FIELD_REAL(SensitivityBand, value, NULL, ANY, OPTIONAL, "of the scene itself"),
     FIELD_REAL(SensitivityBand, mean, NULL, ANY, OPTIONAL, "mean over the runs"),
     FIELD_REAL(SensitivityBand, standard_deviation, NULL, ANY, OPTIONAL, "of one run"),
@@ -93,8 +93,8 @@ static const Field band_fields[] = {
 
 static const Field failure_fields[] = {
     FIELD_TEXT(EnsembleFailure, reason, 0, PRESENCE_OPTIONAL, 0, "in a word"),
-    FIELD_COUNT(EnsembleFailure, count, NULL, AT_LEAST(1), 0, "runs that failed so"),
-    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(EnsembleFailure, first_seed, uint64_t), .range = AT_LEAST(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
+    FIELD_COUNT(EnsembleFailure, count, NULL, AT_MIN(1), 0, "runs that failed so"),
+    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(EnsembleFailure, first_seed, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
     FIELD_TEXT(EnsembleFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
     FIELD_END
 };
@@ -111,7 +111,7 @@ static const Field spectrum_fields[] = {
 };
 
 static const Field draw_fields[] = {
-    FIELD_COUNT(SensitivityDraw, run, NULL, AT_LEAST(1), OPTIONAL, "its number; what is drawn follows of it and of the seed"),
+    FIELD_COUNT(SensitivityDraw, run, NULL, AT_MIN(1), OPTIONAL, "its number; what is drawn follows of it and of the seed"),
     FIELD_TEXT(SensitivityDraw, why, 0, PRESENCE_OPTIONAL, 0, "it failed for this reason"),
     FIELD_REALS(SensitivityDraw, restitution, NULL, ANY, 0, PRESENCE_OPTIONAL, "each given buffer's is this times the scene's: damper by damper, that of both sides, left, right"),
     FIELD_REALS(SensitivityDraw, contact_time, NULL, ANY, 0, PRESENCE_OPTIONAL, "likewise"),
@@ -126,10 +126,10 @@ static const Field answer_fields[] = {
     FIELD_LIST(Sensitivity, response, row_fields, 0, PRESENCE_DEFAULT, "what changes do to the response, parameter by parameter"),
     FIELD_FLAG(Sensitivity, is_chaotic, false, "the scene goes on beyond its trust horizon"),
     FIELD_TEXT(Sensitivity, why, 0, PRESENCE_OPTIONAL, 0, "what that means for the derivatives of the response"),
-    FIELD_COUNT(Sensitivity, runs, NULL, AT_LEAST(0), 0, "runs with restitution and contact time drawn, asked for"),
-    FIELD_COUNT(Sensitivity, made, NULL, AT_LEAST(0), 0, "of those, made"),
-    FIELD_COUNT(Sensitivity, failed, NULL, AT_LEAST(0), 0, "of those, failed; the others alone are counted in what follows"),
-    FIELD_COUNT(Sensitivity, seed, NULL, AT_LEAST(0), OPTIONAL, "of the draws"),
+    FIELD_COUNT(Sensitivity, runs, NULL, AT_MIN(0), 0, "runs with restitution and contact time drawn, asked for"),
+    FIELD_COUNT(Sensitivity, made, NULL, AT_MIN(0), 0, "of those, made"),
+    FIELD_COUNT(Sensitivity, failed, NULL, AT_MIN(0), 0, "of those, failed; the others alone are counted in what follows"),
+    FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "of the draws"),
     FIELD_REAL(Sensitivity, restitution_deviation, NULL, ANY, OPTIONAL, "relative, stated for all buffers; where it is unknown that of spread was taken"),
     FIELD_REAL(Sensitivity, contact_time_deviation, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_LIST(Sensitivity, spread, sensitivity_spread_fields, 0, PRESENCE_DEFAULT, "the deviations of each buffer, and whose they are"),

@@ -18,7 +18,7 @@
 
 // Quotients agree that differ by no more than this part of the largest, or by so little that
 // nothing depends on the parameter.
-static const double settled_part = 0.1, settled_least = 1e-3;
+static const double settled_part = 0.1, settled_min = 1e-3;
 
 // What the study has at hand. Its members are the steps, parameter by parameter, down and up by
 // each of them, and then the drawn runs.
@@ -71,7 +71,7 @@ static double step_of(const SensitivityWork *work, size_t step) {
 }
 
 static double step_up(const SensitivityWork *work, int parameter, size_t step) {
-    return change_most(work->simulation, parameter, step_of(work, step));
+    return change_max(work->simulation, parameter, step_of(work, step));
 }
 
 // Sets the scene of one step.
@@ -135,7 +135,7 @@ static void settle(const double quotients[SENSITIVITY_STEPS], SensitivitySlope *
     }
     slope->spread = most - least;
     slope->is_settled =
-        slope->spread <= fmax(settled_part * fmax(fabs(least), fabs(most)), settled_least);
+        slope->spread <= fmax(settled_part * fmax(fabs(least), fabs(most)), settled_min);
 }
 
 static void fold_step(SensitivityWork *work, size_t index, MemberPart *run) {

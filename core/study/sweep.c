@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
-#include "core/study/sweep_validation.h"
 #include "core/study/sweep_run.h"
+#include "core/study/sweep_validation.h"
 
 // Small scenes' points that are judged while whoever submits them waits: some 20 ms.
 enum { CHECKED_AT_ONCE = 5000 };
@@ -82,14 +82,14 @@ static const Field told_fields[] = {
 
 static const Field failure_fields[] = {
     FIELD_CHOICE(SweepFailure, status, sweep_status_names, OPTIONAL, "in a word"),
-    FIELD_COUNT(SweepFailure, count, NULL, AT_LEAST(1), 0, "points that failed so"),
-    FIELD_COUNT(SweepFailure, first_point, NULL, AT_LEAST(0), OPTIONAL, "the first of them"),
+    FIELD_COUNT(SweepFailure, count, NULL, AT_MIN(1), 0, "points that failed so"),
+    FIELD_COUNT(SweepFailure, first_point, NULL, AT_MIN(0), OPTIONAL, "the first of them"),
     FIELD_TEXT(SweepFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
     FIELD_END
 };
 
 static const Field table_fields[] = {
-    FIELD_COUNT(SweepTable, failed, NULL, AT_LEAST(0), OPTIONAL, "points that came to nothing"),
+    FIELD_COUNT(SweepTable, failed, NULL, AT_MIN(0), OPTIONAL, "points that came to nothing"),
     FIELD_REALS(SweepTable, points, NULL, ANY, 0, PRESENCE_OPTIONAL, "numbers of the points that are there, from 0"),
     FIELD_REALS(SweepTable, statuses, NULL, ANY, 0, PRESENCE_OPTIONAL, "what became of each: 0 made"),
     FIELD_REALS(SweepTable, values, NULL, ANY, 0, PRESENCE_OPTIONAL, "the metrics of each"),
@@ -98,7 +98,7 @@ static const Field table_fields[] = {
 };
 
 static const Field answer_fields[] = {
-    FIELD_COUNT(Sweep, points, NULL, AT_LEAST(1), OPTIONAL, "points asked for"),
+    FIELD_COUNT(Sweep, points, NULL, AT_MIN(1), OPTIONAL, "points asked for"),
     FIELD_CHOICE(Sweep, mode, sweep_mode_names, OPTIONAL, "how the axes go together"),
     FIELD_LIST(Sweep, axes, told_fields, 0, PRESENCE_DEFAULT, "what varies, in the order of the changes"),
     FIELD_TEXTS(Sweep, metrics, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "what is kept of each point"),

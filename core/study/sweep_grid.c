@@ -17,7 +17,7 @@ enum {
     PLACE = sizeof((Fault){0}.pointer),
     COST_SAMPLES = 64,
     COST_SCENES = 2000, // what they may cost
-    AFFORDED_LEAST = 16,
+    AFFORDED_MIN = 16,
     SWEEP_VALUES = 1 << 21,
 };
 
@@ -221,7 +221,7 @@ size_t sweep_affordable(const SweepPlan *plan, size_t scenes) {
     if (scenes == SIZE_MAX)
         return SIZE_MAX;
     const size_t most = (size_t)((double)scenes / cost);
-    return most > AFFORDED_LEAST ? most : AFFORDED_LEAST;
+    return most > AFFORDED_MIN ? most : AFFORDED_MIN;
 }
 
 double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/solve/solvers.h"
-#include "core/study/tradeoff_budget.h"
 #include "core/study/candidate_settings.h"
+#include "core/study/tradeoff_budget.h"
 #include "core/study/tradeoff_run.h"
 
 enum { SOLVERS = 32, REPEATS = 1000 };
@@ -16,12 +16,12 @@ const char *const tradeoff_status_names[] = {"measured", "refused", "failed", NU
 
 // clang-format off
 static const Field study_fields[] = {
-    FIELD_REAL(TradeoffStudy, error, NULL, AT_LEAST(0), OPTIONAL, "error wanted, in the metric's unit; 1e-3 if absent, 1e-2 of mean_acceleration and peak_force, no impact, 0.1 dB"),
+    FIELD_REAL(TradeoffStudy, error, NULL, AT_MIN(0), OPTIONAL, "error wanted, in the metric's unit; 1e-3 if absent, 1e-2 of mean_acceleration and peak_force, no impact, 0.1 dB"),
     FIELD_CHOICE(TradeoffStudy, metric, metric_names, METRIC_DISPLACEMENT, "what the error is of"),
     FIELD_COUNT(TradeoffStudy, repeats, NULL, WITHIN(1, REPEATS), 5, "timings of each point; the smallest and the median are told"),
     FIELD_TEXTS(TradeoffStudy, solvers, NULL, NULL, SOLVERS, PRESENCE_OPTIONAL, 0, "solvers that are tried; all if absent"),
     FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 5e7, "solver steps that a point may be foretold to take; it is refused beyond"),
-    FIELD_COUNT(TradeoffStudy, trial, NULL, AT_LEAST(1), 1, "another number measures the CPU times anew; the same one is answered from what was measured"),
+    FIELD_COUNT(TradeoffStudy, trial, NULL, AT_MIN(1), 1, "another number measures the CPU times anew; the same one is answered from what was measured"),
     FIELD_END
 };
 
@@ -33,13 +33,13 @@ const Field tradeoff_point_fields[] = {
     FIELD_TEXT(TradeoffPoint, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model in place of the scene's"),
     FIELD_REAL(TradeoffPoint, sample_rate, "Hz", ANY, OPTIONAL, "sample rate in place of the scene's; the base keeps its own"),
     FIELD_REAL(TradeoffPoint, duration, "s", ANY, OPTIONAL, "duration in place of the scene's"),
-    FIELD_COUNT(TradeoffPoint, segment, "samples", AT_LEAST(1), OPTIONAL, "segment of the spectra in place of the scene's"),
-    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_LEAST(1), OPTIONAL, "modes that it keeps; all if absent"),
+    FIELD_COUNT(TradeoffPoint, segment, "samples", AT_MIN(1), OPTIONAL, "segment of the spectra in place of the scene's"),
+    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_MIN(1), OPTIONAL, "modes that it keeps; all if absent"),
     FIELD_CHOICE(TradeoffPoint, status, tradeoff_status_names, TRADEOFF_MEASURED, "whether it was run"),
     FIELD_TEXT(TradeoffPoint, why, 0, PRESENCE_OPTIONAL, 0, "why it was not measured"),
     FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, another time will differ"),
     FIELD_REAL(TradeoffPoint, cpu_median, "s", ANY, OPTIONAL, "median of the timings; a measurement"),
-    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_LEAST(0), 0, "runs that were timed: short ones are timed many at once"),
+    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_MIN(0), 0, "runs that were timed: short ones are timed many at once"),
     FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
     FIELD_ITEM(TradeoffPoint, errors, error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
     FIELD_FLAG(TradeoffPoint, is_best, false, "no other point is both cheaper and closer by the metric; follows from measured times"),
@@ -53,7 +53,7 @@ static const Field reference_fields[] = {
 };
 
 static const Field choice_fields[] = {
-    FIELD_COUNT(TradeoffChoice, point, NULL, AT_LEAST(1), OPTIONAL, "number of the point, from 1: the cheapest that keeps the error, or the closest that takes at most 1.25 times as long; unknown: none keeps it; follows from measured times"),
+    FIELD_COUNT(TradeoffChoice, point, NULL, AT_MIN(1), OPTIONAL, "number of the point, from 1: the cheapest that keeps the error, or the closest that takes at most 1.25 times as long; unknown: none keeps it; follows from measured times"),
     FIELD_TEXT(TradeoffChoice, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
     FIELD_END
 };
@@ -61,8 +61,8 @@ static const Field choice_fields[] = {
 static const Field answer_fields[] = {
     FIELD_CHOICE(Tradeoff, metric, metric_names, OPTIONAL, "what the error wanted is of"),
     FIELD_REAL(Tradeoff, error, NULL, ANY, OPTIONAL, "error wanted"),
-    FIELD_COUNT(Tradeoff, repeats, NULL, AT_LEAST(1), OPTIONAL, "timings of each point"),
-    FIELD_COUNT(Tradeoff, trial, NULL, AT_LEAST(1), OPTIONAL, "number of the measurement"),
+    FIELD_COUNT(Tradeoff, repeats, NULL, AT_MIN(1), OPTIONAL, "timings of each point"),
+    FIELD_COUNT(Tradeoff, trial, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
     FIELD_ITEM(Tradeoff, reference, reference_fields, NULL, PRESENCE_DEFAULT, "what the points are compared with"),
     FIELD_LIST(Tradeoff, points, tradeoff_point_fields, 0, PRESENCE_DEFAULT, "the ways tried"),
     FIELD_ITEM(Tradeoff, recommendation, choice_fields, NULL, PRESENCE_DEFAULT, "the point to take"),

@@ -9,7 +9,7 @@
 #include "server/jobs/documents.h"
 
 // The scenes that are compared, and how long they may be.
-enum { RECENT_MOST = 256, SCENE_MOST = 16384 };
+enum { RECENT_MAX = 256, SCENE_MAX = 16384 };
 
 static void put_layer(Bytes *bytes, const char *name, const LayerTally *layer, bool has_budget) {
     bytes_format(bytes, "\"%s\": {\"hits\": %llu, \"misses\": %llu", name,
@@ -75,7 +75,7 @@ static Status find_nearest(App *app, const char *scene, Bytes *bytes, Problem *p
     ResultRows rows = {NULL, 0};
     Differences least = {0};
     const ResultRow *nearest = NULL;
-    TRY(store_result_recent(app->store, RECENT_MOST, SCENE_MOST, &rows, problem));
+    TRY(store_result_recent(app->store, RECENT_MAX, SCENE_MAX, &rows, problem));
     for (size_t i = 0; i < rows.count; i++) {
         Differences other;
         const Status status = differ_json(scene, rows.at[i].scene, NULL, &other, NULL);

@@ -55,7 +55,7 @@ static Status measure_spectra(const Signal *a, const Signal *b, Spectrum *spectr
     static const char *const units[2] = {"", ""};
     Columns pair = {0};
     double rate;
-    TRY(likeness_pair(a, b, MEASURED_LEAST, &pair, &rate, problem));
+    TRY(likeness_pair(a, b, MEASURED_MIN, &pair, &rate, problem));
     columns_name(&pair, 0, "a", "");
     columns_name(&pair, 1, "measured", "");
     const size_t segment = pair.rows < SEGMENT ? pair.rows : SEGMENT;

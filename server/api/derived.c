@@ -10,7 +10,7 @@
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-static const double mass_least = 1e-12, mass_most = 1e15; // [kg]
+static const double mass_min = 1e-12, mass_max = 1e15; // [kg]
 
 typedef struct Asked {
     double damper_mass, structure_mass; // [kg]
@@ -22,9 +22,9 @@ static Status read_query(const Request *request, Asked *asked, Problem *problem)
         return problem_set(problem, STATUS_USAGE,
                            "the query parameter \"damper_mass\" is required: mass of the free "
                            "body [kg]; structure_mass too unless what it strikes does not move");
-    TRY(request_number(request, "damper_mass", mass_least, mass_most, (double)NAN,
-                       &asked->damper_mass, problem));
-    TRY(request_number(request, "structure_mass", mass_least, mass_most, (double)NAN,
+    TRY(request_number(request, "damper_mass", mass_min, mass_max, (double)NAN, &asked->damper_mass,
+                       problem));
+    TRY(request_number(request, "structure_mass", mass_min, mass_max, (double)NAN,
                        &asked->structure_mass, problem));
     TRY(query_choice(request, "identified_for", identified_for_names, IDENTIFIED_FOR_SCENE,
                      &asked->identified_for, problem));

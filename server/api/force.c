@@ -68,8 +68,8 @@ static Status read_what(const Request *request, Look *look, Problem *problem) {
                            "impacts.json lists them",
                            text);
     look->number = (size_t)number;
-    return request_count(request, "points", CLOSEUP_POINTS_LEAST, CLOSEUP_POINTS_MOST,
-                         CLOSEUP_POINTS, &look->points, problem);
+    return request_count(request, "points", CLOSEUP_POINTS_MIN, CLOSEUP_POINTS_MAX, CLOSEUP_POINTS,
+                         &look->points, problem);
 }
 
 // Of a look that has been taken; its columns become the sheet's.

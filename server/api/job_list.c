@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/rfc3339.h"
 #include "core/base/field.h"
+#include "core/base/rfc3339.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/api/job_document.h"
@@ -14,7 +14,7 @@
 #include "server/jobs/job_id.h"
 #include "server/store/job_search.h"
 
-enum { LIST_INITIAL = 20, LIST_MOST = 100 };
+enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 
 // Unfinished jobs whose state is asked for are looked at one by one, this many at a time.
 enum { LOOKED_AT = 256 };
@@ -84,7 +84,7 @@ static Status read_search(const Request *request, JobSearch *search, int *state,
         kinds[count++] = studies[i]->kind.name;
     size_t limit;
     int kind;
-    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     *search = job_search_all(limit);
     TRY(query_choice(request, "status", job_state_names, -1, state, problem));
     TRY(query_choice(request, "kind", kinds, -1, &kind, problem));

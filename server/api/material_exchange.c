@@ -13,7 +13,7 @@
 #include "server/materials/exchange_csv.h"
 #include "server/materials/exchange_json.h"
 
-enum { WHOLE_MOST = 4 << 20 }; // what is longer is sent while it is made
+enum { WHOLE_MAX = 4 << 20 }; // what is longer is sent while it is made
 
 typedef struct Sending {
     ExchangeText text;
@@ -49,7 +49,7 @@ static ptrdiff_t send_next(void *context, char *target, size_t size) {
 // The beginning at once: where that is all it is kept, and compressed.
 static Status begin(Sending *sending, Store *store, bool is_table, Problem *problem) {
     TRY(exchange_text_open(store, is_table, &sending->text, problem));
-    while (!sending->is_last && sending->made.count < WHOLE_MOST)
+    while (!sending->is_last && sending->made.count < WHOLE_MAX)
         TRY(exchange_text_next(&sending->text, &sending->made, &sending->is_last, problem));
     return STATUS_OK;
 }

@@ -12,7 +12,7 @@
 #include "server/materials/catalogue.h"
 
 // Revisions may be long, with their tables; what was done is short.
-enum { REVISIONS_MOST = 100, DEEDS_INITIAL = 100, DEEDS_MOST = 1000 };
+enum { REVISIONS_MAX = 100, DEEDS_INITIAL = 100, DEEDS_MAX = 1000 };
 
 // A page of a list that is numbered from 1, newest first: `limit` items before `before`.
 typedef struct Page {
@@ -76,7 +76,7 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     MaterialRevisions revisions = {0};
     MaterialState state;
     Page page;
-    TRY(read_page(request, REVISIONS_MOST, REVISIONS_MOST, &page, problem));
+    TRY(read_page(request, REVISIONS_MAX, REVISIONS_MAX, &page, problem));
     TRY(store_material_state(app->store, slug, &state, problem));
     if (page.before > state.latest + 1)
         page.before = state.latest + 1;
@@ -109,7 +109,7 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
     MaterialDeeds deeds = {0};
     MaterialState state;
     Page page;
-    TRY(read_page(request, DEEDS_INITIAL, DEEDS_MOST, &page, problem));
+    TRY(read_page(request, DEEDS_INITIAL, DEEDS_MAX, &page, problem));
     TRY(store_material_state(app->store, slug, &state, problem));
     if (page.before > state.version + 1)
         page.before = state.version + 1;

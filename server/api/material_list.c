@@ -8,7 +8,7 @@
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-enum { LIST_INITIAL = 100, LIST_MOST = 1000, LOOKED_AT = 100 };
+enum { LIST_INITIAL = 100, LIST_MAX = 1000, LOOKED_AT = 100 };
 static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 
 typedef struct Search {
@@ -35,7 +35,7 @@ static Status read_search(const Request *request, Search *search, Problem *probl
     TRY(query_range(request, "e", &search->restitution, problem));
     TRY(query_range(request, "T_c", &search->contact_time, problem));
     TRY(query_text(request, "after", &search->after, problem));
-    return request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &search->limit, problem);
+    return request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &search->limit, problem);
 }
 
 // A line for each text: words that are searched for hold no line's end.
@@ -90,7 +90,7 @@ static bool is_meant(const MaterialRevision *revision, const Search *search) {
 
 typedef struct Listed {
     size_t count;
-    char last[MATERIAL_SLUG_MOST + 1]; // shown
+    char last[MATERIAL_SLUG_MAX + 1]; // shown
     bool is_more;
 } Listed;
 
@@ -114,7 +114,7 @@ static Status put_some(MaterialRevisions *materials, const Search *search, Liste
 // At most search->limit of them.
 static Status put_list(Store *store, const Search *search, Listed *list, Bytes *bytes,
                        Problem *problem) {
-    char after[QUERY_TEXT_MOST + 1] = "";
+    char after[QUERY_TEXT_MAX + 1] = "";
     bool is_end = false;
     if (search->after != NULL)
         text_fit(after, sizeof after, search->after);

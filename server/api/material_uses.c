@@ -9,7 +9,7 @@
 #include "server/http/reply.h"
 #include "server/materials/catalogue.h"
 
-enum { LIST_INITIAL = 20, LIST_MOST = 1000 };
+enum { LIST_INITIAL = 20, LIST_MAX = 1000 };
 
 // An empty list is of a revision that is there.
 static Status require_revision(App *app, const char *slug, uint64_t revision, Problem *problem) {
@@ -30,7 +30,7 @@ static Status list_uses(App *app, const Request *request, uint64_t revision, Rep
     uint64_t total;
     char name[96], next[24];
     ResultUses uses = {0};
-    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     TRY(request_count(request, "before", 1, (size_t)1 << 53, 0, &before, problem));
     TRY(require_revision(app, slug, revision, problem));
     snprintf(name, sizeof name, "%.63s@%llu", slug, number);

@@ -134,9 +134,9 @@ Status measured_read(const Request *request, MeasuredRequest **made, Problem *pr
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
     TRY(is_text ? read_text(request, asked, problem) : read_document(request, asked, problem));
     TRY(fields_check(request_fields, asked, "", problem));
-    if (asked->measured.samples.count < MEASURED_LEAST)
+    if (asked->measured.samples.count < MEASURED_MIN)
         return problem_add(problem, STATUS_INVALID, "/measured/samples",
-                           "must be at least %d samples, are %zu", MEASURED_LEAST,
+                           "must be at least %d samples, are %zu", MEASURED_MIN,
                            asked->measured.samples.count);
     return STATUS_OK;
 }

@@ -6,7 +6,7 @@
 #include "core/base/field.h"
 #include "server/http/request.h"
 
-enum { MEASURED_LEAST = 16 }; // samples
+enum { MEASURED_MIN = 16 }; // samples
 
 typedef enum Statistic {
     QUANTITY_ACCELERATION,

@@ -16,7 +16,7 @@
 #include "server/materials/catalogue.h"
 #include "server/materials/measurement.h"
 
-enum { LIST_INITIAL = 20, LIST_MOST = 100 };
+enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 
 Status material_separation(App *app, const Request *request, int *separation, Problem *problem) {
     const char *slug = request->parameters[0];
@@ -205,7 +205,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     size_t limit, before;
     TRY(store_material_state(app->store, slug, &state, problem));
     const size_t count = (size_t)state.measurements;
-    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     TRY(request_count(request, "before", 1, (size_t)1 << 53, count + 1, &before, problem));
     char tag[MATERIAL_TAG];
     material_tag(slug, state.latest, state.version, tag);

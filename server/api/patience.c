@@ -2,7 +2,7 @@
 
 #include "server/base/clock.h"
 
-enum { LONG_MOST = 4 };
+enum { LONG_MAX = 4 };
 static const double quick = 0.5, most = 30; // [s]
 
 void patience_begin(App *app, Patience *patience) {
@@ -15,7 +15,7 @@ bool patience_lasts(void *context, double fraction) {
     const double spent = 1e-9 * (double)(clock_thread_cpu_ns() - patience->from_ns);
     (void)fraction;
     if (spent > quick && !patience->has_place) {
-        patience->has_place = atomic_fetch_add(&app->evaluations, 1) < LONG_MOST;
+        patience->has_place = atomic_fetch_add(&app->evaluations, 1) < LONG_MAX;
         patience->is_crowded = !patience->has_place;
         if (patience->is_crowded)
             atomic_fetch_sub(&app->evaluations, 1);

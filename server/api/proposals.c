@@ -16,14 +16,14 @@
 #include "server/http/shield.h"
 #include "server/materials/measurement.h"
 
-enum { TESTS_MOST = 100, FORMATS = 2 };
+enum { TESTS_MAX = 100, FORMATS = 2 };
 
 static const char *const extensions[] = {"json", "svg", NULL};
 
 // The measurements that are taken in, with their numbers.
 typedef struct Taken {
-    StoredTest stored[TESTS_MOST];
-    Measurement tests[TESTS_MOST];
+    StoredTest stored[TESTS_MAX];
+    Measurement tests[TESTS_MAX];
     size_t count;
 } Taken;
 
@@ -40,11 +40,11 @@ static Status take(const char *slug, const MaterialState *state, uint64_t number
             return problem_set(problem, STATUS_USAGE,
                                "the query parameter \"measurements\" names %llu twice",
                                (unsigned long long)number);
-    if (taken->count == TESTS_MOST)
+    if (taken->count == TESTS_MAX)
         return problem_set(problem, STATUS_USAGE,
                            "at most %d measurements are taken in at a time: name them as "
                            "?measurements=1,2",
-                           TESTS_MOST);
+                           TESTS_MAX);
     if (number == 0 || number > state->measurements)
         return problem_set(problem, STATUS_NOT_FOUND,
                            "there is no measurement %llu of the material \"%.63s\"",
@@ -65,11 +65,11 @@ static Status load(Patience *patience, const char *slug, Taken *taken, Reply *re
         TRY(stored_test_load(patience->app->store, slug, taken->tests[i].number, &taken->stored[i],
                              problem));
         // Before there are more of them in memory.
-        if (evaluation_samples(taken->tests, i + 1) > EVALUATION_SAMPLES_MOST)
+        if (evaluation_samples(taken->tests, i + 1) > EVALUATION_SAMPLES_MAX)
             return problem_set(problem, STATUS_LIMIT,
                                "more than %d samples in traces: take in fewer measurements at a "
                                "time, as ?measurements=1,2",
-                               EVALUATION_SAMPLES_MOST);
+                               EVALUATION_SAMPLES_MAX);
     }
     return STATUS_OK;
 }

@@ -9,10 +9,10 @@
 
 Status query_text(const Request *request, const char *name, const char **text, Problem *problem) {
     *text = request_query(request, name);
-    if (*text != NULL && strlen(*text) > QUERY_TEXT_MOST)
+    if (*text != NULL && strlen(*text) > QUERY_TEXT_MAX)
         return problem_set(problem, STATUS_USAGE,
                            "the query parameter \"%s\" may have %d bytes, has %zu", name,
-                           QUERY_TEXT_MOST, strlen(*text));
+                           QUERY_TEXT_MAX, strlen(*text));
     if (*text != NULL && **text == '\0')
         *text = NULL;
     return STATUS_OK;

@@ -5,9 +5,9 @@
 
 #include "server/http/request.h"
 
-enum { QUERY_TEXT_MOST = 200 };
+enum { QUERY_TEXT_MAX = 200 };
 
-// The query's text, NULL where it is absent or empty; at most QUERY_TEXT_MOST bytes.
+// The query's text, NULL where it is absent or empty; at most QUERY_TEXT_MAX bytes.
 Status query_text(const Request *request, const char *name, const char **text, Problem *problem);
 
 // Which of `names` (NULL-terminated) it is; `initial` where it is absent.

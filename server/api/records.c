@@ -13,7 +13,7 @@
 #include "server/http/reply.h"
 #include "server/jobs/documents.h"
 
-enum { LIST_INITIAL = 50, LIST_MOST = 500 };
+enum { LIST_INITIAL = 50, LIST_MAX = 500 };
 
 // clang-format off
 static const Field row_fields[] = {
@@ -28,7 +28,7 @@ static const Field row_fields[] = {
     FIELD_TEXT(RecordRow, unit, 0, PRESENCE_OPTIONAL, 0, "of the file's numbers, as it was taken"),
     FIELD_TEXT(RecordRow, stated_unit, 0, PRESENCE_OPTIONAL, 0, "as the file tells it"),
     FIELD_REAL(RecordRow, interval, "s", ANY, OPTIONAL, "time between samples"),
-    FIELD_COUNT(RecordRow, count, NULL, AT_LEAST(1), OPTIONAL, "samples"),
+    FIELD_COUNT(RecordRow, count, NULL, AT_MIN(1), OPTIONAL, "samples"),
     FIELD_REAL(RecordRow, peak, "m/s^2", ANY, OPTIONAL, "the largest magnitude"),
     FIELD_REAL(RecordRow, peak_time, "s", ANY, OPTIONAL, "when"),
     FIELD_REAL(RecordRow, peak_velocity, "m/s", ANY, OPTIONAL, "of the base, from rest"),
@@ -115,7 +115,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     const char *words, *after;
     size_t limit;
     RecordRows rows;
-    TRY(request_count(request, "limit", 1, LIST_MOST, LIST_INITIAL, &limit, problem));
+    TRY(request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &limit, problem));
     TRY(query_text(request, "q", &words, problem));
     TRY(query_text(request, "after", &after, problem));
     // One more than asked for tells whether there is a next page.

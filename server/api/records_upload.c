@@ -19,8 +19,8 @@ typedef struct Asked {
     Reals samples;
 } Asked;
 
-#define INTERVAL_LEAST 1e-9
-#define INTERVAL_MOST 1e6
+#define INTERVAL_MIN 1e-9
+#define INTERVAL_MAX 1e6
 
 // clang-format off
 static const Field asked_fields[] = {
@@ -30,7 +30,7 @@ static const Field asked_fields[] = {
     FIELD_TEXT(Asked, earthquake, 200, PRESENCE_OPTIONAL, 0, "which one"),
     FIELD_TEXT(Asked, station, 200, PRESENCE_OPTIONAL, 0, "where it was measured, and in which direction"),
     FIELD_TEXT(Asked, notes, 4000, PRESENCE_OPTIONAL, 0, "what else one should know"),
-    FIELD_REAL(Asked, interval, "s", WITHIN(INTERVAL_LEAST, INTERVAL_MOST), REQUIRED, "time between samples"),
+    FIELD_REAL(Asked, interval, "s", WITHIN(INTERVAL_MIN, INTERVAL_MAX), REQUIRED, "time between samples"),
     FIELD_CHOICE(Asked, unit, import_unit_names, OPTIONAL, "of the samples: g, m/s^2 (if absent) or cm/s^2"),
     FIELD_REALS(Asked, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "base acceleration from the start on"),
     FIELD_END
@@ -76,7 +76,7 @@ static Status read_queries(const Request *request, Asked *asked, Problem *proble
     TRY(read_name(request, "earthquake", &asked->earthquake, problem));
     TRY(read_name(request, "station", &asked->station, problem));
     TRY(read_name(request, "notes", &asked->notes, problem));
-    TRY(request_number(request, "interval", INTERVAL_LEAST, INTERVAL_MOST, (double)NAN,
+    TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN,
                        &asked->interval, problem));
     const char *unit = request_query(request, "unit");
     for (int i = 0; unit != NULL && import_unit_names[i] != NULL; i++)

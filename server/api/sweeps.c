@@ -18,7 +18,7 @@
 #include "server/jobs/sweep_rows.h"
 
 // Up to so many bytes a text is made at once.
-enum { WHOLE_MOST = 4 << 20 };
+enum { WHOLE_MAX = 4 << 20 };
 
 // A path begins with a result, or with the job that makes it.
 static bool is_of_job(const Request *request) {
@@ -99,7 +99,7 @@ static Status refuse_changed(Problem *problem) {
 // The beginning at once: where that is all it can be kept, and compressed.
 static Status begin_text(Sending *sending, Problem *problem) {
     Bytes *made = &sending->made;
-    while (!sending->is_last && made->count < WHOLE_MOST && !made->is_failed)
+    while (!sending->is_last && made->count < WHOLE_MAX && !made->is_failed)
         sending->is_last = !sending->next(&sending->text, made);
     return sending->text.is_broken ? refuse_changed(problem)
            : made->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the table")

@@ -13,7 +13,7 @@
 #include "server/http/reply.h"
 
 // Up to so many bytes an answer is made at once: then it can be kept, and compressed.
-enum { WHOLE_MOST = 4 << 20 };
+enum { WHOLE_MAX = 4 << 20 };
 
 static const double outcome_wait_most = 60; // [s]
 
@@ -187,9 +187,9 @@ static Status reply_stream(Reply *reply, const char *content_type, Sheet *sheet,
     return STATUS_OK;
 }
 
-// Whether a text can be no longer than WHOLE_MOST.
+// Whether a text can be no longer than WHOLE_MAX.
 static bool is_short(const Table *table) {
-    const size_t most = WHOLE_MOST / (SHORTEST_SIZE + 1);
+    const size_t most = WHOLE_MAX / (SHORTEST_SIZE + 1);
     return table->count <= most / (table->column_count + 1);
 }
 
@@ -222,7 +222,7 @@ Status tables_reply(App *app, Reply *reply, const Encoder *encoder, Sheet *sheet
         sheet_clear(sheet);
         return status;
     }
-    if (encoding_size(sheet->encoding) <= WHOLE_MOST)
+    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
         return reply_whole(app, reply, encoder->content_type, sheet, problem);
     return reply_stream(reply, encoder->content_type, sheet, problem);
 }
@@ -235,7 +235,7 @@ Status tables_reply_layout(App *app, Reply *reply, const char *content_type, Lay
         sheet_clear(sheet);
         return status;
     }
-    if (encoding_size(sheet->encoding) <= WHOLE_MOST)
+    if (encoding_size(sheet->encoding) <= WHOLE_MAX)
         return reply_whole(app, reply, content_type, sheet, problem);
     return reply_stream(reply, content_type, sheet, problem);
 }

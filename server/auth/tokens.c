@@ -19,7 +19,7 @@
 
 enum {
     FOLLOW_MS = 500,
-    UNKNOWN_MOST = 16, // looks in that time for tokens that are not in the table
+    UNKNOWN_MAX = 16, // looks in that time for tokens that are not in the table
     USED_MS = 60000,
 };
 
@@ -197,7 +197,7 @@ static void *follow(void *context) {
         pthread_mutex_lock(&tokens->looking);
         (void)look(tokens, NULL);
         pthread_mutex_unlock(&tokens->looking);
-        atomic_store(&tokens->looks_left, UNKNOWN_MOST);
+        atomic_store(&tokens->looks_left, UNKNOWN_MAX);
         pthread_mutex_lock(&tokens->ending);
     }
     pthread_mutex_unlock(&tokens->ending);
@@ -211,7 +211,7 @@ Status tokens_open(Store *store, bool are_required, Tokens **tokens, Problem *pr
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tokens");
     made->store = store;
     made->are_required = are_required;
-    atomic_init(&made->looks_left, UNKNOWN_MOST);
+    atomic_init(&made->looks_left, UNKNOWN_MAX);
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);

@@ -106,7 +106,7 @@ void bytes_reals(Bytes *bytes, const double *values, size_t count) {
 // surrogate, too large.
 static size_t character_length(const unsigned char *text) {
     static const struct {
-        unsigned char first, last, second_least, second_most, length;
+        unsigned char first, last, second_min, second_max, length;
     } forms[] = {{0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
                  {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3},
                  {0xEE, 0xEF, 0x80, 0xBF, 3}, {0xF0, 0xF0, 0x90, 0xBF, 4},
@@ -116,7 +116,7 @@ static size_t character_length(const unsigned char *text) {
     for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
         if (text[0] < forms[i].first || text[0] > forms[i].last)
             continue;
-        if (text[1] < forms[i].second_least || text[1] > forms[i].second_most)
+        if (text[1] < forms[i].second_min || text[1] > forms[i].second_max)
             return 0;
         for (size_t k = 2; k < forms[i].length; k++)
             if ((text[k] & 0xC0) != 0x80)

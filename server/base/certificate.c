@@ -12,11 +12,11 @@
 
 #include "server/base/clock.h"
 
-enum { CHAIN_MOST = 32 };
+enum { CHAIN_MAX = 32 };
 
 typedef struct Certificate {
     struct Certificate *before;
-    gnutls_pcert_st chain[CHAIN_MOST];
+    gnutls_pcert_st chain[CHAIN_MAX];
     unsigned count;
     gnutls_privkey_t key;
 } Certificate;
@@ -84,7 +84,7 @@ Status certificate_use(const char *cert, const char *cert_path, const char *key,
     Certificate *made = calloc(1, sizeof *made);
     if (made == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the certificate");
-    unsigned count = CHAIN_MOST;
+    unsigned count = CHAIN_MAX;
     int code =
         gnutls_pcert_list_import_x509_raw(made->chain, &count, &cert_text, GNUTLS_X509_FMT_PEM, 0);
     if (code >= 0) {

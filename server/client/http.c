@@ -144,11 +144,11 @@ static size_t header_take(char *line, size_t one, size_t count, void *of) {
     const size_t size = one * count;
     char value[256];
     transfer->headers += size;
-    if (transfer->headers > HTTP_HEADERS_MOST) {
+    if (transfer->headers > HTTP_HEADERS_MAX) {
         transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
                                        "%s answers with more than %d bytes of headers: this is "
                                        "no impactd",
-                                       transfer->http->url, HTTP_HEADERS_MOST);
+                                       transfer->http->url, HTTP_HEADERS_MAX);
         return 0;
     }
     if (size > 5 && strncmp(line, "HTTP/", 5) == 0) { // a new answer begins, behind a 1xx
@@ -209,7 +209,7 @@ static size_t body_take(char *piece, size_t one, size_t count, void *of) {
         return size;
     transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
                                    "%s answers with a document of more than %d bytes",
-                                   transfer->http->url, HTTP_DOCUMENT_MOST);
+                                   transfer->http->url, HTTP_DOCUMENT_MAX);
     return 0;
 }
 
@@ -361,7 +361,7 @@ static Status attempt(Transfer *transfer, const char *url, bool *is_cut, Problem
 }
 
 Status http_ask(Http *http, const HttpAsk *ask, HttpAnswer *answer, Problem *problem) {
-    *answer = (HttpAnswer){.retry_after = -1, .body.most = HTTP_DOCUMENT_MOST};
+    *answer = (HttpAnswer){.retry_after = -1, .body.most = HTTP_DOCUMENT_MAX};
     Transfer transfer = {.http = http, .ask = ask, .answer = answer, .problem = problem};
     Bytes url = {.most = 16384};
     bytes_text(&url, http->url);

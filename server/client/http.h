@@ -10,9 +10,9 @@
 #include "server/base/bytes.h"
 
 enum {
-    HTTP_DOCUMENT_MOST = 64 << 20, // [B] of a body that is kept in memory
-    HTTP_HEADERS_MOST = 64 << 10,  // [B] of all headers of an answer
-    HTTP_SILENCE = 60,             // [s] without a byte, after which a server is given up
+    HTTP_DOCUMENT_MAX = 64 << 20, // [B] of a body that is kept in memory
+    HTTP_HEADERS_MAX = 64 << 10,  // [B] of all headers of an answer
+    HTTP_SILENCE = 60,            // [s] without a byte, after which a server is given up
 };
 
 typedef struct HttpServer {

@@ -32,8 +32,8 @@ static Status file_read(const char *path, char *text, size_t size, Problem *prob
     return status;
 }
 
-Status token_read(const char *path, char token[TOKEN_MOST + 1], Problem *problem) {
-    char text[TOKEN_MOST + 64] = "";
+Status token_read(const char *path, char token[TOKEN_MAX + 1], Problem *problem) {
+    char text[TOKEN_MAX + 64] = "";
     const char *source = path != NULL ? "--token-file" : "IMPACTD_TOKEN";
     const char *given = getenv("IMPACTD_TOKEN");
     if (path != NULL)
@@ -44,11 +44,11 @@ Status token_read(const char *path, char token[TOKEN_MOST + 1], Problem *problem
     token[0] = '\0';
     const size_t length = strlen(text);
     // The token itself is not told.
-    if (length > TOKEN_MOST || text[strspn(text, allowed)] != '\0' || (path != NULL && length == 0))
+    if (length > TOKEN_MAX || text[strspn(text, allowed)] != '\0' || (path != NULL && length == 0))
         return problem_add(problem, STATUS_USAGE, source,
                            "must hold a token: 1 to %d letters, digits and -._~+/= on its first "
                            "line",
-                           TOKEN_MOST);
+                           TOKEN_MAX);
     memcpy(token, text, length + 1);
     return STATUS_OK;
 }

@@ -5,9 +5,9 @@
 
 #include "core/base/status.h"
 
-enum { TOKEN_MOST = 512 };
+enum { TOKEN_MAX = 512 };
 
 // Reads the first line of `path`, or, where that is NULL, IMPACTD_TOKEN; "" if there is neither.
-Status token_read(const char *path, char token[TOKEN_MOST + 1], Problem *problem);
+Status token_read(const char *path, char token[TOKEN_MAX + 1], Problem *problem);
 
 #endif

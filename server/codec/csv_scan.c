@@ -21,7 +21,7 @@ static CsvCell *add_cell(CsvScan *scan) {
     if (scan->count == scan->room) {
         const size_t room = scan->room > 0 ? 2 * scan->room : 64;
         CsvCell *grown =
-            scan->count < CSV_CELLS_MOST ? realloc(scan->cells, room * sizeof *grown) : NULL;
+            scan->count < CSV_CELLS_MAX ? realloc(scan->cells, room * sizeof *grown) : NULL;
         if (grown == NULL)
             return NULL;
         scan->cells = grown;

@@ -5,7 +5,7 @@
 
 #include "server/base/bytes.h"
 
-enum { CSV_CELLS_MOST = 1000 };
+enum { CSV_CELLS_MAX = 1000 };
 
 typedef struct CsvCell {
     const char *text; // without its quotes; NUL-terminated
@@ -22,7 +22,7 @@ typedef struct CsvScan {
     CsvCell *cells;
     size_t count, room;
     Bytes texts;
-    bool is_failed; // no memory, or a row of more than CSV_CELLS_MOST cells
+    bool is_failed; // no memory, or a row of more than CSV_CELLS_MAX cells
 } CsvScan;
 
 // The next row that has anything in it, until the call after; false behind the last, or

@@ -62,7 +62,7 @@ static void put_json(Bytes *bytes, const json_t *value) {
 
 // NULL where there is none, or it is too long.
 static char *text_of(const json_t *value, bool *is_long) {
-    Bytes bytes = {.most = DIFFER_VALUE_MOST};
+    Bytes bytes = {.most = DIFFER_VALUE_MAX};
     if (value == NULL)
         return NULL;
     put_json(&bytes, value);
@@ -88,7 +88,7 @@ static void say_long(const json_t *a, const json_t *b, char *text, size_t size) 
 
 static void add(Walk *walk, const char *pointer, const json_t *a, const json_t *b) {
     Differences *differences = walk->differences;
-    if (differences->count == DIFFER_MOST) {
+    if (differences->count == DIFFER_MAX) {
         differences->more++;
         return;
     }

@@ -8,18 +8,18 @@
 #include "core/base/status.h"
 #include "server/base/bytes.h"
 
-enum { DIFFER_MOST = 200, DIFFER_VALUE_MOST = 400 };
+enum { DIFFER_MAX = 200, DIFFER_VALUE_MAX = 400 };
 
 // One place; where a value is missing, or an array's rest is, there is none.
 typedef struct Difference {
     char *pointer;
-    char *a, *b;  // JSON text; NULL: not there, or longer than DIFFER_VALUE_MOST
+    char *a, *b;  // JSON text; NULL: not there, or longer than DIFFER_VALUE_MAX
     char *detail; // for people, where a value is not shown; NULL
 } Difference;
 
 typedef struct Differences {
     Difference *at;
-    size_t count; // at most DIFFER_MOST
+    size_t count; // at most DIFFER_MAX
     size_t more;  // beyond
 } Differences;
 

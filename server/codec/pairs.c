@@ -99,7 +99,7 @@ static bool element_walk(const json_t *element, const char *place, Pairs *pairs)
     if (json_is_string(element) || json_object_get(element, "a") != NULL)
         return walk(element, place, place + 1, pairs);
     // Numbers by the thousand are for programs.
-    if (!json_is_object(element) || pairs->count >= PAIRS_MOST)
+    if (!json_is_object(element) || pairs->count >= PAIRS_MAX)
         return true;
     Bytes rest = {.most = 1000};
     rest_put(&rest, element, "");
@@ -110,7 +110,7 @@ static bool element_walk(const json_t *element, const char *place, Pairs *pairs)
 
 static bool walk(const json_t *value, const char *place, const char *key, Pairs *pairs) {
     char text[PAIRS_TEXT], inner[256];
-    if (pairs->count >= PAIRS_MOST)
+    if (pairs->count >= PAIRS_MAX)
         return true;
     if (json_is_object(value))
         return object_walk(value, place, key, pairs);
@@ -165,7 +165,7 @@ Status listing_read(const char *text, size_t size, const char *list, const char 
         listing->columns++;
     Status status = document_read(text, size, &root, problem);
     const json_t *rows = json_object_get(root, list);
-    const size_t most = PAIRS_MOST,
+    const size_t most = PAIRS_MAX,
                  count = json_array_size(rows) < most ? json_array_size(rows) : most;
     if (status == STATUS_OK && count > 0) {
         listing->cells = calloc(count * listing->columns, sizeof *listing->cells);

@@ -7,7 +7,7 @@
 
 #include "core/base/field.h"
 
-enum { PAIRS_MOST = 2000, PAIRS_TEXT = 160, LISTING_CELL = 32 };
+enum { PAIRS_MAX = 2000, PAIRS_TEXT = 160, LISTING_CELL = 32 };
 
 typedef struct Pair {
     char *name;  // "peak_displacement", or the pointer of an input

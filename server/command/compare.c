@@ -14,7 +14,7 @@ typedef struct CompareSettings {
 // clang-format off
 static const Field compare_fields[] = {
     DAEMON_ROWS(CompareSettings),
-    FIELD_REAL(CompareSettings, wait, "s", AT_LEAST(0), 60, "wait so long for a busy daemon"),
+    FIELD_REAL(CompareSettings, wait, "s", AT_MIN(0), 60, "wait so long for a busy daemon"),
     FIELD_FLAG(CompareSettings, json, false, "print what the daemon answers, as JSON"),
     FIELD_END,
 };

@@ -24,7 +24,7 @@ static const char *setting(const char *given, const char *name, const char *usua
 
 Status daemon_open(const char *server, const char *token_file, const char *ca_file, double wait,
                    Daemon *daemon, Problem *problem) {
-    char token[TOKEN_MOST + 1];
+    char token[TOKEN_MAX + 1];
     output_guard();
     *daemon = (Daemon){.until_ns = clock_monotonic_ns() +
                                    (int64_t)(1e9 * (wait < forever ? wait : forever))};
@@ -204,7 +204,7 @@ static Status events_take(void *context, const void *bytes, size_t size, Problem
 // Shows what the server tells of the job for as long as it does. False where it has no such stream:
 // it is not asked for it again.
 static bool events_follow(Daemon *daemon, const char *id, Show *show) {
-    enum { EVENTS_MOST = 256 << 20 }; // [B]
+    enum { EVENTS_MAX = 256 << 20 }; // [B]
     char path[160];
     HttpAnswer answer;
     Problem *ignored = NULL; // the look that follows tells what is wrong
@@ -214,7 +214,7 @@ static bool events_follow(Daemon *daemon, const char *id, Show *show) {
                          .path = path,
                          .take = events_take,
                          .context = &events,
-                         .most = EVENTS_MOST,
+                         .most = EVENTS_MAX,
                          .within = daemon_left(daemon)};
     (void)http_ask(daemon->http, &ask, &answer, ignored);
     const bool is_there = are_events(&answer);

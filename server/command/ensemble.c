@@ -21,9 +21,9 @@ static const Field ensemble_fields[] = {
     FIELD_TEXTS(EnsembleSettings, output, NULL, NULL, STUDY_OUTPUTS, PRESENCE_OPTIONAL, 0,
                 "write to this file, .json the whole, .csv the runs or .svg the chart; may be "
                 "given again"),
-    FIELD_COUNT(EnsembleSettings, runs, NULL, AT_LEAST(0), OPTIONAL,
+    FIELD_COUNT(EnsembleSettings, runs, NULL, AT_MIN(0), OPTIONAL,
                 "runs, under a target at most so many (64)"),
-    FIELD_COUNT(EnsembleSettings, first_seed, NULL, AT_LEAST(0), OPTIONAL,
+    FIELD_COUNT(EnsembleSettings, first_seed, NULL, AT_MIN(0), OPTIONAL,
                 "seed of the first (the scene's own)"),
     FIELD_REAL(EnsembleSettings, target, NULL, ANY, OPTIONAL,
                "relative error wanted of the metric's mean: no more runs than keep it"),

@@ -21,11 +21,11 @@ static const Field get_fields[] = {
     DAEMON_ROWS(GetSettings),
     FIELD_TEXT(GetSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file; its extension is the format (standard output)"),
     FIELD_TEXT(GetSettings, channels, 4000, PRESENCE_OPTIONAL, 0, "of the series: these, with commas between (all)"),
-    FIELD_REAL(GetSettings, from, "s", AT_LEAST(0), OPTIONAL, "of the series: from here on"),
-    FIELD_REAL(GetSettings, to, "s", AT_LEAST(0), OPTIONAL, "of the series: to here, this sample too"),
-    FIELD_COUNT(GetSettings, points, NULL, AT_LEAST(1), OPTIONAL, "of the series: so many buckets, each with its least and largest value"),
-    FIELD_REAL(GetSettings, wait, "s", AT_LEAST(0), 0, "wait so long for an unfinished job and a busy daemon (0)"),
-    FIELD_COUNT(GetSettings, max_bytes, "B", AT_LEAST(1), 17179869184.0, "more is refused"),
+    FIELD_REAL(GetSettings, from, "s", AT_MIN(0), OPTIONAL, "of the series: from here on"),
+    FIELD_REAL(GetSettings, to, "s", AT_MIN(0), OPTIONAL, "of the series: to here, this sample too"),
+    FIELD_COUNT(GetSettings, points, NULL, AT_MIN(1), OPTIONAL, "of the series: so many buckets, each with its least and largest value"),
+    FIELD_REAL(GetSettings, wait, "s", AT_MIN(0), 0, "wait so long for an unfinished job and a busy daemon (0)"),
+    FIELD_COUNT(GetSettings, max_bytes, "B", AT_MIN(1), 17179869184.0, "more is refused"),
     FIELD_END,
 };
 // clang-format on
@@ -35,7 +35,7 @@ static const char *const binary[] = {"npy", "npz", "mat", "zip", NULL};
 // These have one form, and no extension in their path.
 static const char *const plain[] = {"result", "job", "manifest", NULL};
 
-enum { WHAT_MOST = 100 };
+enum { WHAT_MAX = 100 };
 
 static bool is_among(const char *const *texts, const char *text) {
     for (size_t i = 0; texts[i] != NULL; i++)
@@ -53,14 +53,14 @@ static const char *extension_of(const char *path) {
 
 static bool is_what(const char *what) {
     const size_t length = strlen(what);
-    return length > 0 && length < WHAT_MOST && what[0] != '/' && strstr(what, "..") == NULL &&
+    return length > 0 && length < WHAT_MAX && what[0] != '/' && strstr(what, "..") == NULL &&
            strstr(what, "//") == NULL &&
            strspn(what, "abcdefghijklmnopqrstuvwxyz0123456789_-./") == length;
 }
 
 // "series.csv" of what was typed and of the output's name. Nothing typed is the result itself, or
 // what a file of that kind can only mean.
-static Status choose(const GetSettings *settings, const Options *options, char what[WHAT_MOST + 8],
+static Status choose(const GetSettings *settings, const Options *options, char what[WHAT_MAX + 8],
                      Problem *problem) {
     const char *extension = settings->output != NULL ? extension_of(settings->output) : NULL;
     if (settings->output != NULL && (extension == NULL || !is_among(formats, extension)))
@@ -86,7 +86,7 @@ static Status choose(const GetSettings *settings, const Options *options, char w
         return problem_add(problem, STATUS_USAGE, "--output", "must end in .json for the %s",
                            typed);
     const bool is_bare = is_among(plain, typed) || extension_of(typed) != NULL;
-    snprintf(what, WHAT_MOST + 8, "%s%s%s", typed, is_bare ? "" : ".",
+    snprintf(what, WHAT_MAX + 8, "%s%s%s", typed, is_bare ? "" : ".",
              is_bare                        ? ""
              : strcmp(typed, "bundle") == 0 ? "zip"
              : extension != NULL            ? extension
@@ -163,7 +163,7 @@ static Status fetch(Daemon *daemon, const GetSettings *settings, const char *id,
 
 static int get(void *of, const Options *options, Problem *problem) {
     const GetSettings *settings = of;
-    char what[WHAT_MOST + 8] = "";
+    char what[WHAT_MAX + 8] = "";
     Status status = STATUS_OK;
     if (options->operand_count < 1 || options->operand_count > 2 ||
         !daemon_is_id(options->operands[0]))

@@ -13,7 +13,7 @@ static const char *const statuses[] = {"draft", "approved", "deprecated", NULL};
 // clang-format off
 static const Field materials_fields[] = {
     DAEMON_ROWS(MaterialsSettings),
-    FIELD_REAL(MaterialsSettings, wait, "s", AT_LEAST(0), 60, "wait so long for a busy daemon"),
+    FIELD_REAL(MaterialsSettings, wait, "s", AT_MIN(0), 60, "wait so long for a busy daemon"),
     FIELD_FLAG(MaterialsSettings, json, false, "print what the daemon answers, as JSON"),
     FIELD_TEXT(MaterialsSettings, q, 200, PRESENCE_OPTIONAL, 0, "words in slug, name, kind, supplier, source, tags or notes"),
     FIELD_TEXT(MaterialsSettings, kind, 60, PRESENCE_OPTIONAL, 0, "those of one kind: foam, rubber, metal ..."),
@@ -22,9 +22,9 @@ static const Field materials_fields[] = {
     FIELD_TEXT(MaterialsSettings, T_c, 60, PRESENCE_OPTIONAL, 0, "those whose contact time in s lies in a range"),
     FIELD_FLAG(MaterialsSettings, editable, false, "what the revision says and nothing else, as revise takes it"),
     FIELD_TEXT(MaterialsSettings, comment, 1000, PRESENCE_OPTIONAL, 0, "why, for those who come later"),
-    FIELD_COUNT(MaterialsSettings, from, NULL, AT_LEAST(1), OPTIONAL, "the newest revision you saw: nothing is written if there is a newer one"),
+    FIELD_COUNT(MaterialsSettings, from, NULL, AT_MIN(1), OPTIONAL, "the newest revision you saw: nothing is written if there is a newer one"),
     FIELD_TEXT(MaterialsSettings, reason, 1000, PRESENCE_OPTIONAL, 0, "why it is approved or deprecated"),
-    FIELD_TEXTS(MaterialsSettings, trace, NULL, NULL, TRACES_MOST, PRESENCE_OPTIONAL, 0, "a force trace's file: a time in s and a force in N, or the force alone; may be given again"),
+    FIELD_TEXTS(MaterialsSettings, trace, NULL, NULL, TRACES_MAX, PRESENCE_OPTIONAL, 0, "a force trace's file: a time in s and a force in N, or the force alone; may be given again"),
     FIELD_REAL(MaterialsSettings, interval, "s", ABOVE(0), OPTIONAL, "between samples, where a trace has forces alone"),
     FIELD_FLAG(MaterialsSettings, dry_run, false, "show what would come of it; keep nothing"),
     FIELD_TEXT(MaterialsSettings, measurements, 4000, PRESENCE_OPTIONAL, 0, "the numbers of those that count, as 1,2 (all)"),

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/drop_test/pair_parameters.h"
 #include "core/drop_test/evaluation.h"
+#include "core/drop_test/pair_parameters.h"
 #include "core/scene/buffer.h"
 #include "core/scene/material.h"
 #include "server/codec/amend.h"
@@ -14,11 +14,11 @@
 #include "server/command/scene_file.h"
 #include "server/command/sheet.h"
 
-enum { NUMBER_MOST = 9 }; // digits of a revision
+enum { NUMBER_MAX = 9 }; // digits of a revision
 
 static bool is_number(const char *text) {
     const size_t size = strlen(text);
-    return size > 0 && size <= NUMBER_MOST && text[0] != '0' && strspn(text, "0123456789") == size;
+    return size > 0 && size <= NUMBER_MAX && text[0] != '0' && strspn(text, "0123456789") == size;
 }
 
 Status materials_number(const char *text, const char *what, Problem *problem) {
@@ -29,7 +29,7 @@ Status materials_number(const char *text, const char *what, Problem *problem) {
 }
 
 Status materials_name(const char *text, bool may_have_revision, Problem *problem) {
-    char slug[MATERIAL_SLUG_MOST + 1];
+    char slug[MATERIAL_SLUG_MAX + 1];
     const size_t length = strcspn(text, "@");
     snprintf(slug, sizeof slug, "%.*s", (int)(length < sizeof slug ? length : 0), text);
     const bool has_revision = text[length] == '@';
@@ -37,7 +37,7 @@ Status materials_name(const char *text, bool may_have_revision, Problem *problem
         return problem_set(problem, STATUS_USAGE,
                            "a material is named by 1 to %d lower-case letters, digits, underscores "
                            "and dashes%s, is \"%.80s\"",
-                           MATERIAL_SLUG_MOST, may_have_revision ? ", perhaps with @REVISION" : "",
+                           MATERIAL_SLUG_MAX, may_have_revision ? ", perhaps with @REVISION" : "",
                            text);
     if (!has_revision)
         return STATUS_OK;
@@ -90,9 +90,9 @@ Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
     }
     Status status = outline_read(answer->body.at, answer->body.count, &way, &outline, NULL);
     for (size_t i = 0; i < outline.count; i++)
-        if (outline.at[i].has_heads && outline.at[i].rows == MATERIALS_MOST + 1)
+        if (outline.at[i].has_heads && outline.at[i].rows == MATERIALS_MAX + 1)
             fprintf(stderr, "impactd materials: the first %d; narrow it down to see others\n",
-                    MATERIALS_MOST);
+                    MATERIALS_MAX);
     if (status == STATUS_OK && outline.count == 0)
         fputs("impactd materials: nothing fits\n", stderr);
     else if (status == STATUS_OK)

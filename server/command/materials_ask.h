@@ -33,7 +33,7 @@ typedef struct MaterialsCall {
     const char *about; // what faults are told of; the action may name a file
 } MaterialsCall;
 
-enum { MATERIALS_MOST = 1000 }; // of a list that is asked for
+enum { MATERIALS_MAX = 1000 }; // of a list that is asked for
 
 // Whether `text` is a slug, or where that is allowed SLUG@REVISION. STATUS_USAGE says what would be
 // right.

@@ -30,7 +30,7 @@ static Status get(MaterialsCall *call, Bytes *path, Problem *problem) {
 
 static void most_put(Bytes *path) {
     char most[16];
-    snprintf(most, sizeof most, "%d", MATERIALS_MOST);
+    snprintf(most, sizeof most, "%d", MATERIALS_MAX);
     materials_query(path, "limit", most);
 }
 

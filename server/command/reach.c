@@ -76,7 +76,7 @@ static Status add_names(const ReachSettings *settings, const Address *address, R
 
 static Status read_file(const char *name, const char *path, bool is_secret, char **text,
                         Problem *problem) {
-    enum { PEM_MOST = 1 << 20 };
+    enum { PEM_MAX = 1 << 20 };
     struct stat facts;
     FILE *file = fopen(path, "rb");
     if (file == NULL)
@@ -87,7 +87,7 @@ static Status read_file(const char *name, const char *path, bool is_secret, char
         status = problem_add(problem, STATUS_USAGE, name,
                              "may be read by everyone on this machine; chmod 600 %s", path);
     char piece[4096];
-    Bytes bytes = {.most = PEM_MOST};
+    Bytes bytes = {.most = PEM_MAX};
     for (size_t count; !bytes.is_failed && (count = fread(piece, 1, sizeof piece, file)) > 0;)
         bytes_put(&bytes, piece, count);
     fclose(file);

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/formats/ground_motion_text.h"
 #include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/client/told_record.h"
 #include "server/command/daemon.h"
 #include "server/command/scene_file.h"
@@ -33,7 +33,7 @@ static const Field records_fields[] = {
     FIELD_TEXT(RecordsSettings, notes, 4000, PRESENCE_OPTIONAL, 0, "add: what else one should know"),
     FIELD_TEXT(RecordsSettings, q, 200, PRESENCE_OPTIONAL, 0, "list: those alone that have this text in their words"),
     FIELD_FLAG(RecordsSettings, json, false, "list and add: print what the daemon answers"),
-    FIELD_REAL(RecordsSettings, wait, "s", AT_LEAST(0), 0, "wait so long for a busy daemon (0)"),
+    FIELD_REAL(RecordsSettings, wait, "s", AT_MIN(0), 0, "wait so long for a busy daemon (0)"),
     FIELD_END,
 };
 // clang-format on

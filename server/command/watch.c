@@ -11,7 +11,7 @@ typedef struct WatchSettings {
 // clang-format off
 static const Field watch_fields[] = {
     DAEMON_ROWS(WatchSettings),
-    FIELD_REAL(WatchSettings, wait, "s", AT_LEAST(0), 1e9, "watch so long at most (without end)"),
+    FIELD_REAL(WatchSettings, wait, "s", AT_MIN(0), 1e9, "watch so long at most (without end)"),
     FIELD_FLAG(WatchSettings, json, false, "print the finished job as JSON in place of lines"),
     FIELD_END,
 };

@@ -92,11 +92,11 @@ static void fit(Chart *chart) {
     }
     plot_fit_point(plot, cpu, chart->tradeoff->error);
     // Nothing at all, or errors of 0 alone.
-    if (!(plot->x_most > 0))
+    if (!(plot->x_max > 0))
         plot_fit_point(plot, cpu, 0.1);
     for (size_t i = 0; i < chart->tradeoff->points.count; i++)
         if (is_drawn(chart, &chart->tradeoff->points.at[i]))
-            plot_fit_point(plot, chart->tradeoff->points.at[i].cpu_minimum, plot->y_most);
+            plot_fit_point(plot, chart->tradeoff->points.at[i].cpu_minimum, plot->y_max);
 }
 
 static int by_cpu(const void *a, const void *b) {

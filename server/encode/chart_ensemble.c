@@ -141,7 +141,7 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
     plot_begin(&plot);
     for (size_t i = 0; i < drawn(ensemble); i++)
         plot_fit(&plot, &ensemble->frequency, &ensemble->spectra.at[i].mean);
-    const bool has_spectra = plot.x_most > plot.x_least;
+    const bool has_spectra = plot.x_max > plot.x_min;
     const double from = has_spectra ? bottom + 62 : top + 12;
     const double height = from + row_height * ENSEMBLE_STATISTICS + 12;
     char text[96];

@@ -142,7 +142,7 @@ static void put_panel(const Evaluation *evaluation, Panel panel, int index, Byte
                  panel.name, of->mean, panel.unit, of->low, of->high, (unsigned long long)of->count,
                  of->count == 1 ? "" : "s");
     svg_heading(bytes, left, plot.top - 18, text);
-    if (!(plot.x_most > plot.x_least) || !plot_axes(&plot))
+    if (!(plot.x_max > plot.x_min) || !plot_axes(&plot))
         return;
     put_mean(&plot, &panel);
     for (size_t i = 0; i < evaluation->rows.count && i < ROWS_DRAWN; i++)

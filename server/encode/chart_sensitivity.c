@@ -80,7 +80,7 @@ void chart_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
         plot_fit(&plot, &sensitivity->frequency, &sensitivity->spectra.at[i].value);
         plot_fit(&plot, &sensitivity->frequency, &sensitivity->spectra.at[i].q95);
     }
-    const double top = plot.x_most > plot.x_least ? 420 : 60;
+    const double top = plot.x_max > plot.x_min ? 420 : 60;
     const double height = top + row_height * (ENSEMBLE_STATISTICS + 2);
     svg_open(bytes, width, height, "Sensitivity");
     bytes_format(bytes,

@@ -19,9 +19,9 @@ typedef struct ExchangeText {
     bool is_table;
     bool has_begun;
     ExchangeStage stage;
-    size_t measurements;               // of this material so far
-    char slug[MATERIAL_SLUG_MOST + 1]; // the material's; "" before the first
-    uint64_t number;                   // of its last revision, or measurement
+    size_t measurements;              // of this material so far
+    char slug[MATERIAL_SLUG_MAX + 1]; // the material's; "" before the first
+    uint64_t number;                  // of its last revision, or measurement
 } ExchangeText;
 
 Status exchange_text_open(Store *store, bool is_table, ExchangeText *text, Problem *problem);

@@ -23,7 +23,7 @@ enum {
 };
 
 // Of one variable: readers take sizes as signed numbers of 32 bits.
-static const uint64_t variable_most = 0x7fffffff;
+static const uint64_t variable_max = 0x7fffffff;
 
 static bool is_letter(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -44,7 +44,7 @@ static Status open_variable(Layout *layout, const char *name, size_t rows, Probl
     mat_name(name, known);
     const size_t length = strlen(known), padding = (8 - length % 8) % 8;
     const uint64_t size = 16 + 16 + 8 + length + padding + 8 + 8 * (uint64_t)rows;
-    if (size > variable_most)
+    if (size > variable_max)
         return problem_set(problem, STATUS_LIMIT,
                            "%s has %zu values, more than a variable of such a file can hold: ask "
                            "for a shorter time, or for .npy",

@@ -7,7 +7,7 @@
 #include "server/encode/zip.h"
 
 static Status put(Zip *zip, const char *name, const Layout *array, Problem *problem) {
-    char file[ZIP_NAME_MOST + 1];
+    char file[ZIP_NAME_MAX + 1];
     snprintf(file, sizeof file, "%.74s.npy", name);
     return zip_put(zip, file, array, problem);
 }

@@ -8,8 +8,8 @@
 enum { COLUMNS = 1300, LABELS = 8, TICKS = 12 };
 
 void plot_begin(Plot *plot) {
-    plot->x_least = plot->y_least = DBL_MAX;
-    plot->x_most = plot->y_most = -DBL_MAX;
+    plot->x_min = plot->y_min = DBL_MAX;
+    plot->x_max = plot->y_max = -DBL_MAX;
 }
 
 static bool is_shown(const Plot *plot, double x, double y) {
@@ -19,10 +19,10 @@ static bool is_shown(const Plot *plot, double x, double y) {
 void plot_fit_point(Plot *plot, double x, double y) {
     if (!is_shown(plot, x, y))
         return;
-    plot->x_least = fmin(plot->x_least, x);
-    plot->x_most = fmax(plot->x_most, x);
-    plot->y_least = fmin(plot->y_least, y);
-    plot->y_most = fmax(plot->y_most, y);
+    plot->x_min = fmin(plot->x_min, x);
+    plot->x_max = fmax(plot->x_max, x);
+    plot->y_min = fmin(plot->y_min, y);
+    plot->y_max = fmax(plot->y_max, y);
 }
 
 void plot_fit(Plot *plot, const Reals *x, const Reals *y) {
@@ -32,15 +32,15 @@ void plot_fit(Plot *plot, const Reals *x, const Reals *y) {
 
 double plot_x(const Plot *plot, double x) {
     const double share = plot->is_logarithmic
-                             ? log(x / plot->x_least) / log(plot->x_most / plot->x_least)
-                             : (x - plot->x_least) / (plot->x_most - plot->x_least);
+                             ? log(x / plot->x_min) / log(plot->x_max / plot->x_min)
+                             : (x - plot->x_min) / (plot->x_max - plot->x_min);
     return plot->left + (plot->right - plot->left) * share;
 }
 
 double plot_y(const Plot *plot, double y) {
-    double share = (y - plot->y_least) / (plot->y_most - plot->y_least);
+    double share = (y - plot->y_min) / (plot->y_max - plot->y_min);
     if (plot->is_logarithmic)
-        share = y > 0 ? log(y / plot->y_least) / log(plot->y_most / plot->y_least) : 0;
+        share = y > 0 ? log(y / plot->y_min) / log(plot->y_max / plot->y_min) : 0;
     return plot->bottom - (plot->bottom - plot->top) * fmin(fmax(share, 0), 1);
 }
 
@@ -91,8 +91,8 @@ static double tick_step(double span) {
 }
 
 static void put_steps(const Plot *plot, bool is_x) {
-    const double from = is_x ? plot->x_least : plot->y_least;
-    const double to = is_x ? plot->x_most : plot->y_most, step = tick_step(to - from);
+    const double from = is_x ? plot->x_min : plot->y_min;
+    const double to = is_x ? plot->x_max : plot->y_max, step = tick_step(to - from);
     const double first = ceil(from / step - 1e-9);
     for (int i = 0; i < TICKS && (first + i) * step <= to + 1e-9 * step; i++)
         if (put_grid(plot, is_x, (first + i) * step, true))
@@ -100,28 +100,28 @@ static void put_steps(const Plot *plot, bool is_x) {
 }
 
 bool plot_axes(Plot *plot) {
-    if (!(plot->x_most > plot->x_least) && !(plot->has_whole_decades && plot->x_most > 0))
+    if (!(plot->x_max > plot->x_min) && !(plot->has_whole_decades && plot->x_max > 0))
         return false;
     if (plot->is_logarithmic) {
         int x_from, x_to, y_from, y_to;
-        svg_decades(plot->y_least, plot->y_most, &y_from, &y_to);
+        svg_decades(plot->y_min, plot->y_max, &y_from, &y_to);
         if (plot->decades > 0 && y_from < y_to - plot->decades)
             y_from = y_to - plot->decades;
         y_from -= plot->has_floor;
-        plot->y_least = pow(10, y_from);
-        plot->y_most = pow(10, y_to);
-        svg_decades(plot->x_least, plot->x_most, &x_from, &x_to);
+        plot->y_min = pow(10, y_from);
+        plot->y_max = pow(10, y_to);
+        svg_decades(plot->x_min, plot->x_max, &x_from, &x_to);
         if (plot->has_whole_decades) {
-            plot->x_least = pow(10, x_from);
-            plot->x_most = pow(10, x_to);
+            plot->x_min = pow(10, x_from);
+            plot->x_max = pow(10, x_to);
         }
         put_decades(plot, true, x_from, x_to);
         put_decades(plot, false, y_from, y_to);
     } else {
-        const double room = plot->y_most > plot->y_least ? 0.05 * (plot->y_most - plot->y_least)
-                                                         : fmax(fabs(plot->y_most), 1);
-        plot->y_least -= room;
-        plot->y_most += room;
+        const double room = plot->y_max > plot->y_min ? 0.05 * (plot->y_max - plot->y_min)
+                                                      : fmax(fabs(plot->y_max), 1);
+        plot->y_min -= room;
+        plot->y_max += room;
         put_steps(plot, true);
         put_steps(plot, false);
     }
@@ -146,12 +146,12 @@ static void curve_make(const Plot *plot, const Reals *x, const Reals *y, Curve *
     const size_t count = x->count < y->count ? x->count : y->count;
     size_t k = 0;
     curve->count = 0;
-    while (k < count && !(x->at[k] >= plot->x_least))
+    while (k < count && !(x->at[k] >= plot->x_min))
         k++;
     while (k < count && curve->count < COLUMNS) {
         const double from = plot_x(plot, x->at[k]);
         double along = 0, sum = 0, among = 0;
-        for (; k < count && x->at[k] <= plot->x_most; k++) {
+        for (; k < count && x->at[k] <= plot->x_max; k++) {
             const double at = plot_x(plot, x->at[k]);
             if (at - from > column)
                 break;

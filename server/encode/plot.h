@@ -16,7 +16,7 @@ typedef struct Plot {
     int decades;                     // shown upwards, at most; 0: all
     bool has_floor;                  // the lowest decade stands for 0
     const char *x_title;
-    double x_least, x_most, y_least, y_most; // what was fitted in
+    double x_min, x_max, y_min, y_max; // what was fitted in
     Bytes *bytes;
 } Plot;
 

@@ -95,7 +95,7 @@ void sweep_archive_read(void *context, size_t column, uint64_t offset, void *tar
 static Status put(SweepArchive *archive, Zip *zip, const char *name, size_t column,
                   Problem *problem) {
     const size_t rows = archive->source->rows, texts = width_of(archive, column);
-    char file[ZIP_NAME_MOST + 1], type[32] = "<f8";
+    char file[ZIP_NAME_MAX + 1], type[32] = "<f8";
     Layout array = {0};
     if (texts > 0)
         snprintf(type, sizeof type, "|S%zu", texts);

@@ -9,10 +9,10 @@ enum {
     END = 0x06054b50,
     VERSION = 20,
     DATE = 0x0021, // 1980-01-01, the first that a ZIP knows
-    MEMBERS_MOST = 0xfffe,
+    MEMBERS_MAX = 0xfffe,
 };
 
-static const uint64_t bytes_most = 0xfffffffe;
+static const uint64_t bytes_max = 0xfffffffe;
 
 // What local header and directory entry share.
 static void put_facts(Layout *layout, uint32_t crc, uint64_t size, const char *name) {
@@ -37,8 +37,8 @@ static Status refuse(Problem *problem) {
 Status zip_put(Zip *zip, const char *name, const Layout *content, Problem *problem) {
     Layout *layout = zip->layout;
     const uint64_t start = layout->size;
-    if (content->size > bytes_most || start + content->size + 1024 > bytes_most ||
-        zip->count >= MEMBERS_MOST)
+    if (content->size > bytes_max || start + content->size + 1024 > bytes_max ||
+        zip->count >= MEMBERS_MAX)
         return refuse(problem);
     const uint32_t crc = content->is_failed ? 0 : layout_crc32(content);
     layout_number(layout, LOCAL, 4);
@@ -72,5 +72,5 @@ Status zip_end(Zip *zip, Problem *problem) {
     layout_number(layout, 0, 2); // no comment
     layout_clear(&zip->directory);
     zip->count = 0;
-    return start + size > bytes_most ? refuse(problem) : STATUS_OK;
+    return start + size > bytes_max ? refuse(problem) : STATUS_OK;
 }

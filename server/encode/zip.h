@@ -6,7 +6,7 @@
 #include "core/base/status.h"
 #include "server/encode/layout.h"
 
-enum { ZIP_NAME_MOST = 79 };
+enum { ZIP_NAME_MAX = 79 };
 
 // The archive as it is laid out. All zero but `layout` is an empty one.
 typedef struct Zip {

@@ -87,7 +87,7 @@ static Status answer(const Dispatcher *dispatcher, const Route *route, Handler *
 
 static Status refuse(const Dispatcher *dispatcher, const Request *request, const char *allow,
                      Reply *reply, Problem *problem) {
-    char near[ROUTE_SEGMENT_MOST];
+    char near[ROUTE_SEGMENT_MAX];
     if (allow[0] != '\0') {
         snprintf(reply->allow, sizeof reply->allow, "%s", allow);
         return problem_set(problem, STATUS_METHOD, "%s is not for this path; it takes %s",

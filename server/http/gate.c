@@ -171,7 +171,7 @@ int gate_judge(const Gate *gate, const char *method, const char *target, const c
                       "unknown method; known are GET, HEAD, POST, PUT, PATCH, DELETE and OPTIONS");
     if (target[0] != '/')
         return refuse(problem, 400, "the target must be a path that begins with \"/\"");
-    if (strlen(target) > REQUEST_TARGET_MOST)
+    if (strlen(target) > REQUEST_TARGET_MAX)
         return refuse(problem, 414, "the target is longer than 4096 bytes");
     if (has_control(target, strlen(target)))
         return refuse(problem, 400, "the target holds a control character");

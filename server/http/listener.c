@@ -19,11 +19,11 @@
 #include "server/http/exchange.h"
 
 enum {
-    LOOPS_MOST = 16,
-    THREADS = 16,            // that answer what takes a while
-    CONNECTIONS_MOST = 8192, // over all loops, where as many files may be open
-    FILES_KEPT = 64,         // for everything else
-    TOGETHER = 16,           // connections that one loop takes before another does
+    LOOPS_MAX = 16,
+    THREADS = 16,           // that answer what takes a while
+    CONNECTIONS_MAX = 8192, // over all loops, where as many files may be open
+    FILES_KEPT = 64,        // for everything else
+    TOGETHER = 16,          // connections that one loop takes before another does
     CONNECTION_MEMORY = 16 * 1024,
     SILENCE_S = 60, // nothing sent or received; who is kept waiting by us is not silent
     IN_VAIN = 16,   // runs in a row that called nothing, before a pause
@@ -38,7 +38,7 @@ struct Listener {
     bool is_accepting;
     size_t connections_most;
     size_t loop_count;
-    Loop loops[LOOPS_MOST];
+    Loop loops[LOOPS_MAX];
 };
 
 static void take_arrivals(Loop *loop) {
@@ -209,7 +209,7 @@ static size_t connections_allowed(void) {
         (void)getrlimit(RLIMIT_NOFILE, &files);
     }
     const size_t room = files.rlim_cur > 2 * FILES_KEPT ? files.rlim_cur - FILES_KEPT : FILES_KEPT;
-    return room < CONNECTIONS_MOST ? room : CONNECTIONS_MOST;
+    return room < CONNECTIONS_MAX ? room : CONNECTIONS_MAX;
 }
 
 static Status start(Listener *listener, Problem *problem) {
@@ -222,9 +222,9 @@ static Status start(Listener *listener, Problem *problem) {
     desk->url = listener->url;
     desk->first_id = (uint64_t)clock_unix_ms() << 16;
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t most = processors < 1            ? 1
-                        : processors > LOOPS_MOST ? LOOPS_MOST
-                                                  : (size_t)processors;
+    const size_t most = processors < 1           ? 1
+                        : processors > LOOPS_MAX ? LOOPS_MAX
+                                                 : (size_t)processors;
     listener->connections_most = connections_allowed();
     for (; listener->loop_count < most; listener->loop_count++)
         TRY(loop_start(&listener->loops[listener->loop_count], desk, listener->connections_most,

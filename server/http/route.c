@@ -81,8 +81,8 @@ static void fill(const char *pattern, const char *path, char *target, size_t siz
     }
 }
 
-bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MOST]) {
-    char filled[ROUTE_SEGMENT_MOST];
+bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MAX]) {
+    char filled[ROUTE_SEGMENT_MAX];
     const char *const candidates[] = {target, filled, NULL}; // the nearest so far, and one more
     target[0] = '\0';
     if (strlen(path) >= sizeof filled)

@@ -28,7 +28,7 @@ extern const QuickHandler quick_handlers[]; // ends with NULL
 
 extern const Route routes[]; // ends with method == NULL; of two patterns that fit, the first counts
 
-enum { ROUTE_SEGMENT_MOST = 160 };
+enum { ROUTE_SEGMENT_MAX = 160 };
 
 // Whether `pattern` fits the path as sent. Fills `spans` (start and length in `path`) for each
 // {..}.
@@ -45,6 +45,6 @@ const Route *route_find(const Route *table, const char *method, const char *path
                         RouteSpan spans[REQUEST_PARAMETERS], size_t *count, char allow[64]);
 
 // The nearest path to one that no route fits; false if none is near enough to be meant.
-bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MOST]);
+bool route_nearest(const Route *table, const char *path, char target[ROUTE_SEGMENT_MAX]);
 
 #endif

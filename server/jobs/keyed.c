@@ -7,20 +7,20 @@
 
 #include "server/base/digest.h"
 
-static Status read_key(const char *text, char key[KEY_MOST + 1], Problem *problem) {
+static Status read_key(const char *text, char key[KEY_MAX + 1], Problem *problem) {
     size_t size = strlen(text);
     if (size >= 2 && text[0] == '"' && text[size - 1] == '"') {
         text++;
         size -= 2;
     }
-    bool is_sound = size >= 1 && size <= KEY_MOST;
+    bool is_sound = size >= 1 && size <= KEY_MAX;
     for (size_t i = 0; i < size && is_sound; i++)
         is_sound = text[i] >= ' ' && text[i] <= '~' && text[i] != '"' && text[i] != '\\';
     if (!is_sound)
         return problem_set(problem, STATUS_USAGE,
                            "Idempotency-Key must be 1 to %d printable ASCII characters without "
                            "\" and \\, best a UUID in quotes; it has %zu",
-                           KEY_MOST, size);
+                           KEY_MAX, size);
     memcpy(key, text, size);
     key[size] = '\0';
     return STATUS_OK;

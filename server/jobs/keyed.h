@@ -5,13 +5,13 @@
 
 #include "server/jobs/intake_state.h"
 
-enum { KEY_MOST = 255 };
+enum { KEY_MAX = 255 };
 
 // Lies on the stack of whoever submits, between keyed_begin and keyed_end.
 typedef struct KeyHold {
     struct KeyHold *next;
     const char *client; // "" for nobody in particular
-    char key[KEY_MOST + 1];
+    char key[KEY_MAX + 1];
     char request[65]; // SHA-256 of the body
     bool is_held;
 } KeyHold;

@@ -17,7 +17,7 @@
 #include "server/jobs/job_id.h"
 
 // A larger body is read: comparing it would hold up whoever asks.
-enum { BODY_MOST = 65536, KEY_SIZE = 17 };
+enum { BODY_MAX = 65536, KEY_SIZE = 17 };
 
 typedef struct Entry {
     IndexEntry indexed; // by key
@@ -94,7 +94,7 @@ void known_free(Known *known) {
 }
 
 static bool make_key(const Submission *submission, char key[KEY_SIZE]) {
-    if (submission->size > BODY_MOST)
+    if (submission->size > BODY_MAX)
         return false;
     uint64_t number = (uint64_t)deflate_crc32(0, submission->text, submission->size) << 32 |
                       (uint32_t)submission->size;

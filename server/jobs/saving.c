@@ -18,7 +18,7 @@
 #include "server/jobs/study.h"
 
 // Computations on the way to the store, and the bytes of what they came to.
-enum { SAVING_MOST = 4096, SAVING_BYTES = 256 << 20 };
+enum { SAVING_MAX = 4096, SAVING_BYTES = 256 << 20 };
 
 typedef struct Saving {
     Intake *intake;
@@ -37,7 +37,7 @@ typedef struct Saving {
 static void saved(void *context, Status status, const char *detail);
 
 bool intake_is_behind(const Intake *intake) {
-    return intake->saving >= SAVING_MOST || intake->saving_bytes >= SAVING_BYTES;
+    return intake->saving >= SAVING_MAX || intake->saving_bytes >= SAVING_BYTES;
 }
 
 static char *problem_text(Status status, const char *detail) {

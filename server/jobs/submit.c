@@ -175,7 +175,7 @@ static Status start(Intake *intake, Job *job, StudyRequest *inquiry, bool is_ret
 }
 
 // All labels of a job, in bytes.
-enum { LABELS_MOST = 8192 };
+enum { LABELS_MAX = 8192 };
 
 // Title, labels and study, as they are shown and searched.
 static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *problem) {
@@ -183,11 +183,11 @@ static Status fill_notes(JobRow *row, const StudyRequest *inquiry, Problem *prob
     const Texts *labels = &simulation->labels;
     Bytes shown = {0}, words = {0};
     job_words(&words, simulation->title, (const char *const *)labels->at, labels->count);
-    if (words.count > LABELS_MOST) {
+    if (words.count > LABELS_MAX) {
         const size_t size = words.count;
         bytes_clear(&words);
         return problem_add(problem, STATUS_INVALID, "/labels",
-                           "must have at most %d bytes in all, has about %zu", LABELS_MOST, size);
+                           "must have at most %d bytes in all, has about %zu", LABELS_MAX, size);
     }
     for (size_t i = 0; i < labels->count; i++) {
         bytes_text(&shown, i > 0 ? ", " : "[");

@@ -12,7 +12,7 @@
 #include "server/materials/catalogue.h"
 #include "server/materials/slug.h"
 
-enum { NAME_MOST = 64, WORDS_MOST = 10000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+enum { NAME_MAX = 64, WORDS_MAX = 10000, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
 const char exchange_format[] = "impactd-materials";
 static const char *const kind_names[] = {
@@ -21,8 +21,8 @@ static const char *const kind_names[] = {
 // clang-format off
 static const Field review_fields[] = {
     FIELD_CHOICE(ExchangeReview, status, material_verdicts, REQUIRED, "what was found"),
-    FIELD_TEXT(ExchangeReview, reason, WORDS_MOST, PRESENCE_REQUIRED, 0, "why"),
-    FIELD_TEXT(ExchangeReview, reviewer, NAME_MOST, PRESENCE_OPTIONAL, FIELD_NULL_IS_EMPTY, "whose review it is; null: nobody known; if absent, the importer's"),
+    FIELD_TEXT(ExchangeReview, reason, WORDS_MAX, PRESENCE_REQUIRED, 0, "why"),
+    FIELD_TEXT(ExchangeReview, reviewer, NAME_MAX, PRESENCE_OPTIONAL, FIELD_NULL_IS_EMPTY, "whose review it is; null: nobody known; if absent, the importer's"),
     FIELD_TEXT(ExchangeReview, created, 40, PRESENCE_OPTIONAL, 0, "when; if absent, now"),
     FIELD_END
 };
@@ -31,8 +31,8 @@ static const Field review_fields[] = {
     .range = WITHIN(1, 1e9), .presence = PRESENCE_OPTIONAL, .doc = doc_}
 #define MATERIAL FIELD_BASE(ExchangeRow, material, material_fields)
 #define REVERTS FIELD_COUNT(ExchangeRow, reverts, NULL, WITHIN(1, 1e9), OPTIONAL, "the revision that it says again")
-#define AUTHOR FIELD_TEXT(ExchangeRow, author, NAME_MOST, PRESENCE_OPTIONAL, FIELD_NULL_IS_EMPTY, "who wrote it; null: nobody known; if absent, the importer")
-#define COMMENT FIELD_TEXT(ExchangeRow, comment, WORDS_MOST, PRESENCE_OPTIONAL, 0, "why it was written")
+#define AUTHOR FIELD_TEXT(ExchangeRow, author, NAME_MAX, PRESENCE_OPTIONAL, FIELD_NULL_IS_EMPTY, "who wrote it; null: nobody known; if absent, the importer")
+#define COMMENT FIELD_TEXT(ExchangeRow, comment, WORDS_MAX, PRESENCE_OPTIONAL, 0, "why it was written")
 #define CREATED FIELD_TEXT(ExchangeRow, created, 40, PRESENCE_OPTIONAL, 0, "when, RFC 3339; if absent, now")
 #define REVIEWS FIELD_LIST(ExchangeRow, reviews, review_fields, 1000, PRESENCE_OPTIONAL, "what others think of it, in their order")
 #define TEST(presence_) FIELD_ITEM(ExchangeRow, test, drop_test_fields, NULL, presence_, "the drop test as it was done")
@@ -268,12 +268,12 @@ Status exchange_refuse_many(Problem *problem) {
     return problem_set(problem, STATUS_LIMIT,
                        "there are more than %d revisions and measurements; bring them in several "
                        "files",
-                       EXCHANGE_ROWS_MOST);
+                       EXCHANGE_ROWS_MAX);
 }
 
 static bool is_full(const Exchange *exchange) {
     return exchange->import.revision_count + exchange->import.measurement_count >=
-           EXCHANGE_ROWS_MOST;
+           EXCHANGE_ROWS_MAX;
 }
 
 Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, ExchangeRow *row,

@@ -9,7 +9,7 @@
 #include "core/scene/material.h"
 #include "server/store/material_import.h"
 
-enum { EXCHANGE_VERSION = 1, EXCHANGE_ROWS_MOST = 100000 };
+enum { EXCHANGE_VERSION = 1, EXCHANGE_ROWS_MAX = 100000 };
 extern const char exchange_format[]; // "impactd-materials"
 
 typedef enum ExchangeKind { EXCHANGE_REVISION, EXCHANGE_MEASUREMENT } ExchangeKind;
@@ -58,7 +58,7 @@ Status exchange_take(Exchange *exchange, const char *slug, ExchangeKind kind, Ex
 // A row of that slug of which nothing more is known: other numbers need not continue then.
 Status exchange_drift(Exchange *exchange, const char *slug, const char *place, Problem *problem);
 
-// STATUS_LIMIT: more than EXCHANGE_ROWS_MOST rows.
+// STATUS_LIMIT: more than EXCHANGE_ROWS_MAX rows.
 Status exchange_refuse_many(Problem *problem);
 
 // Sorts what was taken, tells what cannot stand beside each other, and imports it for `who` (NULL:

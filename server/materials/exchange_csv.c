@@ -12,7 +12,7 @@
 #include "server/codec/read.h"
 #include "server/codec/scan.h"
 
-enum { POINTER_SIZE = sizeof((Fault){0}.pointer), COLUMNS_MOST = 64 };
+enum { POINTER_SIZE = sizeof((Fault){0}.pointer), COLUMNS_MAX = 64 };
 
 // Of the header; `field` NULL: it is told already.
 typedef struct Column {
@@ -22,7 +22,7 @@ typedef struct Column {
 
 typedef struct Table {
     CsvScan scan;
-    Column columns[COLUMNS_MOST];
+    Column columns[COLUMNS_MAX];
     size_t count;
     bool lacks_name, lacks_source, lacks_restitution; // columns that revisions need
     bool is_lack_told;
@@ -120,7 +120,7 @@ static bool read_header(Table *table) {
         (void)problem_add(table->problem, STATUS_INVALID, "", "there is no header of names");
         return false;
     }
-    if (scan->count > COLUMNS_MOST) {
+    if (scan->count > COLUMNS_MAX) {
         refuse(table, "", "there are more columns than a table of materials has");
         return false;
     }
@@ -298,16 +298,16 @@ Status exchange_read_csv(const char *text, size_t size, Exchange *exchange, Prob
     const bool goes_on = read_header(&table);
     exchange->import.is_partial = table.lacks_name || table.lacks_source || table.lacks_restitution;
     while (goes_on && status == STATUS_OK && csv_scan_next(&table.scan))
-        status = table.scan.row > EXCHANGE_ROWS_MOST + 1 ? exchange_refuse_many(problem)
-                                                         : read_row(&table, exchange);
-    if (table.scan.is_failed && table.scan.count >= CSV_CELLS_MOST)
+        status = table.scan.row > EXCHANGE_ROWS_MAX + 1 ? exchange_refuse_many(problem)
+                                                        : read_row(&table, exchange);
+    if (table.scan.is_failed && table.scan.count >= CSV_CELLS_MAX)
         refuse(&table, "", "there are more than 1000 cells in a row");
     else if (table.scan.is_failed || status == STATUS_NO_MEMORY)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the materials");
     csv_scan_clear(&table.scan);
     return status != STATUS_OK ? status : problem->count > 0 ? STATUS_INVALID : STATUS_OK;
 }
-_Static_assert(CSV_CELLS_MOST == 1000, "the sentence names this number");
+_Static_assert(CSV_CELLS_MAX == 1000, "the sentence names this number");
 
 void exchange_place_faults(Problem *problem) {
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {

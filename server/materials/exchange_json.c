@@ -27,15 +27,15 @@ typedef struct One {
 // clang-format off
 static const Field envelope_fields[] = {
     FIELD_TEXT(Envelope, format, 100, PRESENCE_REQUIRED, 0, "\"impactd-materials\""),
-    FIELD_COUNT(Envelope, version, NULL, AT_LEAST(1), REQUIRED, "of the format"),
+    FIELD_COUNT(Envelope, version, NULL, AT_MIN(1), REQUIRED, "of the format"),
     FIELD_TEXTS(Envelope, materials, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "all of them"),
     FIELD_END
 };
 
 static const Field one_fields[] = {
     FIELD_TEXT(One, slug, 0, PRESENCE_REQUIRED, 0, "of a-z, 0-9, _ and -"),
-    FIELD_LIST(One, revisions, exchange_revision_fields, EXCHANGE_ROWS_MOST, PRESENCE_OPTIONAL, "by number"),
-    FIELD_LIST(One, measurements, exchange_measurement_fields, EXCHANGE_ROWS_MOST, PRESENCE_OPTIONAL, "by number"),
+    FIELD_LIST(One, revisions, exchange_revision_fields, EXCHANGE_ROWS_MAX, PRESENCE_OPTIONAL, "by number"),
+    FIELD_LIST(One, measurements, exchange_measurement_fields, EXCHANGE_ROWS_MAX, PRESENCE_OPTIONAL, "by number"),
     FIELD_END
 };
 // clang-format on
@@ -120,8 +120,8 @@ static Status read_all(const char *text, size_t size, Exchange *exchange, Proble
     if (is_whole)
         TRY(read_envelope(text, size, &list, has_list, problem));
     for (size_t i = 0; has_list && scan_element(&list); i++)
-        TRY(i >= EXCHANGE_ROWS_MOST ? exchange_refuse_many(problem)
-                                    : read_one(exchange, text, size, &list, i, problem));
+        TRY(i >= EXCHANGE_ROWS_MAX ? exchange_refuse_many(problem)
+                                   : read_one(exchange, text, size, &list, i, problem));
     if (!is_whole)
         TRY(read_envelope(text, size, &list, has_list, problem));
     return problem->count > 0 ? STATUS_INVALID : STATUS_OK;

@@ -21,7 +21,7 @@
 
 enum {
     HALF_BYTES = LATE_BYTES / 2,
-    ROWS_MOST = 8192, // of a half
+    ROWS_MAX = 8192, // of a half
     BUCKETS = 4096,
     BATCH = 512, // rows of one transaction: others wait for no more than these
     DELAY_MS = 20,
@@ -37,8 +37,8 @@ typedef struct Half {
     char *bytes;
     size_t used;
     uint32_t count;
-    uint32_t offsets[ROWS_MOST], next[ROWS_MOST]; // of each row, and the next of its bucket + 1
-    uint32_t buckets[BUCKETS];                    // + 1
+    uint32_t offsets[ROWS_MAX], next[ROWS_MAX]; // of each row, and the next of its bucket + 1
+    uint32_t buckets[BUCKETS];                  // + 1
 } Half;
 
 struct Late {
@@ -107,7 +107,7 @@ static void empty(Half *half) {
 static void recover(const Late *late, Half *half) {
     void *row = calloc(1, late->row_size);
     half->used = sizeof(uint64_t);
-    while (row != NULL && half->count < ROWS_MOST && HALF_BYTES - half->used > sizeof(Header)) {
+    while (row != NULL && half->count < ROWS_MAX && HALF_BYTES - half->used > sizeof(Header)) {
         Header header;
         memcpy(&header, half->bytes + half->used, sizeof header);
         const char *at = half->bytes + half->used + sizeof header;
@@ -270,7 +270,7 @@ bool late_add(Late *late, const void *row) {
         return false;
     pthread_mutex_lock(&late->lock);
     Half *half = &late->halves[late->filling];
-    bool is_taken = half->count < ROWS_MOST && HALF_BYTES - half->used > sizeof(Header) + 8;
+    bool is_taken = half->count < ROWS_MAX && HALF_BYTES - half->used > sizeof(Header) + 8;
     size_t size = 0;
     if (is_taken) {
         char *at = half->bytes + half->used + sizeof(Header);

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const size_t bytes_most = 64 << 20;
+static const size_t bytes_max = 64 << 20;
 
 typedef struct Entry {
     struct Entry *next;
@@ -79,7 +79,7 @@ static void forget(RecordMemory *memory) {
         // Nobody can come to hold it meanwhile but through the lock.
         const bool is_ours = atomic_load(&entry->named->shared.holds) == 1;
         bytes += entry->named->samples.count * sizeof(double);
-        if (!is_ours || bytes <= bytes_most) {
+        if (!is_ours || bytes <= bytes_max) {
             at = &entry->next;
             continue;
         }

@@ -162,10 +162,10 @@ static Status add(Database *database, const void *work, Problem *problem) {
                                            row->name, other);
     }
     TRY(first(database, count_sql, &key, key_columns, &counted, &is_found, problem));
-    if (counted.count >= RECORDS_MOST)
+    if (counted.count >= RECORDS_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "%d records are kept, no more; delete some that nothing uses",
-                           RECORDS_MOST);
+                           RECORDS_MAX);
     if (counted.most + row->count > RECORDS_SAMPLES)
         return problem_set(problem, STATUS_LIMIT,
                            "the records have %llu samples, with this one more than the %llu that "

@@ -7,7 +7,7 @@
 #include "core/excitation/recorded_motion.h"
 #include "server/store/store.h"
 
-enum { RECORDS_MOST = 20000, RECORD_TWINS = 4 };
+enum { RECORDS_MAX = 20000, RECORD_TWINS = 4 };
 #define RECORDS_SAMPLES (UINT64_C(1) << 31) // of all records: 16 GiB
 
 // Texts are NULL where nothing was said.
@@ -41,7 +41,7 @@ void record_digest(double interval, const Reals *samples, char digest[RECORD_DIG
 
 // Writes both down in one transaction. One of the same name, samples and words is there already:
 // *is_there, and nothing is written; with others STATUS_CONFLICT. STATUS_LIMIT where there are
-// RECORDS_MOST, or where they would have more than RECORDS_SAMPLES.
+// RECORDS_MAX, or where they would have more than RECORDS_SAMPLES.
 Status store_record_add(Store *store, const RecordRow *row, const Reals *samples, bool *is_there,
                         Problem *problem);
 

@@ -9,7 +9,7 @@
 
 #include "server/store/row.h"
 
-enum { DIGITS = 6, PLACES = 4, BITS = 1 << (4 * DIGITS), RESULTS_MOST = 4000000 };
+enum { DIGITS = 6, PLACES = 4, BITS = 1 << (4 * DIGITS), RESULTS_MAX = 4000000 };
 
 struct ResultFilter {
     bool says_no;
@@ -87,7 +87,7 @@ Status result_filter_fill(ResultFilter *filter, Database *database, Problem *pro
     if (status == STATUS_OK && has_row)
         status = row_read(statement, row_columns, &last, problem);
     statement_end(statement);
-    if (status != STATUS_OK || last.number > RESULTS_MOST)
+    if (status != STATUS_OK || last.number > RESULTS_MAX)
         return status;
     TRY(statement_begin(database, ids_sql, NULL, NULL, &statement, problem));
     status = fill(filter, statement, problem);

@@ -150,18 +150,18 @@ Status store_result_delete(Store *store, const char *id, Problem *problem) {
 }
 
 typedef struct Recent {
-    uint64_t most, scene_most;
+    uint64_t most, scene_max;
 } Recent;
 static const RowColumn recent_columns[] = {ROW_COLUMN(Recent, most, COLUMN_COUNT),
-                                           ROW_COLUMN(Recent, scene_most, COLUMN_COUNT), ROW_END};
+                                           ROW_COLUMN(Recent, scene_max, COLUMN_COUNT), ROW_END};
 
-Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+Status store_result_recent(Store *store, size_t most, size_t scene_max, ResultRows *rows,
                            Problem *problem) {
     static const char sql[] =
         "SELECT id, engine, scene FROM (SELECT * FROM results ORDER BY number DESC LIMIT :most) "
-        "WHERE length(scene) <= :scene_most";
+        "WHERE length(scene) <= :scene_max";
     void *at;
-    const Status status = store_all(store, sql, recent_columns, &(Recent){most, scene_most},
+    const Status status = store_all(store, sql, recent_columns, &(Recent){most, scene_max},
                                     result_columns, sizeof *rows->at, &at, &rows->count, problem);
     rows->at = at;
     if (status != STATUS_OK)

@@ -43,7 +43,7 @@ static const RowColumn bounds_columns[] = {
 };
 // clang-format on
 
-enum { VACUUM_LEAST = 256 }; // pages that are free before any are given back
+enum { VACUUM_MIN = 256 }; // pages that are free before any are given back
 
 static Status measure(Store *store, bool counts_jobs, Extent *extent, Problem *problem) {
     static const char sizes[] =
@@ -140,7 +140,7 @@ Status store_remove(Store *store, const KeepRules *rules, Removed *removed, Prob
         removal.bounds = (Bounds){INT64_MAX, RETENTION_BATCH / 4};
     else if (is_older)
         removal.bounds = (Bounds){before, RETENTION_BATCH};
-    else if (extent.free_pages > VACUUM_LEAST && extent.free_pages > extent.pages / 8)
+    else if (extent.free_pages > VACUUM_MIN && extent.free_pages > extent.pages / 8)
         removal.gives_back = true;
     else
         return STATUS_OK;

@@ -154,7 +154,7 @@ typedef struct ResultRows {
     ResultRow *at;
     size_t count;
 } ResultRows;
-Status store_result_recent(Store *store, size_t most, size_t scene_most, ResultRows *rows,
+Status store_result_recent(Store *store, size_t most, size_t scene_max, ResultRows *rows,
                            Problem *problem);
 void result_rows_clear(ResultRows *rows);
 

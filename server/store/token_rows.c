@@ -64,10 +64,10 @@ static Status add(Database *database, const void *work, Problem *problem) {
         return problem_set(problem, STATUS_CONFLICT,
                            "there is a token \"%.64s\" already%s; choose another name", row->name,
                            found.revoked_unix_ms > 0 ? ", revoked" : "");
-    if (found.count >= TOKENS_MOST)
+    if (found.count >= TOKENS_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "%d tokens are kept, no more; forget those that are revoked",
-                           TOKENS_MOST);
+                           TOKENS_MAX);
     return database_change(database, sql, token_columns, row, NULL, problem);
 }
 

@@ -5,7 +5,7 @@
 
 #include "server/store/store.h"
 
-enum { TOKEN_NAME_SIZE = 65, TOKENS_MOST = 1000 };
+enum { TOKEN_NAME_SIZE = 65, TOKENS_MAX = 1000 };
 
 // Times in milliseconds since 1970; 0: never.
 typedef struct TokenRow {
@@ -19,7 +19,7 @@ typedef struct TokenRows {
     size_t count;
 } TokenRows;
 
-// STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MOST.
+// STATUS_CONFLICT where the name is taken, STATUS_LIMIT where there are TOKENS_MAX.
 Status store_token_add(Store *store, const TokenRow *row, Problem *problem);
 // All, by name.
 Status store_tokens(Store *store, TokenRows *rows, Problem *problem);

@@ -16,7 +16,7 @@
 #include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"
 
-enum { ROUNDS_MOST = 64 };
+enum { ROUNDS_MAX = 64 };
 
 static size_t points = 10000, threads = 2, rounds = 5;
 
@@ -160,7 +160,7 @@ int main(int argc, char **argv) {
         threads = strtoul(argv[2], NULL, 10);
     if (argc > 3)
         rounds = strtoul(argv[3], NULL, 10);
-    if (points < 2 || threads < 1 || threads > 64 || rounds < 1 || rounds > ROUNDS_MOST ||
+    if (points < 2 || threads < 1 || threads > 64 || rounds < 1 || rounds > ROUNDS_MAX ||
         mkdtemp(folder) == NULL)
         return 2;
     Store *store;
@@ -188,8 +188,8 @@ int main(int argc, char **argv) {
     if (scenes == NULL)
         return 1;
 
-    double core[ROUNDS_MOST], room[ROUNDS_MOST], ratio[ROUNDS_MOST];
-    double core_cpu[ROUNDS_MOST], room_cpu[ROUNDS_MOST];
+    double core[ROUNDS_MAX], room[ROUNDS_MAX], ratio[ROUNDS_MAX];
+    double core_cpu[ROUNDS_MAX], room_cpu[ROUNDS_MAX];
     for (size_t i = 0; i < rounds; i++) {
         double began = process_cpu();
         core[i] = time_core(scenes);

@@ -7,7 +7,7 @@
 #include "server/encode/encoding.h"
 #include "tests/support/doubles.h"
 
-enum { COLUMNS_MOST = 16 };
+enum { COLUMNS_MAX = 16 };
 
 int main(int count, char **arguments) {
     if (count != 6 && count != 7)
@@ -16,14 +16,14 @@ int main(int count, char **arguments) {
     const size_t columns = strtoul(arguments[2], NULL, 10);
     size_t values = 0;
     double *block = doubles_read(&values);
-    if (encoder == NULL || block == NULL || columns < 1 || columns > COLUMNS_MOST ||
+    if (encoder == NULL || block == NULL || columns < 1 || columns > COLUMNS_MAX ||
         values % columns != 0)
         return 2;
 
     const bool has_axis = count == 7;
     const size_t rows = values / columns, offset = has_axis ? 1 : 0;
-    Column column[COLUMNS_MOST];
-    const Column *chosen[COLUMNS_MOST];
+    Column column[COLUMNS_MAX];
+    const Column *chosen[COLUMNS_MAX];
     for (size_t c = offset; c < columns; c++) {
         column[c].values = block + c * rows;
         snprintf(column[c].name, sizeof column[c].name, "channel_%zu", c);

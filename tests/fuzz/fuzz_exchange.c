@@ -12,7 +12,7 @@
 #include "server/materials/exchange_csv.h"
 #include "server/materials/exchange_json.h"
 
-enum { TEXT_MOST = 4096, MUTATIONS_MOST = 6, ROUNDS_TIMED = 64, ROUND_EACH = 200 };
+enum { TEXT_MAX = 4096, MUTATIONS_MAX = 6, ROUNDS_TIMED = 64, ROUND_EACH = 200 };
 
 static const char *const seeds[] = {
     "slug,name,restitution,contact_time [s],source\nfelt,Felt,0.5,0.02,own\ncork,\"Cork, 3 "
@@ -56,7 +56,7 @@ static size_t draw(size_t count) {
 }
 
 static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
-    if (size + length > TEXT_MOST)
+    if (size + length > TEXT_MAX)
         return size;
     memmove(text + at + length, text + at, size - at);
     memcpy(text + at, piece, length);
@@ -171,11 +171,11 @@ int main(int argc, char **argv) {
         return 1;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
-            char text[TEXT_MOST];
+            char text[TEXT_MAX];
             const char *seed = seeds[draw(COUNT(seeds))];
             size_t size = strlen(seed);
             memcpy(text, seed, size);
-            for (size_t mutations = draw(MUTATIONS_MOST + 1); mutations > 0; mutations--)
+            for (size_t mutations = draw(MUTATIONS_MAX + 1); mutations > 0; mutations--)
                 size = mutate(text, size);
             // Of its own size, so that a byte read behind it is seen.
             char *own = malloc(size > 0 ? size : 1);

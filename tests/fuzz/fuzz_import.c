@@ -11,7 +11,7 @@
 
 #include "core/formats/ground_motion_text.h"
 
-enum { TEXT_MOST = 4096, MUTATIONS_MOST = 6, ROUNDS_TIMED = 256 };
+enum { TEXT_MAX = 4096, MUTATIONS_MAX = 6, ROUNDS_TIMED = 256 };
 
 static const char *const seeds[] = {
     "PEER STRONG MOTION DATABASE RECORD\nSOMEWHERE, 090\nACCELERATION TIME HISTORY IN UNITS OF G. "
@@ -78,7 +78,7 @@ static size_t draw(size_t count) {
 }
 
 static size_t put(char *text, size_t size, size_t at, const char *piece, size_t length) {
-    if (size + length > TEXT_MOST)
+    if (size + length > TEXT_MAX)
         return size;
     memmove(text + at + length, text + at, size - at);
     memcpy(text + at, piece, length);
@@ -140,11 +140,11 @@ int main(int argc, char **argv) {
     unsigned long long rounds = 0, passed = 0;
     while (difftime(time(NULL), start) < seconds)
         for (int i = 0; i < ROUNDS_TIMED; i++, rounds++) {
-            char text[TEXT_MOST];
+            char text[TEXT_MAX];
             const char *seed = seeds[draw(COUNT(seeds))];
             size_t size = strlen(seed);
             memcpy(text, seed, size);
-            for (size_t mutations = draw(MUTATIONS_MOST + 1); mutations > 0; mutations--)
+            for (size_t mutations = draw(MUTATIONS_MAX + 1); mutations > 0; mutations--)
                 size = mutate(text, size);
             const ImportRequest request = {draw(2) == 0 ? 0.01 : (double)NAN, (int)draw(4) - 1};
             // Of its own size, so that a byte read behind it is seen.

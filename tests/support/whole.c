@@ -9,7 +9,7 @@ static const Field common_fields[] = {
 static const Field part_fields[] = {
     FIELD_TEXT(Part, material, 12, PRESENCE_OPTIONAL, 0, "where it comes from"),
     FIELD_REAL(Part, stiffness, "N/m", ABOVE(0), OPTIONAL, "of the spring"),
-    FIELD_REAL(Part, damping, "N s/m", AT_LEAST(0), 0.5, "of the damper"),
+    FIELD_REAL(Part, damping, "N s/m", AT_MIN(0), 0.5, "of the damper"),
     FIELD_END
 };
 
@@ -21,7 +21,7 @@ static const Field round_fields[] = {
 
 static const Field square_fields[] = {
     FIELD_BASE(Square, common, common_fields),
-    FIELD_REALS(Square, sides, "m", AT_LEAST(0), 4, PRESENCE_OPTIONAL, "of the square"),
+    FIELD_REALS(Square, sides, "m", AT_MIN(0), 4, PRESENCE_OPTIONAL, "of the square"),
     FIELD_END
 };
 
@@ -50,7 +50,7 @@ const Field whole_fields[] = {
     FIELD_REAL(Whole, mass, "kg", ABOVE(0), REQUIRED, "mass of it"),
     FIELD_REAL(Whole, slope, NULL, ANY, OPTIONAL, "any number"),
     FIELD_COUNT(Whole, steps, "steps", WITHIN(1, 1000000), 7, "how many"),
-    FIELD_COUNT(Whole, storey, NULL, AT_LEAST(1), OPTIONAL, "where"),
+    FIELD_COUNT(Whole, storey, NULL, AT_MIN(1), OPTIONAL, "where"),
     FIELD_FLAG(Whole, is_open, 1, "a fact"),
     FIELD_TEXT(Whole, title, 20, PRESENCE_OPTIONAL, FIELD_NOTE, "for people"),
     FIELD_CHOICE(Whole, rule, rules, 0, "when it ends"),

@@ -332,7 +332,7 @@ static bool is_busy(const Answer *answer) {
     return answer->outcome != NULL || answer->status == STATUS_LIMIT;
 }
 
-static const double SLOW_TIMES = 10, SLOW_LEAST = 0.05, GAP_MOST = 0.3;
+static const double SLOW_TIMES = 10, SLOW_MIN = 0.05, GAP_MAX = 0.3;
 
 void extremes_judge(const char *text, uint64_t number, double most_seconds,
                     ExtremesRecord *record) {
@@ -365,11 +365,11 @@ void extremes_judge(const char *text, uint64_t number, double most_seconds,
         judge_error(&answer, text, most_seconds, record);
     }
     if (record->verdict < EXTREME_FIRST_DEFECT && is_busy(&answer) &&
-        answer.cpu > SLOW_LEAST + SLOW_TIMES * most_seconds) {
+        answer.cpu > SLOW_MIN + SLOW_TIMES * most_seconds) {
         record->verdict = EXTREME_SLOW;
         snprintf(record->reason, sizeof record->reason, "more CPU than allowed");
     }
-    if (record->verdict < EXTREME_FIRST_DEFECT && answer.gap > GAP_MOST) {
+    if (record->verdict < EXTREME_FIRST_DEFECT && answer.gap > GAP_MAX) {
         record->verdict = EXTREME_DEAF;
         snprintf(record->reason, sizeof record->reason, "asked too rarely whether to stop");
     }

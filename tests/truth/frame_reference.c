@@ -122,7 +122,7 @@ static bool go(Walk *walk, double most) {
         Quad rate, until;
         const Quad target = (Quad)next / plan->sample_rate;
         const Quad a = walk_ground(walk, &rate, &until);
-        if (steps > most || walk->truth->impact_count + 8 > IMPACTS_MOST || idle > 5000)
+        if (steps > most || walk->truth->impact_count + 8 > IMPACTS_MAX || idle > 5000)
             return false;
         Quad h = STRIDE / walk_rate(walk);
         const bool is_cut = walk->t + h < target && walk->t + h < until;
@@ -172,7 +172,7 @@ void frame_truth(const Plan *plan, const Base *base, double most, FrameTruth *tr
     const size_t n = plan->storeys, m = plan->damper_count;
     truth->count = plan->count;
     truth->x = calloc((3 * n + 3 * m) * plan->count, sizeof(double));
-    truth->impacts = calloc(IMPACTS_MOST, sizeof *truth->impacts);
+    truth->impacts = calloc(IMPACTS_MAX, sizeof *truth->impacts);
     if (walk == NULL || truth->x == NULL || truth->impacts == NULL || n > N || m > D)
         abort();
     truth->v = truth->x + n * plan->count;

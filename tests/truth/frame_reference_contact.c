@@ -30,7 +30,7 @@ void walk_close_row(Walk *walk, size_t d, double end, double separation) {
     mass->open.lost = (double)mass->lost;
     mass->open.peak = (double)mass->peak;
     mass->is_open = false;
-    if (walk->truth->impact_count < IMPACTS_MOST)
+    if (walk->truth->impact_count < IMPACTS_MAX)
         walk->truth->impacts[walk->truth->impact_count++] = mass->open;
 }
 

@@ -10,7 +10,7 @@
 
 __extension__ typedef __float128 Quad;
 
-enum { TERMS = 40, IMPACTS_MOST = 20000, N = TRUTH_STOREYS, D = TRUTH_DAMPERS };
+enum { TERMS = 40, IMPACTS_MAX = 20000, N = TRUTH_STOREYS, D = TRUTH_DAMPERS };
 enum { FLYING, TOUCHING, INSIDE, RESTING };
 
 typedef struct Mass {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TERMS = 46, PARTS = 8, NODES = 14, IMPACTS_MOST = 200000 };
+enum { TERMS = 46, PARTS = 8, NODES = 14, IMPACTS_MAX = 200000 };
 
 static void *array(size_t count) {
     return calloc(count > 0 ? count : 1, sizeof(double));

@@ -129,7 +129,7 @@ static bool NAME(list)(NAME(Walk) * walk, const ReferenceImpact *impact) {
     if (answer->impact_count == answer->impact_room) {
         const size_t room = answer->impact_room * 2 + 64;
         ReferenceImpact *larger =
-            room <= IMPACTS_MOST ? realloc(answer->impacts, room * sizeof *larger) : NULL;
+            room <= IMPACTS_MAX ? realloc(answer->impacts, room * sizeof *larger) : NULL;
         if (larger == NULL)
             return false;
         answer->impacts = larger;

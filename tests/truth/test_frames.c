@@ -22,7 +22,7 @@ static size_t scenes = 16;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 
-static const double STEPS_MOST = 15000;
+static const double STEPS_MAX = 15000;
 static const double FLOOR = 1e-11;   // what is always allowed
 static const double FACTOR = 100;    // of what one last digit changes
 static const double CHAOTIC = 1e-11; // a scene that a last digit changes more is not judged
@@ -308,7 +308,7 @@ static Verdict judge(uint64_t number) {
     FrameTruth truth, answer;
     double residual;
     Misses misses, digit = {.is_same = true};
-    frame_truth(plan, &drawn.base, STEPS_MOST, &truth);
+    frame_truth(plan, &drawn.base, STEPS_MAX, &truth);
     if (!truth.is_whole) { // bounces within bounces: the engine too would go through millions
         frame_truth_clear(&truth);
         frame_clear(&drawn);

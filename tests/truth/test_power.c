@@ -14,8 +14,8 @@
 #include <cmocka.h>
 
 #include "core/math/fft.h"
-#include "core/solve/exact_accuracy.h"
 #include "core/solve/event_engine.h"
+#include "core/solve/exact_accuracy.h"
 #include "tests/support/scenes.h"
 #include "tests/truth/drawn.h"
 #include "tests/truth/power_reference.h"
@@ -24,7 +24,7 @@ static size_t scenes = 24;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 
-enum { IMPACTS_MOST = 300 };
+enum { IMPACTS_MAX = 300 };
 static const double FLOOR = 2e-11;   // what is always allowed
 static const double REFERENCE = 3e4; // what the reference misses, over a rounding's effect
 static const double CHAOTIC = 1e-10; // a scene that a rounding changes more is not judged
@@ -129,8 +129,8 @@ static Answer power_run(const PowerScene *scene, double tolerance) {
                .accuracy = &accuracy.accuracy,
                .columns = &column,
                .column_count = 1,
-               .steps_most = 1e9,
-               .impacts_most = 100000};
+               .steps_max = 1e9,
+               .impacts_max = 100000};
     answer.status = frame_run(&run, &answer.response, &problem);
     answer.steps = run.steps;
     if (answer.status != STATUS_OK && is_verbose)
@@ -201,7 +201,7 @@ static void full_accuracy_is_that_of_another_integrator(void **state) {
         assert_true(answer.response.energy.residual < 1e-10);
         const double size = answer.response.peaks.displacement;
         const double estimate = answer.response.error_estimate;
-        power_truth(scene.plan, &scene.base, IMPACTS_MOST, &truth);
+        power_truth(scene.plan, &scene.base, IMPACTS_MAX, &truth);
         if (estimate < CHAOTIC && truth.is_whole) {
             const double allowed = FLOOR + REFERENCE * estimate;
             const double error = difference(answer.x, truth.x, scene.plan->count) / size;

@@ -21,7 +21,7 @@ static uint64_t seed = 1;
 static bool is_verbose = false;
 
 enum { DOUBLES = 3 }; // of other sub-steps, for one may be right by luck
-static const double STEPS_MOST = 25000;
+static const double STEPS_MAX = 25000;
 static const double CHAOTIC = 1e-8; // a double that misses more cannot be judged by
 static const double FACTOR = 100;   // of what that double misses
 static const double FLOOR = 1e-12;
@@ -50,9 +50,9 @@ static void judge(const ReferenceScene *scene, size_t number, Tally *tally) {
     char text[400];
     const clock_t before = clock();
     for (int i = 0; i < DOUBLES; i++)
-        reference_double(scene, 1 - 0.2 * i, 2 * STEPS_MOST, &plain[i]);
+        reference_double(scene, 1 - 0.2 * i, 2 * STEPS_MAX, &plain[i]);
     if (plain[0].is_whole)
-        reference_quad(scene, 1, STEPS_MOST, &quad);
+        reference_quad(scene, 1, STEPS_MAX, &quad);
     tally->quad_seconds += (double)(clock() - before) / CLOCKS_PER_SEC;
     Outcome *outcome = drawn_run(scene, true);
     if (outcome == NULL)
@@ -240,7 +240,7 @@ static void the_reference_returns_restitution_and_contact_time(void **state) {
                                           .duration = 0.03,
                                           .sample_rate = 1000};
             ReferenceAnswer answer;
-            reference_quad(&scene, 1, STEPS_MOST, &answer);
+            reference_quad(&scene, 1, STEPS_MAX, &answer);
             assert_true(answer.is_whole && answer.impact_count == 1);
             const ReferenceImpact *impact = &answer.impacts[0];
             const double energy = 1.35 * 0.1107 / (1.35 + 0.1107) * 0.5 * 0.5 / 2 * (1 - e * e);

@@ -17,7 +17,7 @@ typedef struct Part {
 static const Field part_fields[] = {
     FIELD_TEXT(Part, material, 8, PRESENCE_OPTIONAL, 0, "where it comes from"),
     FIELD_REAL(Part, stiffness, "N/m", ABOVE(0), REQUIRED, "contact stiffness k_b"),
-    FIELD_REAL(Part, damping, "N s/m", AT_LEAST(0), OPTIONAL, "contact damping c_b"), FIELD_END};
+    FIELD_REAL(Part, damping, "N s/m", AT_MIN(0), OPTIONAL, "contact damping c_b"), FIELD_END};
 
 typedef struct Common {
     double offset;
@@ -44,7 +44,7 @@ static const Field round_fields[] = {FIELD_BASE(Round, common, common_fields),
                                      FIELD_END};
 static const Field square_fields[] = {
     FIELD_BASE(Square, common, common_fields),
-    FIELD_REALS(Square, sides, "m", AT_LEAST(0), 4, PRESENCE_REQUIRED, "of the square"), FIELD_END};
+    FIELD_REALS(Square, sides, "m", AT_MIN(0), 4, PRESENCE_REQUIRED, "of the square"), FIELD_END};
 
 static const Kind shape_round = {"round", "a circle", round_fields, sizeof(Round)};
 static const Kind shape_square = {"square", "a square", square_fields, sizeof(Square)};
@@ -81,7 +81,7 @@ static const char *const wanted[] = {"velocity", "displacement", NULL};
 
 static const Field whole_fields[] = {
     FIELD_REAL(Whole, mass, "kg", ABOVE(0), REQUIRED, "mass of it"),
-    FIELD_COUNT(Whole, storey, NULL, AT_LEAST(1), 3, "where"),
+    FIELD_COUNT(Whole, storey, NULL, AT_MIN(1), 3, "where"),
     FIELD_FLAG(Whole, is_open, 1, "a fact"),
     FIELD_TEXT(Whole, title, 10, PRESENCE_OPTIONAL, FIELD_NOTE, "for people"),
     FIELD_CHOICE(Whole, rule, rules, 1, "when it ends"),

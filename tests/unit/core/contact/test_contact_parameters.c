@@ -66,7 +66,7 @@ static void a_power_law_is_as_stiff_as_its_contact_time_asks_at_each_speed(void 
         assert_near(h * pow(0.1 / frozen.stiffness, 0.4) * pow(speed, -0.2), 0.02);
         assert_true(frozen.speed == speed);
     }
-    assert_true(contact_freeze(&stop, 0).speed == CONTACT_SPEED_LEAST);
+    assert_true(contact_freeze(&stop, 0).speed == CONTACT_SPEED_MIN);
     ContactNumbers known = measured;
     known.contact_time = NAN;
     known.stiffness = 1e5;

@@ -162,7 +162,7 @@ static void more_drops_than_the_limit_are_refused(void **state) {
     (void)state;
     Bytes bytes = {0};
     bytes_text(&bytes, "{\"drops\": [{\"contact_time\": 1}");
-    for (size_t i = 0; i < DROPS_MOST; i++)
+    for (size_t i = 0; i < DROPS_MAX; i++)
         bytes_text(&bytes, ", {\"contact_time\": 1}");
     bytes_text(&bytes, "]}");
     char *text = bytes_take(&bytes, NULL);

@@ -344,11 +344,11 @@ static void the_stated_confidence_is_kept(void **state) {
 static void a_thousand_drops_are_evaluated(void **state) {
     (void)state;
     DropTest test;
-    drops_make(&test, DROPS_MOST);
+    drops_make(&test, DROPS_MAX);
     test.gravity = 9.80665;
     uint64_t next = 0;
-    for (size_t i = 0; i < DROPS_MOST; i++) {
-        const double speed = 0.5 + (double)i / DROPS_MOST;
+    for (size_t i = 0; i < DROPS_MAX; i++) {
+        const double speed = 0.5 + (double)i / DROPS_MAX;
         const Pull pull = {9.80665, speed, SEPARATION_ZERO_FORCE, false};
         const Pulled pulled = gravity_pull(&pull, 0.7, 0.01);
         test.drops.at[i].approach_speed = speed;
@@ -357,7 +357,7 @@ static void a_thousand_drops_are_evaluated(void **state) {
         test.drops.at[i].contact_time = pulled.contact_time;
     }
     evaluate(&test, SEPARATION_ZERO_FORCE);
-    assert_int_equal(evaluation.restitution.count, DROPS_MOST);
+    assert_int_equal(evaluation.restitution.count, DROPS_MAX);
     assert_near(evaluation.restitution.mean, 0.7, 0.002);
     assert_near(evaluation.contact_time.mean / 0.01, 1, 0.001);
     evaluation_clear(&evaluation);
@@ -380,8 +380,8 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
     assert_int_equal(evaluation.rows.at[1].measurement, 7);
     evaluation_clear(&evaluation);
     DropTest many;
-    drops_make(&many, DROPS_MOST);
-    for (size_t i = 0; i < DROPS_MOST; i++)
+    drops_make(&many, DROPS_MAX);
+    for (size_t i = 0; i < DROPS_MAX; i++)
         many.drops.at[i].contact_time = 1;
     Measurement all[21];
     for (size_t i = 0; i < COUNT(all); i++)
@@ -393,12 +393,12 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
     evaluation_clear(&evaluation);
     // Two tests of the most samples go together, many do not; what is there is not looked at.
     double nothing[8] = {0};
-    Trace trace = {.interval = 1e-3, .force = {nothing, TRACE_SAMPLES_MOST}};
+    Trace trace = {.interval = 1e-3, .force = {nothing, TRACE_SAMPLES_MAX}};
     const DropTest large = {.traces = {&trace, 1}};
-    assert_int_equal(drop_test_samples(&large), TRACE_SAMPLES_MOST);
+    assert_int_equal(drop_test_samples(&large), TRACE_SAMPLES_MAX);
     for (size_t i = 0; i < COUNT(all); i++)
         all[i].test = &large;
-    assert_true(evaluation_samples(all, 2) <= EVALUATION_SAMPLES_MOST);
+    assert_true(evaluation_samples(all, 2) <= EVALUATION_SAMPLES_MAX);
     problem_clear(&problem);
     assert_int_equal(
         evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),

@@ -323,7 +323,7 @@ static void many_contacts_end_at_a_limit_that_is_told(void **state) {
     for (size_t i = 10; i < 4000; i += 10)
         record.values[i] = 1 + 1e-6 * (double)i;
     TraceReading reading = look(&record, &usual);
-    assert_int_equal(reading.contacts.count, TRACE_CONTACTS_MOST);
+    assert_int_equal(reading.contacts.count, TRACE_CONTACTS_MAX);
     assert_non_null(strstr(reading.why, "only the first"));
     trace_reading_clear(&reading);
 }

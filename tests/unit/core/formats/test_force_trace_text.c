@@ -91,7 +91,7 @@ static void what_cannot_be_meant_is_told_with_its_line(void **state) {
 
 static void a_trace_has_a_most(void **state) {
     (void)state;
-    const size_t count = (size_t)TRACE_SAMPLES_MOST + 1;
+    const size_t count = (size_t)TRACE_SAMPLES_MAX + 1;
     char *text = malloc(2 * count + 1);
     for (size_t i = 0; i < count; i++)
         memcpy(text + 2 * i, "1\n", 2);
@@ -100,7 +100,7 @@ static void a_trace_has_a_most(void **state) {
     assert_int_equal(read_text(text, 1e-4, &trace), STATUS_TOO_LARGE);
     text[2 * count - 2] = '\0';
     assert_int_equal(read_text(text, 1e-4, &trace), STATUS_OK);
-    assert_int_equal(trace.force.count, TRACE_SAMPLES_MOST);
+    assert_int_equal(trace.force.count, TRACE_SAMPLES_MAX);
     free(trace.force.at);
     free(text);
 }

@@ -143,13 +143,13 @@ static void the_tests_pair_has_an_effective_mass_where_it_is_known(void **state)
 
 static void slugs_are_plain(void **state) {
     (void)state;
-    char longest[MATERIAL_SLUG_MOST + 2];
+    char longest[MATERIAL_SLUG_MAX + 2];
     memset(longest, 'a', sizeof longest);
-    longest[MATERIAL_SLUG_MOST] = '\0';
+    longest[MATERIAL_SLUG_MAX] = '\0';
     assert_true(material_slug_is_good("soft_rubber-2"));
     assert_true(material_slug_is_good(longest));
-    longest[MATERIAL_SLUG_MOST] = 'a';
-    longest[MATERIAL_SLUG_MOST + 1] = '\0';
+    longest[MATERIAL_SLUG_MAX] = 'a';
+    longest[MATERIAL_SLUG_MAX + 1] = '\0';
     const char *const bad[] = {"", "Sponge", "a b", "a@1", "a/b", "\xc3\xa4", longest};
     for (size_t i = 0; i < COUNT(bad); i++)
         assert_false(material_slug_is_good(bad[i]));

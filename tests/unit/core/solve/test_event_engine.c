@@ -369,9 +369,9 @@ static void limits_and_cancelling_end_a_run_with_their_reason(void **state) {
     plan->count = 300001;
     assert_int_equal(status_of(plan, (Run){.progress = &progress}, &problem), STATUS_CANCELLED);
     assert_int_equal(asked, 3);
-    assert_int_equal(status_of(plan, (Run){.impacts_most = 5}, &problem), STATUS_LIMIT);
+    assert_int_equal(status_of(plan, (Run){.impacts_max = 5}, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "5 impacts"));
-    assert_int_equal(status_of(plan, (Run){.steps_most = 2e4}, &problem), STATUS_LIMIT);
+    assert_int_equal(status_of(plan, (Run){.steps_max = 2e4}, &problem), STATUS_LIMIT);
     assert_non_null(strstr(problem.detail, "2e+04 solver steps"));
     plan->displacement[0] = 1e308;
     assert_int_equal(status_of(plan, (Run){0}, &problem), STATUS_UNSTABLE);
@@ -425,7 +425,7 @@ static void masses_held_tight_wait_for_the_base_to_reach_them(void **state) {
         plan->separation = scene % 2 == 0 ? SEPARATION_ZERO_PENETRATION : SEPARATION_ZERO_FORCE;
         Response response = {0};
         Problem problem;
-        Run with = {.plan = plan, .base = &base, .steps_most = 1e6};
+        Run with = {.plan = plan, .base = &base, .steps_max = 1e6};
         problem_clear(&problem);
         if (frame_run(&with, &response, &problem) != STATUS_OK)
             fail_msg("scene %d: %s", scene, problem.detail);

@@ -59,7 +59,7 @@ static Plan *draw(void) {
 
 // How many of RUNS scenes a solver answers; the others it must refuse in words.
 static void run_all(Status (*solve)(Run *run, Response *response, Problem *problem),
-                    double steps_most, size_t *answered, size_t *refused) {
+                    double steps_max, size_t *answered, size_t *refused) {
     seed = 1;
     *answered = *refused = 0;
     for (int i = 0; i < RUNS; i++) {
@@ -75,7 +75,7 @@ static void run_all(Status (*solve)(Run *run, Response *response, Problem *probl
             base.count = 7;
             base.interval = uniform(0, 1) < 0.5 ? 1 / plan->sample_rate : 0.013;
         }
-        Run run = {.plan = plan, .base = &base, .steps_most = steps_most, .impacts_most = 5000};
+        Run run = {.plan = plan, .base = &base, .steps_max = steps_max, .impacts_max = 5000};
         Response response = {0};
         Problem problem;
         problem_clear(&problem);

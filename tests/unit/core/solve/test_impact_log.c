@@ -14,13 +14,13 @@
 static Problem problem;
 
 // A run that starts with 2 J and ends with `end`, of which the base gave `input`.
-static Status balance(double end, double input, double gain_most) {
+static Status balance(double end, double input, double gain_max) {
     Response response = {0};
     Ledger ledger;
     const EnergyState first = {1.5, 0.5}, last = {end, 0};
     problem_clear(&problem);
     ledger_start(&ledger, &response, 0, &first);
-    ledger.gain_most = gain_most;
+    ledger.gain_max = gain_max;
     ledger_work(&ledger, input, 0);
     const Status status = ledger_finish(&ledger, NULL, 0, &last, &problem);
     response_clear(&response);
@@ -53,7 +53,7 @@ static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
     const EnergyState first = {2, 0}, middle = {3, 0};
     problem_clear(&problem);
     ledger_start(&ledger, &response, 0, &first);
-    ledger.gain_most = 1e-6;
+    ledger.gain_max = 1e-6;
     assert_int_equal(ledger_status(&ledger, &problem), STATUS_OK);
     ledger_balance(&ledger, &middle);
     assert_int_equal(ledger_status(&ledger, &problem), STATUS_UNSTABLE);

@@ -47,7 +47,7 @@ static void fly(const Lanes *lanes, const State *start, double room, const doubl
                    .left = room,
                    .right = room,
                    .middle = 0.001,
-                   .base_most = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
+                   .base_max = base == NULL && lanes->base_omega == 0 ? 0 : 1.4,
                    .base = &cursor};
     for (int i = 0; i < CHANNEL_COUNT; i++)
         if (i <= CHANNEL_DAMPER_VELOCITY)

@@ -527,14 +527,14 @@ static void runs_stop_when_told_or_at_a_limit(void **state) {
         response = (Response){0};
         run.progress = NULL;
         run.steps = 0;
-        run.steps_most = 30000;
+        run.steps_max = 30000;
         problem_clear(&problem);
         assert_int_equal((*at)->run(&run, &response, &problem), STATUS_LIMIT);
         assert_true(run.steps < 200000);
         response_clear(&response);
         response = (Response){0};
-        run.steps_most = 0;
-        run.impacts_most = 1;
+        run.steps_max = 0;
+        run.impacts_max = 1;
         problem_clear(&problem);
         assert_int_equal((*at)->run(&run, &response, &problem), STATUS_LIMIT);
         assert_non_null(strstr(problem.detail, "impacts"));

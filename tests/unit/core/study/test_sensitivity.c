@@ -309,8 +309,8 @@ static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(1, 0.025, 1);
     complete(&inquiry);
-    assert_true(change_most(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
-    assert_true(change_most(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
+    assert_true(change_max(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
+    assert_true(change_max(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
     Sensitivity *answer = make(&inquiry);
     assert_true(
         !isnan(slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_RMS_DISPLACEMENT)->derivative));

@@ -36,7 +36,7 @@ static int teardown(void **state) {
 
 static void the_file_wins_over_the_environment(void **state) {
     (void)state;
-    char token[TOKEN_MOST + 1];
+    char token[TOKEN_MAX + 1];
     assert_int_equal(unsetenv("IMPACTD_TOKEN"), 0);
     assert_int_equal(token_read(NULL, token, NULL), STATUS_OK);
     assert_string_equal(token, "");
@@ -52,7 +52,7 @@ static void the_file_wins_over_the_environment(void **state) {
 
 static void files_that_others_can_read_are_refused(void **state) {
     (void)state;
-    char token[TOKEN_MOST + 1];
+    char token[TOKEN_MAX + 1];
     static const mode_t modes[] = {0644, 0640, 0604, 0620, 0602, 0601};
     for (size_t i = 0; i < COUNT(modes); i++) {
         put("secret", modes[i]);
@@ -65,10 +65,10 @@ static void files_that_others_can_read_are_refused(void **state) {
 
 static void what_is_no_token_is_refused_and_not_told(void **state) {
     (void)state;
-    char token[TOKEN_MOST + 1];
-    char longest[TOKEN_MOST + 2];
+    char token[TOKEN_MAX + 1];
+    char longest[TOKEN_MAX + 2];
     memset(longest, 'x', sizeof longest);
-    longest[TOKEN_MOST + 1] = '\0';
+    longest[TOKEN_MAX + 1] = '\0';
     const char *const wrong[] = {"", "\nx", "secret word", "secret\x01", "secret\xc3\xa4", longest};
     Problem *problem = calloc(1, sizeof *problem);
     for (size_t i = 0; i < COUNT(wrong); i++) {
@@ -77,7 +77,7 @@ static void what_is_no_token_is_refused_and_not_told(void **state) {
         assert_int_equal(token_read(path, token, problem), STATUS_USAGE);
         assert_null(strstr(problem->faults[0].detail, "secret"));
     }
-    longest[TOKEN_MOST] = '\0';
+    longest[TOKEN_MAX] = '\0';
     put(longest, 0600);
     assert_int_equal(token_read(path, token, NULL), STATUS_OK);
     assert_string_equal(token, longest);

@@ -64,13 +64,13 @@ static void more_than_are_shown_are_counted(void **state) {
     Bytes texts[2] = {{0}, {0}};
     for (int t = 0; t < 2; t++) {
         bytes_text(&texts[t], "{");
-        for (int i = 0; i < DIFFER_MOST + 5; i++)
+        for (int i = 0; i < DIFFER_MAX + 5; i++)
             bytes_format(&texts[t], "%s\"m%d\": %d", i > 0 ? ", " : "", i, t);
         bytes_text(&texts[t], "}");
     }
     Differences differences;
     assert_int_equal(differ_json(texts[0].at, texts[1].at, NULL, &differences, NULL), STATUS_OK);
-    assert_true(differences.count == DIFFER_MOST && differences.more == 5);
+    assert_true(differences.count == DIFFER_MAX && differences.more == 5);
     differences_clear(&differences);
     bytes_clear(&texts[0]);
     bytes_clear(&texts[1]);

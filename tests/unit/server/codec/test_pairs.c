@@ -82,12 +82,12 @@ static void rows_are_bounded_and_long_texts_cut(void **state) {
     (void)state;
     Bytes text = {0};
     bytes_text(&text, "{\"rows\": [");
-    for (int i = 0; i < 3 * PAIRS_MOST; i++)
+    for (int i = 0; i < 3 * PAIRS_MAX; i++)
         bytes_format(&text, "%s{\"a\": \"%01000d\", \"b\": %d}", i > 0 ? "," : "", i, i);
     bytes_text(&text, "]}");
     Pairs pairs;
     assert_int_equal(pairs_read(text.at, text.count, &pairs, NULL), STATUS_OK);
-    assert_int_equal(pairs.count, PAIRS_MOST);
+    assert_int_equal(pairs.count, PAIRS_MAX);
     assert_true(strlen(pairs.at[7].a) < PAIRS_TEXT);
     pairs_clear(&pairs);
     bytes_clear(&text);
