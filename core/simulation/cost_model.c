@@ -3,10 +3,10 @@
 #include <math.h>
 
 #include "core/simulation/accuracy_target.h"
-#include "core/simulation/undamped_baseline.h"
 #include "core/simulation/choice.h"
+#include "core/simulation/undamped_baseline.h"
 #include "core/solve/exact_accuracy.h"
-#include "core/solve/frame_work.h"
+#include "core/solve/step_work.h"
 
 static const double TURN = 6.28318530717958647693;
 
@@ -89,11 +89,11 @@ static double frame_steps(const Scene *scene, const Outlook *outlook) {
     const size_t n = outlook->modes, m = scene->dampers.count;
     const bool is_coupled = outlook->is_coupled;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    const double arc = frame_work_steps(FRAME_WORK_ARC, n, m, is_coupled);
-    const double event = frame_work_steps(FRAME_WORK_EVENT, n, m, is_coupled);
-    const double flight = frame_work_steps(FRAME_WORK_FLIGHT, n, m, is_coupled);
+    const double arc = step_work_steps(STEP_WORK_ARC, n, m, is_coupled);
+    const double event = step_work_steps(STEP_WORK_EVENT, n, m, is_coupled);
+    const double flight = step_work_steps(STEP_WORK_FLIGHT, n, m, is_coupled);
     const double contact = law->form == CONTACT_POWER
-                               ? frame_work_steps(FRAME_WORK_POWER, n, m, is_coupled) *
+                               ? step_work_steps(STEP_WORK_POWER, n, m, is_coupled) *
                                      (EASY + (1 - EASY) * outlook->digits / DIGITS)
                            : law->form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
                                                             : FRAME_ARCS * arc;

@@ -19,30 +19,30 @@
 // Only rounding could make so many rounds of a few dampers.
 enum { ROUNDS_MAX = 100000 };
 
-void frame_push(Frame *frame, const double *impulses) {
-    for (size_t d = 0; d < frame->dampers; d++) {
+void modal_state_push(ModalState *state, const double *impulses) {
+    for (size_t d = 0; d < state->dampers; d++) {
         const double impulse = impulses[d];
         if (impulse == 0)
             continue;
-        const double *shape = frame->damper[d].shape;
-        for (size_t i = 0; i < frame->mode_count; i++)
-            frame->p[i] += shape[i] * impulse;
-        for (size_t e = 0; e < frame->dampers; e++)
-            frame->damper[e].w -= frame->yield[e * frame->dampers + d] * impulse;
+        const double *shape = state->damper[d].shape;
+        for (size_t i = 0; i < state->mode_count; i++)
+            state->p[i] += shape[i] * impulse;
+        for (size_t e = 0; e < state->dampers; e++)
+            state->damper[e].w -= state->delassus[e * state->dampers + d] * impulse;
     }
 }
 
-static double coupling(const Frame *frame, size_t d, size_t e) {
-    return frame_sign(frame->damper[d].side) * frame_sign(frame->damper[e].side) *
-           frame->yield[d * frame->dampers + e];
+static double coupling(const ModalState *state, size_t d, size_t e) {
+    return modal_state_sign(state->damper[d].side) * modal_state_sign(state->damper[e].side) *
+           state->delassus[d * state->dampers + e];
 }
 
 // Relative speed that stop d lacks with the present impulses; 0 where that is rounding.
-static double lack(const Frame *frame, size_t d) {
-    const double asked = frame->damper[d].closing + frame->damper[d].parting;
+static double lack(const ModalState *state, size_t d) {
+    const double asked = state->damper[d].approach_speed + state->damper[d].separation_speed;
     double sum = asked, size = asked;
-    for (size_t e = 0; e < frame->dampers; e++) {
-        const double given = coupling(frame, d, e) * frame->damper[e].pressed;
+    for (size_t e = 0; e < state->dampers; e++) {
+        const double given = coupling(state, d, e) * state->damper[e].impulse;
         sum -= given;
         size += fabs(given);
     }
@@ -50,75 +50,75 @@ static double lack(const Frame *frame, size_t d) {
 }
 
 // `wanted` of all stops that press, were it to them alone: coupling = L D L', row after row.
-static void solve(Frame *frame) {
-    const size_t n = frame->dampers;
-    double *L = frame->scratch;
+static void solve(ModalState *state) {
+    const size_t n = state->dampers;
+    double *L = state->scratch;
     for (size_t i = 0; i < n; i++) {
-        FrameDamper *damper = &frame->damper[i];
+        DamperState *damper = &state->damper[i];
         if (!damper->is_pressing)
             continue;
-        damper->wanted = damper->closing + damper->parting;
+        damper->wanted = damper->approach_speed + damper->separation_speed;
         for (size_t j = 0; j <= i; j++) {
-            if (!frame->damper[j].is_pressing)
+            if (!state->damper[j].is_pressing)
                 continue;
-            double sum = coupling(frame, i, j);
+            double sum = coupling(state, i, j);
             for (size_t k = 0; k < j; k++)
-                if (frame->damper[k].is_pressing)
+                if (state->damper[k].is_pressing)
                     sum -= L[i * n + k] * L[k * n + k] * L[j * n + k];
             L[i * n + j] = i == j ? sum : sum / L[j * n + j];
             if (j < i)
-                damper->wanted -= L[i * n + j] * frame->damper[j].wanted;
+                damper->wanted -= L[i * n + j] * state->damper[j].wanted;
         }
     }
     for (size_t i = n; i-- > 0;) {
-        FrameDamper *damper = &frame->damper[i];
+        DamperState *damper = &state->damper[i];
         if (!damper->is_pressing)
             continue;
         damper->wanted /= L[i * n + i];
         for (size_t j = i + 1; j < n; j++)
-            if (frame->damper[j].is_pressing)
-                damper->wanted -= L[j * n + i] * frame->damper[j].wanted;
+            if (state->damper[j].is_pressing)
+                damper->wanted -= L[j * n + i] * state->damper[j].wanted;
     }
 }
 
 // From the present impulses as far towards the wanted ones as all only press; false: one that no
 // longer does has dropped out.
-static bool approach(Frame *frame) {
+static bool approach(ModalState *state) {
     double share = 1;
-    FrameDamper *least = NULL;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
+    DamperState *least = NULL;
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
         if (!damper->is_pressing || damper->plan->clearance == 0 || damper->wanted > 0)
             continue;
-        const double part = damper->pressed / (damper->pressed - damper->wanted);
+        const double part = damper->impulse / (damper->impulse - damper->wanted);
         if (least == NULL || !(part >= share)) { // not a number where both are 0
             share = part > 0 ? part : 0;
             least = damper;
         }
     }
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
         if (damper->is_pressing)
-            damper->pressed = least == NULL
+            damper->impulse = least == NULL
                                   ? damper->wanted
-                                  : damper->pressed + share * (damper->wanted - damper->pressed);
+                                  : damper->impulse + share * (damper->wanted - damper->impulse);
     }
     if (least == NULL)
         return true;
-    least->pressed = 0;
+    least->impulse = 0;
     least->is_pressing = false;
     return false;
 }
 
 // The stop that lacks most; NULL where none does.
-static FrameDamper *find_lacking(Frame *frame) {
-    FrameDamper *most = NULL;
+static DamperState *find_lacking(ModalState *state) {
+    DamperState *most = NULL;
     double largest = 0;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
-        if (!damper->is_met || damper->is_pressing || damper->is_spent)
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        if (!damper->in_collision || damper->is_pressing || damper->is_finished)
             continue;
-        const double weight = lack(frame, d) / sqrt(frame->yield[d * frame->dampers + d]);
+        const double weight = lack(state, d) / sqrt(state->delassus[d * state->dampers + d]);
         if (weight > largest) {
             largest = weight;
             most = damper;
@@ -129,41 +129,41 @@ static FrameDamper *find_lacking(Frame *frame) {
 
 // One stop more presses. Where it would pull, what it lacked was rounding: it stays out until
 // another joins.
-static void join(Frame *frame, FrameDamper *damper) {
+static void join(ModalState *state, DamperState *damper) {
     damper->is_pressing = true;
-    solve(frame);
+    solve(state);
     if (!(damper->wanted > 0)) {
         damper->is_pressing = false;
-        damper->is_spent = true;
+        damper->is_finished = true;
         return;
     }
-    for (size_t d = 0; d < frame->dampers; d++)
-        frame->damper[d].is_spent = false;
-    while (!approach(frame))
-        solve(frame);
+    for (size_t d = 0; d < state->dampers; d++)
+        state->damper[d].is_finished = false;
+    while (!approach(state))
+        solve(state);
 }
 
-void frame_collide(Frame *frame) {
-    double *impulses = frame->scratch;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
-        damper->pressed = 0;
-        damper->is_pressing = damper->is_met && damper->plan->clearance == 0;
-        damper->is_spent = false;
+void collision_resolve(ModalState *state) {
+    double *impulses = state->scratch;
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        damper->impulse = 0;
+        damper->is_pressing = damper->in_collision && damper->plan->clearance == 0;
+        damper->is_finished = false;
     }
-    solve(frame);
-    (void)approach(frame); // these may pull
-    FrameDamper *next = NULL;
-    for (size_t i = 0; i < ROUNDS_MAX && (next = find_lacking(frame)) != NULL; i++)
-        join(frame, next);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        impulses[d] = damper->is_met ? frame_sign(damper->side) * damper->pressed : 0;
+    solve(state);
+    (void)approach(state); // these may pull
+    DamperState *next = NULL;
+    for (size_t i = 0; i < ROUNDS_MAX && (next = find_lacking(state)) != NULL; i++)
+        join(state, next);
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        impulses[d] = damper->in_collision ? modal_state_sign(damper->side) * damper->impulse : 0;
     }
-    frame_push(frame, impulses);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
-        if (damper->is_met && damper->pressed != 0)
-            damper->w = -frame_sign(damper->side) * damper->parting;
+    modal_state_push(state, impulses);
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        if (damper->in_collision && damper->impulse != 0)
+            damper->w = -modal_state_sign(damper->side) * damper->separation_speed;
     }
 }

@@ -6,9 +6,9 @@
 #include "core/solve/modal_state.h"
 
 // Of all dampers with is_met, each at its `side`: finds `pressed` and changes all speeds, p and w.
-void frame_collide(Frame *frame);
+void collision_resolve(ModalState *state);
 
 // N's impulses [N s], one per damper, change all speeds.
-void frame_push(Frame *frame, const double *impulses);
+void modal_state_push(ModalState *state, const double *impulses);
 
 #endif

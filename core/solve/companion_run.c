@@ -11,97 +11,97 @@ static const double FINER = 30;    // than the run's tolerance
 static const double CAUTION = 3;   // with what comes between two comparisons
 
 // Whether the run's contacts may be wrong by more than rounding.
-static bool is_loose(const FrameEngine *engine) {
-    return engine->ode.tolerance > FRAME_ODE_TOLERANCE;
+static bool is_loose(const EventEngine *engine) {
+    return engine->ode.tolerance > POWER_CONTACT_TOLERANCE;
 }
 
 // Some roundings more, of either sign.
-static void nudge(Frame *frame) {
+static void nudge(ModalState *state) {
     const double by = NUDGE;
-    for (size_t i = 0; i < frame->mode_count; i++) {
-        const double sign = (frame->sample / NEIGHBOUR_SAMPLES + i) % 2 == 0 ? 1 : -1;
-        frame->q[i] *= 1 + sign * by;
-        frame->p[i] *= 1 - sign * by;
+    for (size_t i = 0; i < state->mode_count; i++) {
+        const double sign = (state->sample / COMPANION_SAMPLES + i) % 2 == 0 ? 1 : -1;
+        state->q[i] *= 1 + sign * by;
+        state->p[i] *= 1 - sign * by;
     }
 }
 
 // Of a difference, what the run's error is taken for.
-static double part_of(const FrameNeighbour *neighbour) {
+static double part_of(const CompanionRun *neighbour) {
     return neighbour->is_stepped ? CAUTION : 1;
 }
 
 // Of the modes' displacements at one sample.
-static void look(FrameNeighbour *neighbour, const Frame *frame, const double *run,
+static void look(CompanionRun *neighbour, const ModalState *state, const double *run,
                  const double *near) {
-    const size_t n = frame->mode_count;
+    const size_t n = state->mode_count;
     double *apart = neighbour->apart, bound = 0, difference = 0;
     for (size_t i = 0; i < n; i++) {
         apart[i] = run[i] - near[i];
-        bound += frame->widest[i] * fabs(apart[i]);
+        bound += state->max_shape[i] * fabs(apart[i]);
     }
     if (bound <= neighbour->worst)
         return;
-    const double *values = frame_spread(frame, apart);
-    for (size_t j = 0; j < frame->storey_count; j++)
+    const double *values = modal_state_expand(state, apart);
+    for (size_t j = 0; j < state->storey_count; j++)
         difference = fmax(difference, fabs(values[j]));
     neighbour->worst = fmax(neighbour->worst, difference);
 }
 
-static void compare(FrameNeighbour *neighbour, const Frame *frame, size_t before) {
-    neighbour->largest = fmax(neighbour->largest, frame->ledger.response->peaks.displacement);
+static void compare(CompanionRun *neighbour, const ModalState *state, size_t before) {
+    neighbour->largest = fmax(neighbour->largest, state->impacts.response->peaks.displacement);
     if (neighbour->is_stepped) {
         // Such an error is no growing noise: it swings as the motion does.
-        const double *run = neighbour->tracks, *near = run + NEIGHBOUR_SAMPLES * frame->padded;
-        for (size_t k = 0; k < frame->sample - before; k++)
-            look(neighbour, frame, run + k * frame->padded, near + k * frame->padded);
+        const double *run = neighbour->tracks, *near = run + COMPANION_SAMPLES * state->padded;
+        for (size_t k = 0; k < state->sample - before; k++)
+            look(neighbour, state, run + k * state->padded, near + k * state->padded);
     } else {
-        look(neighbour, frame, frame->q, neighbour->engine.frame.q);
+        look(neighbour, state, state->q, neighbour->engine.state.q);
     }
     const double error = part_of(neighbour) * neighbour->worst;
     if (isnan(neighbour->horizon) && !(error <= RESPONSE_PARTING * neighbour->largest))
-        neighbour->horizon = (double)before / frame->plan->sample_rate;
-    neighbour->is_spent = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
+        neighbour->horizon = (double)before / state->plan->sample_rate;
+    neighbour->is_finished = error > (neighbour->is_stepped ? 1 : PARTED) * neighbour->largest;
 }
 
-bool frame_neighbour_step(FrameNeighbour *neighbour, const Frame *frame) {
-    if (neighbour->is_spent)
+bool companion_run_step(CompanionRun *neighbour, const ModalState *state) {
+    if (neighbour->is_finished)
         return true;
-    neighbour->run.steps = frame->run->steps;
-    Frame *own = &neighbour->engine.frame;
+    neighbour->run.steps = state->run->steps;
+    ModalState *own = &neighbour->engine.state;
     const size_t from = own->sample;
     nudge(own);
-    while (own->sample < frame->sample && neighbour->is_known)
-        neighbour->is_known = frame_engine_step(&neighbour->engine, frame->sample) == STATUS_OK;
-    frame->run->work.neighbour_samples += own->sample - from;
-    frame->run->steps = neighbour->run.steps;
+    while (own->sample < state->sample && neighbour->is_known)
+        neighbour->is_known = event_engine_step(&neighbour->engine, state->sample) == STATUS_OK;
+    state->run->work.neighbour_samples += own->sample - from;
+    state->run->steps = neighbour->run.steps;
     if (neighbour->is_known)
-        compare(neighbour, frame, from);
+        compare(neighbour, state, from);
     else
-        neighbour->is_spent = true;
+        neighbour->is_finished = true;
     return neighbour->is_known;
 }
 
-void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
-    const Frame *frame = &engine->frame;
+void companion_run_start(CompanionRun *neighbour, EventEngine *engine) {
+    const ModalState *state = &engine->state;
     memset(neighbour, 0, sizeof *neighbour);
     neighbour->horizon = NAN;
-    neighbour->is_known = neighbour->is_spent = true;
-    if (!frame->has_stops)
+    neighbour->is_known = neighbour->is_finished = true;
+    if (!state->has_stops)
         return;
-    neighbour->run = (Run){.plan = frame->plan,
-                           .base = frame->run->base,
-                           .progress = frame->run->progress,
-                           .steps_max = frame->run->steps_max};
+    neighbour->run = (Run){.plan = state->plan,
+                           .base = state->run->base,
+                           .progress = state->run->progress,
+                           .steps_max = state->run->steps_max};
     neighbour->response.is_unlisted = true;
-    Frame *own = &neighbour->engine.frame;
-    neighbour->is_stepped = frame->plan->form == CONTACT_POWER && is_loose(engine);
-    const size_t tracked = neighbour->is_stepped ? NEIGHBOUR_SAMPLES * frame->padded : 0;
+    ModalState *own = &neighbour->engine.state;
+    neighbour->is_stepped = state->plan->form == CONTACT_POWER && is_loose(engine);
+    const size_t tracked = neighbour->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
     neighbour->tracks = calloc(2 * tracked + 1, sizeof *neighbour->tracks);
-    neighbour->apart = calloc(frame->padded, sizeof *neighbour->apart);
+    neighbour->apart = calloc(state->padded, sizeof *neighbour->apart);
     neighbour->is_known =
         neighbour->apart != NULL && neighbour->tracks != NULL &&
-        frame_engine_shadow(&neighbour->engine, engine, &neighbour->run,
-                            fmax(engine->ode.tolerance / FINER, FRAME_ODE_TOLERANCE),
+        event_engine_shadow(&neighbour->engine, engine, &neighbour->run,
+                            fmax(engine->ode.tolerance / FINER, POWER_CONTACT_TOLERANCE),
                             &neighbour->response) == STATUS_OK;
     if (!neighbour->is_known)
         return;
@@ -113,16 +113,17 @@ void frame_neighbour_start(FrameNeighbour *neighbour, FrameEngine *engine) {
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
             (own->damper[d].r > 0 ? -1 : 1) * NUDGE * own->damper[d].plan->clearance;
-    neighbour->is_known = frame_engine_settle(&neighbour->engine) == STATUS_OK;
-    neighbour->is_spent = !neighbour->is_known;
+    neighbour->is_known = event_engine_settle(&neighbour->engine) == STATUS_OK;
+    neighbour->is_finished = !neighbour->is_known;
 }
 
-void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, Response *response) {
+void companion_run_tell(const CompanionRun *neighbour, const ModalState *state,
+                        Response *response) {
     const double size = fmax(neighbour->largest, response->peaks.displacement);
     // A frequency's own rounding turns the phase; a pulse is over before it matters.
-    const Base *base = frame->run->base;
-    const double rate = fmax(frame->rate, base->form == BASE_SINE ? base->omega : 0);
-    const double drift = DBL_EPSILON * (1 + rate * frame->plan->duration);
+    const Base *base = state->run->base;
+    const double rate = fmax(state->rate, base->form == BASE_SINE ? base->omega : 0);
+    const double drift = DBL_EPSILON * (1 + rate * state->plan->duration);
     const double worst = part_of(neighbour) * neighbour->worst;
     const double error = size > 0 ? fmax(worst / size, drift) : 0;
     response->has_trust = neighbour->is_known;
@@ -132,9 +133,9 @@ void frame_neighbour_tell(const FrameNeighbour *neighbour, const Frame *frame, R
     response->trust_horizon = error <= RESPONSE_PARTING ? (double)NAN : neighbour->horizon;
 }
 
-void frame_neighbour_clear(FrameNeighbour *neighbour) {
-    frame_ode_clear(&neighbour->engine.ode);
-    frame_clear(&neighbour->engine.frame);
+void companion_run_clear(CompanionRun *neighbour) {
+    power_contact_clear(&neighbour->engine.ode);
+    modal_state_clear(&neighbour->engine.state);
     response_clear(&neighbour->response);
     free(neighbour->apart);
     free(neighbour->tracks);

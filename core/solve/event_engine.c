@@ -4,46 +4,46 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/exact_accuracy.h"
 #include "core/solve/companion_run.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/recorder.h"
 
-static Status solve(FrameEngine *engine, FrameNeighbour *neighbour) {
-    Frame *frame = &engine->frame;
-    const Plan *plan = frame->plan;
-    TRY(frame_engine_settle(engine));
-    frame_engine_take_sample(engine);
-    frame_neighbour_start(neighbour, engine);
-    while (frame->sample + 1 < plan->count) {
-        const size_t next = (frame->sample / NEIGHBOUR_SAMPLES + 1) * NEIGHBOUR_SAMPLES;
+static Status solve(EventEngine *engine, CompanionRun *neighbour) {
+    ModalState *state = &engine->state;
+    const Plan *plan = state->plan;
+    TRY(event_engine_settle(engine));
+    event_engine_take_sample(engine);
+    companion_run_start(neighbour, engine);
+    while (state->sample + 1 < plan->count) {
+        const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
-        while (frame->sample < until)
-            TRY(frame_engine_step(engine, until));
-        if (!frame_neighbour_step(neighbour, frame))
-            TRY(frame_engine_check(engine)); // it may have been told to stop
+        while (state->sample < until)
+            TRY(event_engine_step(engine, until));
+        if (!companion_run_step(neighbour, state))
+            TRY(event_engine_check(engine)); // it may have been told to stop
     }
-    frame_neighbour_tell(neighbour, frame, frame->ledger.response);
+    companion_run_tell(neighbour, state, state->impacts.response);
     // The duration may end between samples.
-    TRY(frame_engine_cross(engine, plan->duration - (double)frame->sample / plan->sample_rate));
-    frame_record_note(frame);
-    TRY(frame_engine_check(engine));
-    return frame_record_ledger(frame);
+    TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));
+    recorder_note(state);
+    TRY(event_engine_check(engine));
+    return recorder_ledger(state);
 }
 
-Status frame_run(Run *run, Response *response, Problem *problem) {
-    FrameEngine engine;
-    FrameNeighbour *neighbour = calloc(1, sizeof *neighbour);
+Status event_engine_run(Run *run, Response *response, Problem *problem) {
+    EventEngine engine;
+    CompanionRun *neighbour = calloc(1, sizeof *neighbour);
     if (neighbour == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
     memset(&engine, 0, sizeof engine);
     Status status =
-        frame_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
+        event_engine_make(&engine, run, exact_tolerance(run->accuracy), response, problem);
     if (status == STATUS_OK)
         status = solve(&engine, neighbour);
     if (engine.record.block != NULL)
-        frame_record_finish(&engine.record, &engine.frame, response);
-    frame_engine_clear(&engine);
-    frame_neighbour_clear(neighbour);
+        recorder_finish(&engine.record, &engine.state, response);
+    event_engine_clear(&engine);
+    companion_run_clear(neighbour);
     free(neighbour);
     return status;
 }

@@ -7,6 +7,6 @@
 #include "core/solve/solver.h"
 
 // As Solver.run.
-Status frame_run(Run *run, Response *response, Problem *problem);
+Status event_engine_run(Run *run, Response *response, Problem *problem);
 
 #endif

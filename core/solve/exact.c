@@ -33,11 +33,11 @@ static const double ARC_STEPS = 4, ARC_ORDER_STEPS = 0.7, EVENT_STEPS = 8, HOLD_
 
 static void take_integrals(Exact *exact, const ArcIntegrals *integrals) {
     const Plan *plan = exact->plan;
-    ledger_work(&exact->ledger,
-                -plan->mass[0] * integrals->av -
-                    exact->damper->mass * (integrals->av + integrals->aw),
-                plan->damping[0] * integrals->vv);
-    recorder_base(&exact->recorder, integrals->a);
+    impact_log_work(&exact->ledger,
+                    -plan->mass[0] * integrals->av -
+                        exact->damper->mass * (integrals->av + integrals->aw),
+                    plan->damping[0] * integrals->vv);
+    exact_record_base(&exact->recorder, integrals->a);
 }
 
 // What a stretch of contact or rest adds to its row of the ledger.
@@ -45,15 +45,15 @@ static void take_contact(Exact *exact, const Arc *arc, const ArcIntegrals *integ
     const double mass = exact_effective_mass(exact);
     double s = -1;
     const double peak =
-        arc_peak_force(arc, ledger_least_force(&exact->ledger, &exact->row) / mass, &s);
-    ledger_force(&exact->ledger, &exact->row, mass * peak);
+        arc_peak_force(arc, impact_log_least_force(&exact->ledger, &exact->row) / mass, &s);
+    impact_log_force(&exact->ledger, &exact->row, mass * peak);
     if (s >= 0) {
         const State middle = arc_at(arc, s);
         const double n = root_value(arc->force, arc->degree - 1, s) / (arc->length * arc->length);
         const double own = exact->flying.damping * middle.v + exact->flying.omega2 * middle.x;
-        ledger_acceleration(&exact->ledger, exact->resting.share * n - own);
+        impact_log_acceleration(&exact->ledger, exact->resting.share * n - own);
     }
-    ledger_stretch(
+    impact_log_stretch(
         &exact->ledger, &exact->row, arc->length, mass * arc_impulse(arc),
         exact->phase == CONTACT ? exact->damper->stops[exact->side].damping * integrals->ww : 0);
 }
@@ -97,7 +97,7 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     State end;
     const HoldLevel *level =
         hold_step(held, &exact->state, slice, length, exact_sign(exact->side),
-                  ledger_least_force(&exact->ledger, &exact->row) / mass, &end);
+                  impact_log_least_force(&exact->ledger, &exact->row) / mass, &end);
     if (level == NULL)
         return false;
     double impulse;
@@ -105,9 +105,9 @@ static bool hold(Exact *exact, const Slice *slice, double length) {
     take_integrals(exact, &integrals);
     exact->state = end;
     exact->offset += level->length;
-    ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
-    ledger_stretch(&exact->ledger, &exact->row, level->length, mass * impulse,
-                   exact->damper->stops[exact->side].damping * integrals.ww);
+    impact_log_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
+    impact_log_stretch(&exact->ledger, &exact->row, level->length, mass * impulse,
+                       exact->damper->stops[exact->side].damping * integrals.ww);
     return true;
 }
 
@@ -154,7 +154,7 @@ static Status advance(Exact *exact, double length) {
             exact_touch(exact, side);
         else
             exact_release(exact);
-        TRY(ledger_status(&exact->ledger, exact->problem));
+        TRY(impact_log_status(&exact->ledger, exact->problem));
     }
     return ++exact->arcs >= WATCH_ARCS ? keep_going(exact) : STATUS_OK;
 }
@@ -167,7 +167,7 @@ static bool fly(Exact *exact) {
         return false;
     ArcIntegrals integrals;
     integrals.ww = 0;
-    const State end = flight_step(&exact->flight, &exact->state, &slice, &integrals);
+    const State end = exact_flight_step(&exact->flight, &exact->state, &slice, &integrals);
     if (exact->has_stops) {
         exact->run->work.stop_searches++;
         const double first = fabs(slice.value),
@@ -175,8 +175,8 @@ static bool fly(Exact *exact) {
         const double most = slice.omega > 0 ? first + fabs(slice.slope)
                             : first > last  ? first
                                             : last;
-        const double sag = flight_curvature(&exact->flight, &exact->state, most) * exact->interval *
-                           exact->interval / 8;
+        const double sag = exact_flight_curvature(&exact->flight, &exact->state, most) *
+                           exact->interval * exact->interval / 8;
         const double nearest = exact_room(exact, SIDE_RIGHT) - sag,
                      furthest = sag - exact_room(exact, SIDE_LEFT);
         if (!(exact->state.r < nearest && end.r < nearest && exact->state.r > furthest &&
@@ -270,12 +270,12 @@ static Status prepare(Exact *exact, Run *run, Response *response, Problem *probl
     trust_start(&exact->trust, &exact->flying, exact->touching, &exact->resting, &exact->state,
                 exact->damper->clearance, run->base->form == BASE_SINE, plan->duration);
     const EnergyState energy = exact_energy(exact);
-    ledger_start(&exact->ledger, response, run->impacts_max, &energy);
-    exact->ledger.gain_max = LEDGER_GAIN_EXACT;
-    recorder_start(&exact->recorder, run, response);
+    impact_log_start(&exact->ledger, response, run->impacts_max, &energy);
+    exact->ledger.gain_max = IMPACT_LOG_GAIN_EXACT;
+    exact_record_start(&exact->recorder, run, response);
     TRY(exact_stride_start(exact));
     if (exact->lanes.run == NULL && !exact->has_flight) {
-        flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
+        exact_flight_make(&exact->flight, &flying, run->base->omega, exact->interval);
         exact->has_flight = true;
     }
     return STATUS_OK;
@@ -295,19 +295,19 @@ static Status settle(Exact *exact) {
         if (is_event)
             exact_touch(exact, side);
     }
-    return ledger_status(&exact->ledger, exact->problem);
+    return impact_log_status(&exact->ledger, exact->problem);
 }
 
 static Status solve(Exact *exact) {
     const Plan *plan = exact->plan;
     TRY(settle(exact));
-    Moment at = exact_moment(exact);
-    recorder_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
-    ledger_peaks(&exact->ledger, &at);
+    Instant at = exact_moment(exact);
+    exact_record_take(&exact->recorder, 0, &at, base_cursor_at(&exact->base, 0));
+    impact_log_peaks(&exact->ledger, &at);
     while (exact->sample + 1 < plan->count) {
         const size_t most = plan->count - 1 - exact->sample;
         const size_t strode = exact_stride(exact, most < WATCH_ARCS ? most : WATCH_ARCS);
-        TRY(ledger_status(&exact->ledger, exact->problem));
+        TRY(impact_log_status(&exact->ledger, exact->problem));
         if ((exact->arcs += strode) >= WATCH_ARCS)
             TRY(keep_going(exact));
         if (strode > 0 && exact->offset == 0)
@@ -321,7 +321,7 @@ static Status solve(Exact *exact) {
         exact_pass_sample(exact);
         if (exact->sample % 64 == 0) {
             const EnergyState energy = exact_energy(exact);
-            ledger_balance(&exact->ledger, &energy);
+            impact_log_balance(&exact->ledger, &energy);
         }
     }
     exact_stride_enter(exact);
@@ -332,15 +332,16 @@ static Status solve(Exact *exact) {
     trust_tell(&exact->trust, exact->ledger.response);
     TRY(keep_going(exact));
     const EnergyState energy = exact_energy(exact);
-    const Status status = ledger_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
-    ledger_count(&exact->ledger, &exact->run->work);
+    const Status status =
+        impact_log_finish(&exact->ledger, &exact->row, 1, &energy, exact->problem);
+    impact_log_count(&exact->ledger, &exact->run->work);
     return status;
 }
 
 static Status start(Exact *exact, Run *run, Response *response, Problem *problem) {
     TRY(prepare(exact, run, response, problem));
     const Status status = solve(exact);
-    recorder_finish(&exact->recorder, response);
+    exact_record_finish(&exact->recorder, response);
     return status;
 }
 
@@ -370,7 +371,7 @@ static Status run_on_grid(Run *run, Response *response, Problem *problem) {
 
 static Status exact_run(Run *run, Response *response, Problem *problem) {
     if (!plan_is_single(run->plan) && !(run->is_clear && plan_is_single_in_flight(run->plan)))
-        return frame_run(run, response, problem);
+        return event_engine_run(run, response, problem);
     // A base whose samples are further apart than the output's goes by strides once it has them.
     const size_t fine = refine_count(run->base, run->plan->sample_rate, run->plan->count);
     Workspace none = {0}, *workspace = run->workspace == NULL ? &none : run->workspace;

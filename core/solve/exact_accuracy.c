@@ -7,7 +7,7 @@
 double exact_tolerance(const Accuracy *accuracy) {
     const double asked =
         accuracy == NULL ? (double)NAN : ((const AccuracyExact *)(const void *)accuracy)->tolerance;
-    return asked > FRAME_ODE_TOLERANCE ? asked : FRAME_ODE_TOLERANCE;
+    return asked > POWER_CONTACT_TOLERANCE ? asked : POWER_CONTACT_TOLERANCE;
 }
 
 // Linear contacts and impulses have closed forms.
@@ -22,7 +22,7 @@ Status exact_decide(const Accuracy *accuracy, double base_interval, Plan *plan, 
     if (plan->form != CONTACT_POWER || plan->damper_count == 0)
         return STATUS_OK;
     const double tolerance = exact_tolerance(accuracy);
-    const bool is_asked = tolerance > FRAME_ODE_TOLERANCE;
+    const bool is_asked = tolerance > POWER_CONTACT_TOLERANCE;
     return decisions_add(&plan->report.decisions, "tolerance", is_asked ? "asked" : "rounding",
                          tolerance, NULL,
                          is_asked ? "relative error that a contact may end with; flight between "

@@ -4,24 +4,24 @@
 #include <math.h>
 
 void exact_note(Exact *exact) {
-    const Moment at = exact_moment(exact);
-    ledger_peaks(&exact->ledger, &at);
+    const Instant at = exact_moment(exact);
+    impact_log_peaks(&exact->ledger, &at);
     if (exact->pending > 0) // not all work is in the ledger yet
         return;
     const EnergyState energy = exact_energy(exact);
-    ledger_balance(&exact->ledger, &energy);
+    impact_log_balance(&exact->ledger, &energy);
 }
 
 void exact_pass_sample(Exact *exact) {
     exact->sample++;
     exact->offset = 0;
-    const Moment at = exact_moment(exact);
+    const Instant at = exact_moment(exact);
     if (exact->sample == exact->recorder.statistics_start)
-        ledger_forget_peaks(&exact->ledger, &at);
+        impact_log_forget_peaks(&exact->ledger, &at);
     const bool is_base_wanted = exact->recorder.columns[CHANNEL_BASE_ACCELERATION] != NULL;
-    recorder_take(&exact->recorder, exact->sample, &at,
-                  is_base_wanted ? base_cursor_at(&exact->base, exact->sample) : 0);
-    ledger_peaks(&exact->ledger, &at);
+    exact_record_take(&exact->recorder, exact->sample, &at,
+                      is_base_wanted ? base_cursor_at(&exact->base, exact->sample) : 0);
+    impact_log_peaks(&exact->ledger, &at);
 }
 
 void exact_end_phase(Exact *exact) {
@@ -36,8 +36,8 @@ void exact_end_phase(Exact *exact) {
 
 // Only the force has changed.
 static void note_force(Exact *exact) {
-    ledger_acceleration(&exact->ledger,
-                        exact_force(exact) / exact->plan->mass[0] - exact_push(exact));
+    impact_log_acceleration(&exact->ledger,
+                            exact_force(exact) / exact->plan->mass[0] - exact_push(exact));
 }
 
 static void begin_contact(Exact *exact, Side side) {
@@ -47,8 +47,8 @@ static void begin_contact(Exact *exact, Side side) {
     exact->origin = (Origin)side;
     exact->state.r = 0;
     const double speed = fabs(exact->state.w);
-    ledger_open(&exact->row, IMPACT_IMPACT, exact_time(exact), 0, side, speed);
-    ledger_force(&exact->ledger, &exact->row, exact->damper->stops[side].damping * speed);
+    impact_log_open(&exact->row, IMPACT_IMPACT, exact_time(exact), 0, side, speed);
+    impact_log_force(&exact->ledger, &exact->row, exact->damper->stops[side].damping * speed);
 }
 
 static void begin_rest(Exact *exact, Side side) {
@@ -61,10 +61,10 @@ static void begin_rest(Exact *exact, Side side) {
     exact->origin = (Origin)side;
     exact->phase = RESTING;
     exact->side = side;
-    ledger_open(&exact->row, IMPACT_RESTING, exact_time(exact), 0, side, NAN);
-    ledger_stretch(&exact->ledger, &exact->row, 0, exact_sign(side) * mass * speed,
-                   0.5 * mass * speed * speed);
-    ledger_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
+    impact_log_open(&exact->row, IMPACT_RESTING, exact_time(exact), 0, side, NAN);
+    impact_log_stretch(&exact->ledger, &exact->row, 0, exact_sign(side) * mass * speed,
+                       0.5 * mass * speed * speed);
+    impact_log_force(&exact->ledger, &exact->row, fabs(exact_force(exact)));
 }
 
 static void bounce(Exact *exact, Side side) {
@@ -76,7 +76,7 @@ static void bounce(Exact *exact, Side side) {
     exact->state.r = 0;
     exact->state.v += sign * exact->resting.share * (1 + e) * approach;
     exact->state.w = -sign * e * approach;
-    ledger_bounce(&exact->ledger, exact_time(exact), 0, side, approach, e * approach, mass);
+    impact_log_bounce(&exact->ledger, exact_time(exact), 0, side, approach, e * approach, mass);
     // Bounces towards a pushing stop follow each other in a geometric series. When all that are
     // left take less time than the clock resolves, they are one: the mass rests.
     const double pull = sign * exact_push(exact);
@@ -112,8 +112,8 @@ void exact_release(Exact *exact) {
     exact->is_leaving = exact->phase == RESTING;
     exact->state.r = 0;
     exact->state.w = exact->is_leaving ? 0 : (sign * exact->state.w < 0 ? exact->state.w : 0);
-    ledger_close(&exact->ledger, &exact->row, exact_time(exact),
-                 exact->phase == RESTING ? NAN : fabs(exact->state.w));
+    impact_log_close(&exact->ledger, &exact->row, exact_time(exact),
+                     exact->phase == RESTING ? NAN : fabs(exact->state.w));
     const bool is_held = exact->phase == RESTING && exact->damper->clearance == 0;
     exact->phase = FLIGHT;
     if (is_held) // between stops without clearance the other one takes over

@@ -28,7 +28,8 @@ static void pick_form(const long double *form, double target[10]) {
             target[n++] = (double)(form[columns[i] * SIZE + columns[j]] * (i == j ? 1 : 2));
 }
 
-void flight_make(Flight *flight, const Motion *motion, double base_omega, double length) {
+void exact_flight_make(ExactFlight *flight, const Motion *motion, double base_omega,
+                       double length) {
     long double system[SIZE * SIZE] = {0};
     system[X * SIZE + V] = 1;
     system[V * SIZE + X] = -(long double)motion->omega2;

@@ -6,7 +6,7 @@
 
 #include "core/solve/arc.h"
 
-typedef struct Flight {
+typedef struct ExactFlight {
     double length;     // of the interval [s]
     double x[4], v[4]; // rows of the transition over (x, v, value, slope)
     double r[4], w[4]; // what these add to r + w length, and to w
@@ -15,10 +15,10 @@ typedef struct Flight {
         av[10];       // quadratic forms of the integrals of v^2 and a_g v, upper triangle by rows
     double curvature; // |r''| is at most curvature * (|v| + omega |x| + length max|a_g|)
     double omega;     // sqrt(K / M) [rad/s]
-} Flight;
+} ExactFlight;
 
 // `omega` is the base's (0: linear).
-void flight_make(Flight *flight, const Motion *motion, double base_omega, double length);
+void exact_flight_make(ExactFlight *flight, const Motion *motion, double base_omega, double length);
 
 static inline double flight_form(const double *form, const double *y) {
     return y[0] * (form[0] * y[0] + form[1] * y[1] + form[2] * y[2] + form[3] * y[3]) +
@@ -28,8 +28,8 @@ static inline double flight_form(const double *form, const double *y) {
 
 // The state at the interval's end. `integrals` gets all but ww; aw is for the free mass: of a_g (v
 // + w), minus av.
-static inline State flight_step(const Flight *flight, const State *start, const Slice *slice,
-                                ArcIntegrals *integrals) {
+static inline State exact_flight_step(const ExactFlight *flight, const State *start,
+                                      const Slice *slice, ArcIntegrals *integrals) {
     const double y[4] = {start->x, start->v, slice->value, slice->slope};
     const State end = {
         start->x + (flight->x[0] * y[0] + flight->x[1] * y[1] +
@@ -50,7 +50,8 @@ static inline State flight_step(const Flight *flight, const State *start, const 
 }
 
 // The most |r''| can be over the interval [m/s^2].
-static inline double flight_curvature(const Flight *flight, const State *start, double base_max) {
+static inline double exact_flight_curvature(const ExactFlight *flight, const State *start,
+                                            double base_max) {
     const double speed = (start->v < 0 ? -start->v : start->v) +
                          flight->omega * (start->x < 0 ? -start->x : start->x) +
                          flight->length * base_max;

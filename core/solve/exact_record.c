@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-void recorder_start(Recorder *recorder, const Run *run, Response *response) {
+void exact_record_start(ExactRecord *recorder, const Run *run, Response *response) {
     memset(recorder, 0, sizeof *recorder);
     for (size_t i = 0; i < run->column_count; i++)
         recorder->columns[run->columns[i].channel] = run->columns[i].values;
@@ -18,7 +18,8 @@ static inline void put(double *column, size_t sample, double value) {
         column[sample] = value;
 }
 
-void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double base_acceleration) {
+void exact_record_take(ExactRecord *recorder, size_t sample, const Instant *at,
+                       double base_acceleration) {
     double *const *columns = recorder->columns;
     put(columns[CHANNEL_DISPLACEMENT], sample, at->x);
     put(columns[CHANNEL_VELOCITY], sample, at->v);
@@ -43,13 +44,14 @@ void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double b
     }
 }
 
-void recorder_sums(Recorder *recorder, size_t count, double displacement, double acceleration) {
+void exact_record_sums(ExactRecord *recorder, size_t count, double displacement,
+                       double acceleration) {
     recorder->sum_displacement += displacement;
     recorder->sum_acceleration += acceleration;
     recorder->count += count;
 }
 
-void recorder_finish(const Recorder *recorder, Response *response) {
+void exact_record_finish(const ExactRecord *recorder, Response *response) {
     response->sum_squares_displacement = recorder->sum_displacement;
     response->sum_squares_acceleration = recorder->sum_acceleration;
     response->statistics_count = recorder->count;

@@ -6,7 +6,7 @@
 #include "core/solve/impact_log.h"
 #include "core/solve/solver.h"
 
-typedef struct Recorder {
+typedef struct ExactRecord {
     double *columns[CHANNEL_COUNT];
     double sample_rate;
     size_t statistics_start; // the first sample that counts
@@ -14,16 +14,18 @@ typedef struct Recorder {
     double last_velocity;
     double sum_displacement, sum_acceleration; // of squares
     size_t count;
-} Recorder;
+} ExactRecord;
 
-void recorder_start(Recorder *recorder, const Run *run, Response *response);
-void recorder_take(Recorder *recorder, size_t sample, const Moment *at, double base_acceleration);
+void exact_record_start(ExactRecord *recorder, const Run *run, Response *response);
+void exact_record_take(ExactRecord *recorder, size_t sample, const Instant *at,
+                       double base_acceleration);
 // The sums over `count` more samples, all of them where statistics count.
-void recorder_sums(Recorder *recorder, size_t count, double displacement, double acceleration);
-void recorder_finish(const Recorder *recorder, Response *response);
+void exact_record_sums(ExactRecord *recorder, size_t count, double displacement,
+                       double acceleration);
+void exact_record_finish(const ExactRecord *recorder, Response *response);
 
 // The base's velocity gained over a stretch [m/s].
-static inline void recorder_base(Recorder *recorder, double speed) {
+static inline void exact_record_base(ExactRecord *recorder, double speed) {
     recorder->base_speed += speed;
 }
 

@@ -58,7 +58,7 @@ INLINE double sum_of(const Eight *values) {
 INLINE double most_of(const double values[RIDE]) {
     double most = 0;
     for (size_t j = 0; j < RIDE; j++)
-        most = ledger_larger(most, values[j]);
+        most = impact_log_larger(most, values[j]);
     return most;
 }
 
@@ -283,14 +283,14 @@ INLINE void enter(Press *press, const Tally *tally, size_t count, bool is_counte
     press->work -= (exact->plan->mass[0] + exact->damper->mass) * sums[2];
     press->gained += sums[3];
     Peaks *peaks = &exact->ledger.response->peaks;
-    peaks->displacement = ledger_larger(peaks->displacement, most_of(tally->x));
-    peaks->velocity = ledger_larger(peaks->velocity, most_of(tally->v));
-    peaks->acceleration = ledger_larger(peaks->acceleration, most_of(tally->acceleration));
-    peaks->damper_displacement = ledger_larger(peaks->damper_displacement, most_of(tally->z));
-    ledger_force(&exact->ledger, &exact->row, most_of(tally->force));
+    peaks->displacement = impact_log_larger(peaks->displacement, most_of(tally->x));
+    peaks->velocity = impact_log_larger(peaks->velocity, most_of(tally->v));
+    peaks->acceleration = impact_log_larger(peaks->acceleration, most_of(tally->acceleration));
+    peaks->damper_displacement = impact_log_larger(peaks->damper_displacement, most_of(tally->z));
+    impact_log_force(&exact->ledger, &exact->row, most_of(tally->force));
     exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
     if (is_counted)
-        recorder_sums(&exact->recorder, count, sum_of(&tally->xx), sum_of(&tally->aa));
+        exact_record_sums(&exact->recorder, count, sum_of(&tally->xx), sum_of(&tally->aa));
 }
 
 INLINE size_t run(Press *press, size_t most, BaseKind kind) {

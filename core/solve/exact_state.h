@@ -22,7 +22,7 @@
 #define EXACT_SAMPLE_STEPS 0.1
 #define EXACT_HOP_STEPS 5
 
-typedef enum Phase { FLIGHT, CONTACT, RESTING } Phase;
+typedef enum ExactPhase { FLIGHT, CONTACT, RESTING } ExactPhase;
 typedef enum Origin { ORIGIN_LEFT = SIDE_LEFT, ORIGIN_RIGHT = SIDE_RIGHT, ORIGIN_MIDDLE } Origin;
 
 // All that the tables are made from.
@@ -44,7 +44,7 @@ typedef struct Exact {
     double base_slope; // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
     size_t pending;    // samples whose sums wait in `stretch`
     double free_work; // integral of a_g times the free mass's relative velocity over them [m^2/s^2]
-    Phase phase;
+    ExactPhase phase;
     Side side;       // of CONTACT and RESTING
     Origin origin;   // what state.r is counted from
     bool is_leaving; // released from rest a moment ago: gap, its speed and its acceleration are
@@ -56,9 +56,9 @@ typedef struct Exact {
     BaseCursor base;
     Slice sine;         // at sample sine_sample - 1: looked up once for all that happens after it
     size_t sine_sample; // 0: none yet
-    Ledger ledger;
-    LedgerRow row; // of the present contact or rest
-    Recorder recorder;
+    ImpactLog ledger;
+    ImpactRow row; // of the present contact or rest
+    ExactRecord recorder;
     size_t contact_arcs; // since it began
     size_t arcs;         // since the progress was asked
     size_t events;       // all so far
@@ -67,7 +67,7 @@ typedef struct Exact {
     // empty. Each is made when it is first needed.
     ExactKey key;
     bool has_lanes, has_flight, has_pulse[2];
-    Flight flight;
+    ExactFlight flight;
     Lanes lanes;
     HopTable hops;   // with the lanes
     Pulse pulses[2]; // by Side
@@ -122,12 +122,12 @@ static inline double exact_force(const Exact *exact) {
     return 0;
 }
 
-static inline Moment exact_moment(const Exact *exact) {
+static inline Instant exact_moment(const Exact *exact) {
     const double n = exact_force(exact);
-    Moment moment = {.x = exact->state.x,
-                     .v = exact->state.v,
-                     .acceleration = n / exact->plan->mass[0] - exact_push(exact),
-                     .force = n};
+    Instant moment = {.x = exact->state.x,
+                      .v = exact->state.v,
+                      .acceleration = n / exact->plan->mass[0] - exact_push(exact),
+                      .force = n};
     if (exact->plan->damper_count > 0) {
         moment.damper_x = exact->state.x + exact_relative(exact);
         moment.damper_v = exact->state.v + exact->state.w;

@@ -31,12 +31,12 @@ INLINE void measure(const double *values, size_t count, double *most, double *st
     *most = count > 0 ? fabs(values[0]) : 0;
     *step = 0;
     for (; i < count; i++) {
-        *most = ledger_larger(*most, fabs(values[i]));
-        *step = ledger_larger(*step, fabs(values[i] - values[i - 1]));
+        *most = impact_log_larger(*most, fabs(values[i]));
+        *step = impact_log_larger(*step, fabs(values[i] - values[i - 1]));
     }
     for (size_t j = 0; j < SIDE_BY_SIDE; j++) {
-        *most = ledger_larger(*most, sizes[j]);
-        *step = ledger_larger(*step, steps[j]);
+        *most = impact_log_larger(*most, sizes[j]);
+        *step = impact_log_larger(*step, steps[j]);
     }
 }
 
@@ -149,7 +149,8 @@ static size_t fly(Exact *exact, size_t most) {
     const double gain = z - s->z;
     exact->free_work += gain * (z - gain / 2);
     Peaks *peaks = &exact->ledger.response->peaks; // trust asks for this one
-    peaks->displacement = ledger_larger(peaks->displacement, lanes_take_peak(s, OF_DISPLACEMENT));
+    peaks->displacement =
+        impact_log_larger(peaks->displacement, lanes_take_peak(s, OF_DISPLACEMENT));
     exact->pending += count;
     exact->sample += count;
     exact->run->steps += EXACT_SAMPLE_STEPS * (double)count;
@@ -164,10 +165,11 @@ INLINE void take_hop(Exact *exact, const Hop *hop, double s) {
     ArcIntegrals integrals;
     hop_integrals(hop, s, &integrals);
     const Plan *plan = exact->plan;
-    ledger_work(&exact->ledger,
-                -plan->mass[0] * integrals.av - exact->damper->mass * (integrals.av + integrals.aw),
-                plan->damping[0] * integrals.vv);
-    recorder_base(&exact->recorder, integrals.a);
+    impact_log_work(&exact->ledger,
+                    -plan->mass[0] * integrals.av -
+                        exact->damper->mass * (integrals.av + integrals.aw),
+                    plan->damping[0] * integrals.vv);
+    exact_record_base(&exact->recorder, integrals.a);
     hop_at(hop, s, &exact->state);
     exact->run->steps += EXACT_HOP_STEPS;
 }
@@ -308,7 +310,7 @@ static double keeps_digits(const Exact *exact, const Pulse *pulse) {
     const double v = fabs(a[PULSE_V]) * most + fabs(s[PULSE_V]) * slope;
     const double apart = exact->plan->mass[0] * (v * v + exact->flying.omega2 * x * x);
     const EnergyState now = exact_energy(exact);
-    const double held = ledger_larger(exact->ledger.largest_energy, now.kinetic + now.strain);
+    const double held = impact_log_larger(exact->ledger.largest_energy, now.kinetic + now.strain);
     return apart > 0 ? APART_MAX * held / apart : INFINITY;
 }
 
@@ -370,32 +372,33 @@ void exact_stride_enter(Exact *exact) {
     Peaks *peaks = &exact->ledger.response->peaks;
     lanes_take_sums(stretch, sums);
     const double speed = lanes_take_peak(stretch, OF_VELOCITY);
-    peaks->velocity = ledger_larger(peaks->velocity, speed);
+    peaks->velocity = impact_log_larger(peaks->velocity, speed);
     peaks->acceleration =
-        ledger_larger(peaks->acceleration, lanes_take_peak(stretch, OF_ACCELERATION));
+        impact_log_larger(peaks->acceleration, lanes_take_peak(stretch, OF_ACCELERATION));
     const double damper = lanes_take_peak(stretch, OF_DAMPER);
     if (plan->damper_count > 0)
-        peaks->damper_displacement = ledger_larger(peaks->damper_displacement, damper);
+        peaks->damper_displacement = impact_log_larger(peaks->damper_displacement, damper);
     for (int i = 0; i < LANE_SUMS; i++) {
         vv += lanes->vv[i] * sums[i];
         av += lanes->av[i] * sums[i];
     }
-    ledger_work(&exact->ledger, -plan->mass[0] * av - exact->damper->mass * exact->free_work,
-                plan->damping[0] * vv);
+    impact_log_work(&exact->ledger, -plan->mass[0] * av - exact->damper->mass * exact->free_work,
+                    plan->damping[0] * vv);
     if (exact->sample >= exact->recorder.statistics_start)
-        recorder_sums(&exact->recorder, exact->pending, sums[XX],
-                      lanes->damping * lanes->damping * sums[VV] +
-                          2 * lanes->damping * lanes->omega2 * sums[XV] +
-                          lanes->omega2 * lanes->omega2 * sums[XX]);
+        exact_record_sums(&exact->recorder, exact->pending, sums[XX],
+                          lanes->damping * lanes->damping * sums[VV] +
+                              2 * lanes->damping * lanes->omega2 * sums[XV] +
+                              lanes->omega2 * lanes->omega2 * sums[XX]);
     // It may all be gone again by the time that the balance is taken.
-    ledger_held(&exact->ledger, plan->mass[0] * speed * speed / 2);
-    ledger_held(&exact->ledger, plan->stiffness[0] * peaks->displacement * peaks->displacement / 2);
+    impact_log_held(&exact->ledger, plan->mass[0] * speed * speed / 2);
+    impact_log_held(&exact->ledger,
+                    plan->stiffness[0] * peaks->displacement * peaks->displacement / 2);
     exact->free_work = 0;
     exact->pending = 0;
     if (exact->phase != FLIGHT) // a contact's work is entered at its end
         return;
     const EnergyState energy = exact_energy(exact);
-    ledger_balance(&exact->ledger, &energy);
+    impact_log_balance(&exact->ledger, &energy);
 }
 
 void exact_stride_pass(Exact *exact) {

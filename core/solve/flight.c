@@ -2,7 +2,7 @@
 // the base alone: z'' = -a_g, and r = z - x.
 //
 // With V^2 = p'p + q'W^2 q, V grows by no more than |participation| |a_g| in unit time, and
-// |r''| <= reach V + |lean| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
+// |r''| <= reach V + |base_coupling| |a_g|. So r stays within length^2 max|r''| / 8 of its chord.
 #include "core/solve/flight.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@
 enum { Q, P, A, B, SIZE, WORTH = 32 };
 enum { VALUE, SLOPE, SUM, FALL, GROUND };
 
-void frame_flight_ground(double omega, double length, double ground[2], double fall[2]) {
+void flight_ground(double omega, double length, double ground[2], double fall[2]) {
     const bool is_sine = omega > 0;
     long double system[GROUND * GROUND] = {0}, gain[GROUND * GROUND];
     system[VALUE * GROUND + SLOPE] = is_sine ? omega : 1;
@@ -28,13 +28,13 @@ void frame_flight_ground(double omega, double length, double ground[2], double f
     }
 }
 
-static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
-    const long double share = frame->modes->participation[i], damping = frame->diagonal[i];
-    const double omega = frame->turning;
+static void make_mode(Flight *flight, const ModalState *state, size_t i) {
+    const long double share = state->modes->participation[i], damping = state->diagonal[i];
+    const double omega = state->base_omega;
     const bool is_sine = omega > 0;
     long double system[SIZE * SIZE] = {0};
     system[Q * SIZE + P] = 1;
-    system[P * SIZE + Q] = -(long double)frame->omega2[i];
+    system[P * SIZE + Q] = -(long double)state->omega2[i];
     system[P * SIZE + P] = -damping;
     system[P * SIZE + A] = -share;
     system[A * SIZE + B] = is_sine ? omega : 1;
@@ -65,54 +65,54 @@ static void make_mode(FrameFlight *flight, const Frame *frame, size_t i) {
     }
 }
 
-Status frame_flight_make(FrameFlight *flight, const Frame *frame, Problem *problem) {
-    const size_t n = frame->mode_count;
+Status flight_make(Flight *flight, const ModalState *state, Problem *problem) {
+    const size_t n = state->mode_count;
     memset(flight, 0, sizeof *flight);
-    if (frame->base.base->form == BASE_SAMPLED && frame->base.ratio == 0)
+    if (state->base.base->form == BASE_SAMPLED && state->base.ratio == 0)
         return STATUS_OK; // a_g has its kinks inside the intervals
-    if (frame->diagonal == NULL) {
+    if (state->diagonal == NULL) {
         // Where making it would cost more than it saves there is none.
-        if (frame->plan->count < WORTH * n || !(frame->interval * frame->rate < 0x1p40))
+        if (state->plan->count < WORTH * n || !(state->interval * state->rate < 0x1p40))
             return STATUS_OK;
-        TRY(frame_dense_make(&flight->dense, 1, frame, NULL, problem));
+        TRY(transition_make(&flight->dense, 1, state, NULL, problem));
     }
     // Gains, loss and input; whole vectors, filled up with zeros.
-    double **arrays[8 + FRAME_SUMS + 4];
+    double **arrays[8 + FLIGHT_SUMS + 4];
     for (size_t i = 0; i < 4; i++) {
         arrays[i] = &flight->gains.q[i];
         arrays[4 + i] = &flight->gains.p[i];
-        arrays[8 + FRAME_SUMS + i] = &flight->input[i];
+        arrays[8 + FLIGHT_SUMS + i] = &flight->input[i];
     }
-    for (size_t i = 0; i < FRAME_SUMS; i++)
+    for (size_t i = 0; i < FLIGHT_SUMS; i++)
         arrays[8 + i] = &flight->loss[i];
-    const size_t count = frame->diagonal == NULL ? 0 : COUNT(arrays);
-    const size_t padded = frame->padded;
-    const size_t starts = FRAME_FOUR * (2 * n + 2);
-    const size_t ends = FRAME_FOUR * frame_lanes_padded(2 * n + 2);
-    flight->block = calloc((count + FRAME_SUMS) * padded + starts + ends, sizeof *flight->block);
+    const size_t count = state->diagonal == NULL ? 0 : COUNT(arrays);
+    const size_t padded = state->padded;
+    const size_t starts = FLIGHT_ROWS * (2 * n + 2);
+    const size_t ends = FLIGHT_ROWS * simd_kernels_padded(2 * n + 2);
+    flight->block = calloc((count + FLIGHT_SUMS) * padded + starts + ends, sizeof *flight->block);
     if (flight->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     for (size_t i = 0; i < count; i++)
         *arrays[i] = flight->block + i * padded;
     flight->sums = flight->block + count * padded;
-    flight->start = flight->sums + FRAME_SUMS * padded;
+    flight->start = flight->sums + FLIGHT_SUMS * padded;
     flight->gained = flight->start + starts;
-    flight->length = frame->interval;
-    frame_flight_ground(frame->turning, flight->length, flight->ground, flight->fall);
+    flight->length = state->interval;
+    flight_ground(state->base_omega, flight->length, flight->ground, flight->fall);
     for (size_t i = 0; i < n && count > 0; i++)
-        make_mode(flight, frame, i);
+        make_mode(flight, state, i);
     return STATUS_OK;
 }
 
-void frame_flight_clear(FrameFlight *flight) {
-    frame_dense_clear(&flight->dense);
+void flight_clear(Flight *flight) {
+    transition_clear(&flight->dense);
     free(flight->block);
 }
 
 // Rows 1 to count of the trail.
-static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+static void fly_dense(const Flight *flight, FlightBuffer *trail, const ModalState *state,
                       size_t count) {
-    const size_t n = frame->mode_count, padded = trail->padded;
+    const size_t n = state->mode_count, padded = trail->padded;
     double *start = flight->start, *gained = flight->gained;
     for (size_t k = 0; k < count; k++) {
         const size_t now = k * padded, next = now + padded;
@@ -120,7 +120,7 @@ static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame 
         memcpy(start + n, trail->p + now, n * sizeof *start);
         start[2 * n] = trail->a[k];
         start[2 * n + 1] = trail->b[k];
-        frame->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
+        state->lanes->multiply(flight->dense.gain, flight->dense.rows, start, 2 * n + 2, gained);
         for (size_t i = 0; i < n; i++) {
             trail->q[next + i] = trail->q[now + i] + gained[i];
             trail->p[next + i] = trail->p[now + i] + gained[n + i];
@@ -130,11 +130,11 @@ static void fly_dense(const FrameFlight *flight, FrameTrail *trail, const Frame 
     }
 }
 
-static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame,
+static void fly(const Flight *flight, FlightBuffer *trail, const ModalState *state,
                 const Slice *slices, size_t count) {
-    const size_t n = frame->mode_count;
-    memcpy(trail->q, frame->q, n * sizeof *trail->q);
-    memcpy(trail->p, frame->p, n * sizeof *trail->p);
+    const size_t n = state->mode_count;
+    memcpy(trail->q, state->q, n * sizeof *trail->q);
+    memcpy(trail->p, state->p, n * sizeof *trail->p);
     for (size_t k = 0; k < count; k++) {
         trail->a[k] = slices[k].value;
         trail->b[k] = slices[k].slope;
@@ -142,55 +142,55 @@ static void fly(const FrameFlight *flight, FrameTrail *trail, const Frame *frame
             flight->ground[0] * slices[k].value + flight->ground[1] * slices[k].slope;
     }
     if (flight->dense.block != NULL)
-        fly_dense(flight, trail, frame, count);
+        fly_dense(flight, trail, state, count);
     else
-        frame->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
+        state->lanes->fly(&flight->gains, trail->padded, count, trail->a, trail->b, trail->q,
                           trail->p, trail->moved, trail->sped);
 }
 
-bool frame_flight_is_clear(const FrameDamper *damper, double from, double to, double bend,
-                           double length) {
+bool flight_is_clear(const DamperState *damper, double from, double to, double bend,
+                     double length) {
     const double sag = bend * length * length / 8;
-    const double most = frame_room(damper, SIDE_RIGHT) - sag;
-    const double least = sag - frame_room(damper, SIDE_LEFT);
+    const double most = modal_state_room(damper, SIDE_RIGHT) - sag;
+    const double least = sag - modal_state_room(damper, SIDE_LEFT);
     return from < most && to < most && from > least && to > least;
 }
 
-static void add_dense_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
-                           size_t count, FrameWork *work) {
-    const FrameDense *dense = &flight->dense;
-    const size_t n = frame->mode_count, size = dense->size;
-    for (size_t from = 0; from < count; from += FRAME_FOUR) {
-        const size_t many = count - from < FRAME_FOUR ? count - from : FRAME_FOUR;
+static void add_dense_work(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
+                           size_t count, StepWork *work) {
+    const Transition *dense = &flight->dense;
+    const size_t n = state->mode_count, size = dense->size;
+    for (size_t from = 0; from < count; from += FLIGHT_ROWS) {
+        const size_t many = count - from < FLIGHT_ROWS ? count - from : FLIGHT_ROWS;
         for (size_t k = from; k < from + many; k++) {
             double *start = flight->start + (k - from) * size;
             memcpy(start, trail->q + k * trail->padded, n * sizeof *start);
             memcpy(start + n, trail->p + k * trail->padded, n * sizeof *start);
             start[2 * n] = trail->a[k];
             start[2 * n + 1] = trail->b[k];
-            work->input -= trail->a[k] * frame_dot(dense->input[0], start, size) +
-                           trail->b[k] * frame_dot(dense->input[1], start, size);
+            work->input -= trail->a[k] * modal_state_dot(dense->input[0], start, size) +
+                           trail->b[k] * modal_state_dot(dense->input[1], start, size);
         }
-        frame->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
+        state->lanes->multiply_four(dense->loss, dense->rows, flight->start, size, size,
                                     flight->gained);
         for (size_t k = 0; k < many; k++)
             work->damping +=
-                frame_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
+                modal_state_dot(flight->gained + k * dense->rows, flight->start + k * size, size);
     }
 }
 
-static void add_work(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
-                     size_t count, FrameWork *work) {
-    const size_t n = frame->mode_count;
+static void add_work(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
+                     size_t count, StepWork *work) {
+    const size_t n = state->mode_count;
     const size_t padded = trail->padded;
     double *sums = flight->sums;
-    memset(sums, 0, FRAME_SUMS * padded * sizeof *sums);
-    frame->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
-    for (size_t j = 0; j < FRAME_SUMS; j++)
-        work->damping += frame_dot(flight->loss[j], sums + j * padded, n);
+    memset(sums, 0, FLIGHT_SUMS * padded * sizeof *sums);
+    state->lanes->sum(padded, count, trail->a, trail->b, trail->q, trail->p, sums);
+    for (size_t j = 0; j < FLIGHT_SUMS; j++)
+        work->damping += modal_state_dot(flight->loss[j], sums + j * padded, n);
     // The sums' last four are over (q value, q slope, p value, p slope).
     for (size_t j = 0; j < 4; j++)
-        work->input -= frame_dot(flight->input[j], sums + (3 + j) * padded, n);
+        work->input -= modal_state_dot(flight->input[j], sums + (3 + j) * padded, n);
     const double *lb = flight->loss_base, *ib = flight->input_base;
     for (size_t k = 0; k < count; k++) {
         const double a = trail->a[k], b = trail->b[k];
@@ -199,20 +199,20 @@ static void add_work(const FrameFlight *flight, const FrameTrail *trail, const F
     }
 }
 
-double frame_flight_shaken(const Slice *slice, double length) {
+double flight_shaken(const Slice *slice, double length) {
     const double first = fabs(slice->value), last = fabs(slice->value + slice->slope * length);
     return slice->omega > 0 ? first + fabs(slice->slope) : fmax(first, last);
 }
 
 // Of one damper along the trail: rows 1 to count of r and z. Its absolute velocity stays.
-static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *frame, size_t d,
+static void follow(const Flight *flight, FlightBuffer *trail, const ModalState *state, size_t d,
                    size_t count, const Slice *slices) {
-    const FrameDamper *damper = &frame->damper[d];
+    const DamperState *damper = &state->damper[d];
     double *r = trail->r + d * TRAIL_ROWS, *z = trail->z + d * TRAIL_ROWS, far = damper->r;
     double moved[TRAIL_ROWS];
-    frame->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
+    state->lanes->dot(trail->padded, count, damper->shape, trail->moved + trail->padded, moved);
     r[0] = damper->r;
-    z[0] = frame_dot(damper->shape, trail->p, frame->mode_count) + damper->w;
+    z[0] = modal_state_dot(damper->shape, trail->p, state->mode_count) + damper->w;
     for (size_t k = 0; k < count; k++) {
         far += flight->length * z[k] -
                (flight->fall[0] * slices[k].value + flight->fall[1] * slices[k].slope);
@@ -222,95 +222,95 @@ static void follow(const FrameFlight *flight, FrameTrail *trail, const Frame *fr
 }
 
 // sqrt(p'p + q'W^2 q) over an interval that begins with such a size, or over `many`.
-static double grown(const FrameFlight *flight, const Frame *frame, double size, double shaken,
+static double grown(const Flight *flight, const ModalState *state, double size, double shaken,
                     size_t many) {
     const double length = (double)many * flight->length;
-    const double left = 1 - frame->growth * length; // exp(growth length) < 1 / left
-    return left > 0.5 ? (size + length * frame->drive * shaken) / left : INFINITY;
+    const double left = 1 - state->growth * length; // exp(growth length) < 1 / left
+    return left > 0.5 ? (size + length * state->participation_norm * shaken) / left : INFINITY;
 }
 
 // Of one damper, how many of `count` intervals surely keep it between its stops, bent by no more
 // than `bend`.
-static size_t count_clear(const FrameFlight *flight, const FrameTrail *trail, const Frame *frame,
+static size_t count_clear(const Flight *flight, const FlightBuffer *trail, const ModalState *state,
                           size_t d, double bend, const Slice *slices, size_t count) {
-    const FrameDamper *damper = &frame->damper[d];
+    const DamperState *damper = &state->damper[d];
     const double *r = trail->r + d * TRAIL_ROWS, length = flight->length;
     double least = r[0], most = r[0];
     for (size_t k = 1; k <= count; k++) {
         least = r[k] < least ? r[k] : least;
         most = r[k] > most ? r[k] : most;
     }
-    if (frame_flight_is_clear(damper, least, most, bend, length))
+    if (flight_is_clear(damper, least, most, bend, length))
         return count;
     for (size_t k = 0; k < count; k++) {
-        if (frame_flight_is_clear(damper, r[k], r[k + 1], bend, length))
+        if (flight_is_clear(damper, r[k], r[k + 1], bend, length))
             continue;
         // The bound of this interval alone is closer.
-        const double shaken = frame_flight_shaken(&slices[k], length);
+        const double shaken = flight_shaken(&slices[k], length);
         const double size =
-            frame_size_of(frame, trail->q + k * trail->padded, trail->p + k * trail->padded);
-        const double own =
-            damper->reach * grown(flight, frame, size, shaken, 1) + fabs(damper->lean) * shaken;
-        if (!frame_flight_is_clear(damper, r[k], r[k + 1], own, length))
+            modal_state_size_of(state, trail->q + k * trail->padded, trail->p + k * trail->padded);
+        const double own = damper->elastic_bound * grown(flight, state, size, shaken, 1) +
+                           fabs(damper->base_coupling) * shaken;
+        if (!flight_is_clear(damper, r[k], r[k + 1], own, length))
             return k;
     }
     return count;
 }
 
 // A guess of how many intervals it takes to the next stop: to fly further would be in vain.
-static size_t guess(const FrameFlight *flight, const Frame *frame, size_t count) {
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
+static size_t guess(const Flight *flight, const ModalState *state, size_t count) {
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
         const double step = fabs(damper->w) * flight->length;
-        const double room = damper->w > 0 ? frame_room(damper, SIDE_RIGHT) - damper->r
-                                          : frame_room(damper, SIDE_LEFT) + damper->r;
+        const double room = damper->w > 0 ? modal_state_room(damper, SIDE_RIGHT) - damper->r
+                                          : modal_state_room(damper, SIDE_LEFT) + damper->r;
         if (room < (double)(count - 1) * step)
             count = 1 + (size_t)fmax(room / step, 0);
     }
     return count;
 }
 
-size_t frame_flight_run(FrameFlight *flight, FrameTrail *trail, Frame *frame, const Slice *slices,
-                        size_t count, FrameWork *work) {
-    const size_t n = frame->mode_count;
+size_t flight_run(Flight *flight, FlightBuffer *trail, ModalState *state, const Slice *slices,
+                  size_t count, StepWork *work) {
+    const size_t n = state->mode_count;
     double shaken = 0;
-    if (frame->has_stops)
-        count = guess(flight, frame, count);
-    fly(flight, trail, frame, slices, count);
+    if (state->has_stops)
+        count = guess(flight, state, count);
+    fly(flight, trail, state, slices, count);
     for (size_t k = 0; k < count; k++)
-        shaken = fmax(shaken, frame_flight_shaken(&slices[k], flight->length));
+        shaken = fmax(shaken, flight_shaken(&slices[k], flight->length));
     const double most =
-        frame->has_stops ? grown(flight, frame, frame_size(frame), shaken, count) : 0;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const double bend = damper->reach * most + fabs(damper->lean) * shaken;
-        follow(flight, trail, frame, d, count, slices);
-        if (frame->has_stops)
-            count = count_clear(flight, trail, frame, d, bend, slices, count);
+        state->has_stops ? grown(flight, state, modal_state_size(state), shaken, count) : 0;
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        const double bend = damper->elastic_bound * most + fabs(damper->base_coupling) * shaken;
+        follow(flight, trail, state, d, count, slices);
+        if (state->has_stops)
+            count = count_clear(flight, trail, state, d, bend, slices, count);
     }
     if (count == 0)
         return 0;
     if (work != NULL) {
-        *work = (FrameWork){0};
+        *work = (StepWork){0};
         if (flight->dense.block != NULL)
-            add_dense_work(flight, trail, frame, count, work);
+            add_dense_work(flight, trail, state, count, work);
         else
-            add_work(flight, trail, frame, count, work);
+            add_work(flight, trail, state, count, work);
     }
     const size_t end = count * trail->padded;
     double speed = 0;
     for (size_t k = 0; k < count; k++)
         speed += trail->ground[k];
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
         const double *z = trail->z + d * TRAIL_ROWS;
         for (size_t k = 0; k < count && work != NULL; k++)
             work->input -= damper->plan->mass * trail->ground[k] * (z[k] - trail->ground[k] / 2);
         damper->r = trail->r[d * TRAIL_ROWS + count];
-        damper->w -= speed + frame_dot(damper->shape, trail->sped + end, n);
+        damper->w -= speed + modal_state_dot(damper->shape, trail->sped + end, n);
         damper->force = 0;
     }
-    memcpy(frame->q, trail->q + end, n * sizeof *frame->q);
-    memcpy(frame->p, trail->p + end, n * sizeof *frame->p);
+    memcpy(state->q, trail->q + end, n * sizeof *state->q);
+    memcpy(state->p, trail->p + end, n * sizeof *state->p);
     return count;
 }

@@ -1,15 +1,15 @@
-// Flight of all masses over a whole sample interval is one step where bounds on the gaps' curvature
-// prove that no stop can be reached (frame_flight.h); a mass pressed to a stiff stop that it surely
-// does not leave has long steps too (frame_press.h); everything else goes by arcs (frame_arc.h),
-// whose polynomials locate events to rounding. Time is a sample's number and an offset from it, so
-// that short contacts keep their digits late in a run.
+// ExactFlight of all masses over a whole sample interval is one step where bounds on the gaps'
+// curvature prove that no stop can be reached (flight.h); a mass pressed to a stiff stop that it
+// surely does not leave has long steps too (sustained_contact.h); everything else goes by arcs
+// (taylor_step.h), whose polynomials locate events to rounding. Time is a sample's number and an
+// offset from it, so that short contacts keep their digits late in a run.
 #include "core/solve/frame_engine.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-#include "core/solve/frame_work.h"
+#include "core/solve/step_work.h"
 
 enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
 
@@ -21,226 +21,227 @@ static const double GAIN_CONTACTS = 1e3;
 static const double WATCH_STEPS = 3e4; // between looks at the progress
 static const double WORK_OF_STEP = 60; // multiplications
 
-Status frame_engine_check(FrameEngine *engine) {
-    const Frame *frame = &engine->frame;
+Status event_engine_check(EventEngine *engine) {
+    const ModalState *state = &engine->state;
     engine->work = 0;
-    const EnergyState energy = frame_energy(frame);
+    const EnergyState energy = modal_state_energy(state);
     double sum = energy.kinetic + energy.strain;
-    for (size_t i = 0; i < frame->mode_count; i++)
-        sum += fabs(frame->q[i]);
-    for (size_t d = 0; d < frame->dampers; d++)
-        sum += fabs(frame->damper[d].r);
+    for (size_t i = 0; i < state->mode_count; i++)
+        sum += fabs(state->q[i]);
+    for (size_t d = 0; d < state->dampers; d++)
+        sum += fabs(state->damper[d].r);
     if (!isfinite(sum))
-        return problem_set(frame->problem, STATUS_UNSTABLE,
+        return problem_set(state->problem, STATUS_UNSTABLE,
                            "the motion left what double precision can hold at t = %.6g s",
-                           frame_time(frame));
-    if (frame->run->steps_max > 0 && frame->run->steps > frame->run->steps_max)
-        return problem_set(frame->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
-                           frame->run->steps_max, frame->run->steps_max * SOLVER_STEP,
-                           frame_time(frame), frame->plan->duration);
-    if (!progress_advance(frame->run->progress, frame_time(frame) / frame->plan->duration))
-        return problem_set(frame->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
-                           frame_time(frame));
+                           modal_state_time(state));
+    if (state->run->steps_max > 0 && state->run->steps > state->run->steps_max)
+        return problem_set(state->problem, STATUS_LIMIT, SOLVER_STOPPED "t = %.6g s of %.6g s",
+                           state->run->steps_max, state->run->steps_max * SOLVER_STEP,
+                           modal_state_time(state), state->plan->duration);
+    if (!progress_advance(state->run->progress, modal_state_time(state) / state->plan->duration))
+        return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                           modal_state_time(state));
     return STATUS_OK;
 }
 
-static double each(const FrameEngine *engine, FrameWorkKind kind) {
-    const Frame *frame = &engine->frame;
-    return frame_work_steps(kind, frame->mode_count, frame->dampers, frame->diagonal == NULL);
+static double each(const EventEngine *engine, StepWorkKind kind) {
+    const ModalState *state = &engine->state;
+    return step_work_steps(kind, state->mode_count, state->dampers, state->diagonal == NULL);
 }
 
-static Status count_steps(FrameEngine *engine, double steps) {
-    engine->frame.run->steps += steps;
+static Status count_steps(EventEngine *engine, double steps) {
+    engine->state.run->steps += steps;
     engine->work += steps;
-    return engine->work > WATCH_STEPS ? frame_engine_check(engine) : STATUS_OK;
+    return engine->work > WATCH_STEPS ? event_engine_check(engine) : STATUS_OK;
 }
 
-static void take_work(FrameEngine *engine, const FrameWork *work) {
-    ledger_work(&engine->frame.ledger, work->input, work->damping);
+static void take_work(EventEngine *engine, const StepWork *work) {
+    impact_log_work(&engine->state.impacts, work->input, work->damping);
     engine->record.base_speed += work->ground;
 }
 
 // What a stretch of contact or rest adds to a damper's row; the state becomes that of a new peak.
-static void take_contact(FrameEngine *engine, size_t d) {
-    Frame *frame = &engine->frame;
-    FrameDamper *damper = &frame->damper[d];
-    const FrameArc *arc = &engine->arc;
+static void take_contact(EventEngine *engine, size_t d) {
+    ModalState *state = &engine->state;
+    DamperState *damper = &state->damper[d];
+    const TaylorStep *arc = &engine->arc;
     double s = -1, impulse, lost;
-    const double peak = arc_largest(frame_arc_force(arc, d), arc->degree - 1,
-                                    ledger_least_force(&frame->ledger, &damper->row), &s);
-    ledger_force(&frame->ledger, &damper->row, peak);
+    const double peak = arc_largest(taylor_step_force(arc, d), arc->degree - 1,
+                                    impact_log_least_force(&state->impacts, &damper->row), &s);
+    impact_log_force(&state->impacts, &damper->row, peak);
     if (s > 0) {
-        frame_arc_state(arc, frame, s);
-        frame_feel(frame);
-        frame_record_acceleration(frame);
+        taylor_step_state(arc, state, s);
+        modal_state_forces(state);
+        recorder_acceleration(state);
     }
-    frame_arc_contact(arc, frame, d, &impulse, &lost);
-    ledger_stretch(&frame->ledger, &damper->row, arc->length, impulse, lost);
+    taylor_step_contact(arc, state, d, &impulse, &lost);
+    impact_log_stretch(&state->impacts, &damper->row, arc->length, impulse, lost);
 }
 
 // After an arc: has the gap of a mass released from rest opened beyond rounding yet? Where the arc
 // ends by closing it, the speed stays.
-static void leave(FrameDamper *damper, bool is_hit) {
-    const double sign = frame_sign((Side)damper->origin);
+static void leave(DamperState *damper, bool is_hit) {
+    const double sign = modal_state_sign((Side)damper->origin);
     if (sign * damper->r < 0)
-        damper->leaving = 0;
+        damper->zero_gap_terms = 0;
     else if (!is_hit || sign * damper->w < 0)
         damper->r = damper->w = 0;
 }
 
 // Takes what lies on the arc and moves to its end, where `hit` (or none) has its event.
-static void pass(FrameEngine *engine, const FrameEvent *hit) {
-    Frame *frame = &engine->frame;
-    const FrameArc *arc = &engine->arc;
-    if (!frame->is_shadow) {
-        const FrameWork work = frame_arc_work(arc, frame);
+static void pass(EventEngine *engine, const ContactEvent *hit) {
+    ModalState *state = &engine->state;
+    const TaylorStep *arc = &engine->arc;
+    if (!state->is_shadow) {
+        const StepWork work = taylor_step_work(arc, state);
         take_work(engine, &work);
     }
-    for (size_t d = 0; d < frame->dampers && !frame->is_shadow; d++)
-        if (frame->damper[d].row.is_open)
+    for (size_t d = 0; d < state->dampers && !state->is_shadow; d++)
+        if (state->damper[d].row.is_open)
             take_contact(engine, d);
-    frame_arc_state(arc, frame, 1);
-    frame->offset += arc->length;
-    frame->still_events = 0;
-    frame->storm_time += arc->length;
-    if (frame->storm_time > frame_clock(frame)) {
-        frame->storm_events = 0;
-        frame->storm_time = 0;
+    taylor_step_state(arc, state, 1);
+    state->offset += arc->length;
+    state->events_at_instant = 0;
+    state->chatter_time += arc->length;
+    if (state->chatter_time > modal_state_clock(state)) {
+        state->chatter_events = 0;
+        state->chatter_time = 0;
     }
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
-        damper->is_fresh = false;
-        if (damper->leaving > 0)
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
+        damper->just_begun = false;
+        if (damper->zero_gap_terms > 0)
             leave(damper, hit != NULL && hit->damper == d);
     }
 }
 
-static Status happen(Frame *frame, const FrameEvent *event) {
-    const size_t most = STILL_EVENTS * frame->dampers;
-    frame->events++;
-    frame->storm_events++;
-    if (++frame->still_events > most)
-        return problem_set(frame->problem, STATUS_UNSTABLE,
+static Status happen(ModalState *state, const ContactEvent *event) {
+    const size_t most = STILL_EVENTS * state->dampers;
+    state->events++;
+    state->chatter_events++;
+    if (++state->events_at_instant > most)
+        return problem_set(state->problem, STATUS_UNSTABLE,
                            "more than %zu contact events at one instant, t = %.17g s", most,
-                           frame_time(frame));
-    frame_happen(frame, event);
-    return ledger_status(&frame->ledger, frame->problem);
+                           modal_state_time(state));
+    contact_event_apply(state, event);
+    return impact_log_status(&state->impacts, state->problem);
 }
 
 // The longest arc: a half-sine of the base is fast only while it lasts.
-static double arc_max(const Frame *frame, const Slice *slice) {
-    return 1 / fmax(frame_rate(frame), slice->omega);
+static double arc_max(const ModalState *state, const Slice *slice) {
+    return 1 / fmax(modal_state_rate(state), slice->omega);
 }
 
 // One step of contact under a power law, at most `length` long.
-static Status press(FrameEngine *engine, const Slice *slice, double length) {
-    Frame *frame = &engine->frame;
-    FrameOdeStep step;
-    frame_ode_step(&engine->ode, slice, length, &step);
-    ledger_work(&frame->ledger, step.input, step.damping);
+static Status press(EventEngine *engine, const Slice *slice, double length) {
+    ModalState *state = &engine->state;
+    PowerContactStep step;
+    power_contact_step(&engine->ode, slice, length, &step);
+    impact_log_work(&state->impacts, step.input, step.damping);
     engine->record.base_speed += step.ground;
-    const double before = frame->offset;
-    frame->offset += step.length;
-    frame->ground = slice_at(slice, step.length);
-    frame->still_events = 0;
+    const double before = state->offset;
+    state->offset += step.length;
+    state->base_acceleration = slice_at(slice, step.length);
+    state->events_at_instant = 0;
     // A step may be shorter than what the clock tells, or end where it began; not very many in
     // turn.
-    engine->idle = frame->offset > before ? 0 : engine->idle + 1;
-    frame->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
+    engine->idle = state->offset > before ? 0 : engine->idle + 1;
+    state->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
-        TRY(happen(frame, &step.event));
+        TRY(happen(state, &step.event));
     else
-        frame_record_note(frame);
-    frame->run->work.steps++;
+        recorder_note(state);
+    state->run->work.steps++;
     return count_steps(engine, step.work / WORK_OF_STEP);
 }
 
 // A long step of contact. False: it must go by arcs.
-static bool hold(FrameEngine *engine, const Slice *slice, double length) {
-    Frame *frame = &engine->frame;
-    FrameWork work;
-    if (slice->omega > 0 && frame->turning == 0)
+static bool hold(EventEngine *engine, const Slice *slice, double length) {
+    ModalState *state = &engine->state;
+    StepWork work;
+    if (slice->omega > 0 && state->base_omega == 0)
         return false; // its steps know no such base
-    const double taken =
-        frame_press_step(&engine->pressing, frame, slice, length, frame->is_shadow ? NULL : &work);
+    const double taken = sustained_contact_step(&engine->pressing, state, slice, length,
+                                                state->is_shadow ? NULL : &work);
     if (taken == 0)
         return false;
-    if (!frame->is_shadow)
+    if (!state->is_shadow)
         take_work(engine, &work);
-    frame->offset += taken;
-    frame->ground = slice_at(slice, taken);
+    state->offset += taken;
+    state->base_acceleration = slice_at(slice, taken);
     return true;
 }
 
 // Masses that touch and part at one instant again and again do so by rounding alone: between stops
 // without clearance, say, of a storey that hardly moves yet. They stay as they are for a while that
 // is longer each time, until the motion itself decides. (Impulses close such series themselves.)
-static bool is_stalled(Frame *frame) {
-    if (frame->storm_events < STORM_EVENTS * frame->dampers ||
-        frame->plan->form == CONTACT_IMPULSIVE)
+static bool is_stalled(ModalState *state) {
+    if (state->chatter_events < STORM_EVENTS * state->dampers ||
+        state->plan->form == CONTACT_IMPULSIVE)
         return false;
-    const double now = frame_time(frame);
-    const bool goes_on = now - frame->stalled_at <= 4 * frame->stall;
-    frame->stall = fmax(goes_on ? 2 * frame->stall : 0, frame_clock(frame));
-    frame->stalled_at = now;
+    const double now = modal_state_time(state);
+    const bool goes_on = now - state->suppressed_at <= 4 * state->suppress_time;
+    state->suppress_time = fmax(goes_on ? 2 * state->suppress_time : 0, modal_state_clock(state));
+    state->suppressed_at = now;
     return true;
 }
 
 // One arc, at most `length` long, up to its end or the first event.
-static Status advance(FrameEngine *engine, double length) {
-    Frame *frame = &engine->frame;
-    FrameArc *arc = &engine->arc;
+static Status advance(EventEngine *engine, double length) {
+    ModalState *state = &engine->state;
+    TaylorStep *arc = &engine->arc;
     Slice slice;
-    const double knot = base_cursor_slice(&frame->base, frame->sample, frame->offset, &slice);
-    frame->ground = slice.value;
-    if (frame_ode_serves(&engine->ode))
+    const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
+    state->base_acceleration = slice.value;
+    if (power_contact_serves(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
     if (hold(engine, &slice, fmin(length, knot)))
-        return count_steps(engine, each(engine, FRAME_WORK_HOLD));
-    const bool stays = is_stalled(frame);
-    const double most = fmin(fmin(length, knot), stays ? frame->stall : INFINITY);
-    frame_arc_make(arc, frame, &slice, fmin(most, arc_max(frame, &slice)));
-    frame->run->work.arcs++;
-    FrameEvent event;
-    const bool is_event = frame_find_event(frame, arc, &event) &&
-                          !(stays && event.s * arc->length <= frame_clock(frame));
+        return count_steps(engine, each(engine, STEP_WORK_HOLD));
+    const bool stays = is_stalled(state);
+    const double most = fmin(fmin(length, knot), stays ? state->suppress_time : INFINITY);
+    taylor_step_make(arc, state, &slice, fmin(most, arc_max(state, &slice)));
+    state->run->work.arcs++;
+    ContactEvent event;
+    const bool is_event = contact_event_find(state, arc, &event) &&
+                          !(stays && event.s * arc->length <= modal_state_clock(state));
     if (is_event)
-        frame_arc_cut(arc, frame, event.s * arc->length < SHORTEST ? 0 : event.s);
+        taylor_step_cut(arc, state, event.s * arc->length < SHORTEST ? 0 : event.s);
     if (arc->length > 0)
         pass(engine, is_event ? &event : NULL);
     if (is_event)
-        TRY(happen(frame, &event));
-    return count_steps(engine, each(engine, FRAME_WORK_ARC) +
-                                   (is_event ? each(engine, FRAME_WORK_EVENT) : 0));
+        TRY(happen(state, &event));
+    return count_steps(engine, each(engine, STEP_WORK_ARC) +
+                                   (is_event ? each(engine, STEP_WORK_EVENT) : 0));
 }
 
-Status frame_engine_cross(FrameEngine *engine, double length) {
-    Frame *frame = &engine->frame;
+Status event_engine_cross(EventEngine *engine, double length) {
+    ModalState *state = &engine->state;
     // Less than this cannot be told from nothing: the clock's resolution at the interval's end.
     const double clock = 2 * DBL_EPSILON * length;
-    while (length - frame->offset > clock) {
-        const double before = frame->offset;
-        const size_t events = frame->events;
-        TRY(advance(engine, length - frame->offset));
-        if (frame->offset == before && frame->events == events)
-            return problem_set(frame->problem, STATUS_UNSTABLE,
+    while (length - state->offset > clock) {
+        const double before = state->offset;
+        const size_t events = state->events;
+        TRY(advance(engine, length - state->offset));
+        if (state->offset == before && state->events == events)
+            return problem_set(state->problem, STATUS_UNSTABLE,
                                "the contact is too stiff to be followed: at t = %.6g s a step of "
                                "1/%.6g s is below the clock's resolution",
-                               frame_time(frame), frame_rate(frame));
+                               modal_state_time(state), modal_state_rate(state));
     }
     return STATUS_OK;
 }
 
 // a_g over whole intervals from the present sample on; returns over how many it has no kinks.
-static size_t find_slices(const Frame *frame, size_t count, Slice *slices) {
+static size_t find_slices(const ModalState *state, size_t count, Slice *slices) {
     size_t found = 0;
     for (; found < count; found++) {
-        if (found > 0 && frame->base.base->form == BASE_SINE) {
+        if (found > 0 && state->base.base->form == BASE_SINE) {
             const Slice *last = &slices[found - 1];
-            slices[found] = (Slice){last->value * frame->turned[0] + last->slope * frame->turned[1],
-                                    last->slope * frame->turned[0] - last->value * frame->turned[1],
-                                    last->omega};
-        } else if (!base_cursor_interval(&frame->base, frame->sample + found, &slices[found]))
+            slices[found] = (Slice){
+                last->value * state->base_rotation[0] + last->slope * state->base_rotation[1],
+                last->slope * state->base_rotation[0] - last->value * state->base_rotation[1],
+                last->omega};
+        } else if (!base_cursor_interval(&state->base, state->sample + found, &slices[found]))
             break;
     }
     return found;
@@ -248,148 +249,149 @@ static size_t find_slices(const Frame *frame, size_t count, Slice *slices) {
 
 // Whole intervals at once, up to sample `until`, and writes them down. Returns how many; 0: it must
 // go by arcs.
-static size_t fly(FrameEngine *engine, size_t until) {
-    Frame *frame = &engine->frame;
-    FrameRecord *record = &engine->record;
-    Slice slices[TRAIL_MAX];
-    FrameWork work;
-    for (size_t d = 0; d < frame->dampers; d++)
-        if (frame->damper[d].phase != FRAME_FLIGHT || frame->damper[d].leaving > 0)
+static size_t fly(EventEngine *engine, size_t until) {
+    ModalState *state = &engine->state;
+    Recorder *record = &engine->record;
+    Slice slices[FLIGHT_BUFFER_MAX];
+    StepWork work;
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].phase != PHASE_FLIGHT || state->damper[d].zero_gap_terms > 0)
             return 0;
-    size_t count = until - frame->sample;
-    if (count > TRAIL_MAX)
-        count = TRAIL_MAX;
+    size_t count = until - state->sample;
+    if (count > FLIGHT_BUFFER_MAX)
+        count = FLIGHT_BUFFER_MAX;
     // Statistics begin with a stretch.
-    if (frame->sample + 1 < record->statistics_start &&
-        frame->sample + count >= record->statistics_start)
-        count = record->statistics_start - 1 - frame->sample;
-    count = engine->flight.length == 0 ? 0 : find_slices(frame, count, slices);
-    frame->run->work.stop_searches += count > 0 && frame->has_stops;
+    if (state->sample + 1 < record->statistics_start &&
+        state->sample + count >= record->statistics_start)
+        count = record->statistics_start - 1 - state->sample;
+    count = engine->flight.length == 0 ? 0 : find_slices(state, count, slices);
+    state->run->work.stop_searches += count > 0 && state->has_stops;
     if (count > 0)
-        count = frame_flight_run(&engine->flight, &engine->trail, frame, slices, count,
-                                 frame->is_shadow ? NULL : &work);
-    frame->sample += count;
-    if (count == 0 || frame->is_shadow)
+        count = flight_run(&engine->flight, &engine->trail, state, slices, count,
+                           state->is_shadow ? NULL : &work);
+    state->sample += count;
+    if (count == 0 || state->is_shadow)
         return count;
-    Work *done = &frame->run->work;
-    *(frame->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
+    Work *done = &state->run->work;
+    *(state->base.base->form == BASE_STILL ? &done->unforced_samples : &done->flight_samples) +=
         count;
-    done->mode_samples += count * frame->mode_count;
-    frame->ground = base_cursor_at(&frame->base, frame->sample);
-    ledger_work(&frame->ledger, work.input, work.damping);
-    FrameTrail *trail = &engine->trail;
-    frame_trail_feel(trail, frame, count);
-    if (frame->sample + 1 - count == record->statistics_start)
-        frame_record_forget(frame);
-    frame_record_take(record, frame, count);
-    frame_record_flight_peaks(record, frame, count);
+    done->mode_samples += count * state->mode_count;
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    impact_log_work(&state->impacts, work.input, work.damping);
+    FlightBuffer *trail = &engine->trail;
+    flight_buffer_feel(trail, state, count);
+    if (state->sample + 1 - count == record->statistics_start)
+        recorder_forget(state);
+    recorder_take(record, state, count);
+    recorder_flight_peaks(record, state, count);
     return count;
 }
 
-Status frame_engine_settle(FrameEngine *engine) {
-    Frame *frame = &engine->frame;
+Status event_engine_settle(EventEngine *engine) {
+    ModalState *state = &engine->state;
     for (bool is_event = true; is_event;) {
         Slice slice;
-        FrameEvent event;
-        (void)base_cursor_slice(&frame->base, 0, 0, &slice);
-        frame_arc_make(&engine->arc, frame, &slice, fmin(frame->interval, arc_max(frame, &slice)));
-        is_event = frame_find_event(frame, &engine->arc, &event) && event.s == 0 &&
-                   frame->damper[event.damper].phase == FRAME_FLIGHT;
+        ContactEvent event;
+        (void)base_cursor_slice(&state->base, 0, 0, &slice);
+        taylor_step_make(&engine->arc, state, &slice,
+                         fmin(state->interval, arc_max(state, &slice)));
+        is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
+                   state->damper[event.damper].phase == PHASE_FLIGHT;
         if (is_event)
-            TRY(happen(frame, &event));
+            TRY(happen(state, &event));
     }
     return STATUS_OK;
 }
 
-static void balance(Frame *frame) {
-    if (frame->is_shadow || frame->sample % 64 != 0)
+static void balance(ModalState *state) {
+    if (state->is_shadow || state->sample % 64 != 0)
         return;
-    const EnergyState energy = frame_energy(frame);
-    ledger_balance(&frame->ledger, &energy);
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_balance(&state->impacts, &energy);
 }
 
-void frame_engine_take_sample(FrameEngine *engine) {
-    Frame *frame = &engine->frame;
-    if (frame->is_shadow)
+void event_engine_take_sample(EventEngine *engine) {
+    ModalState *state = &engine->state;
+    if (state->is_shadow)
         return;
-    frame->ground = base_cursor_at(&frame->base, frame->sample);
-    frame_feel(frame);
-    if (frame->sample == engine->record.statistics_start && frame->sample > 0)
-        frame_record_forget(frame);
-    frame_trail_take(&engine->trail, frame, engine->record.base_speed);
-    frame_record_take(&engine->record, frame, 1);
-    frame_record_peaks(frame);
+    state->base_acceleration = base_cursor_at(&state->base, state->sample);
+    modal_state_forces(state);
+    if (state->sample == engine->record.statistics_start && state->sample > 0)
+        recorder_forget(state);
+    flight_buffer_take(&engine->trail, state, engine->record.base_speed);
+    recorder_take(&engine->record, state, 1);
+    recorder_peaks(state);
 }
 
 // Notes the samples just passed: so many flown over, or the present one.
-static void track(FrameEngine *engine, size_t flown) {
-    const Frame *frame = &engine->frame;
-    const FrameTrail *trail = &engine->trail;
+static void track(EventEngine *engine, size_t flown) {
+    const ModalState *state = &engine->state;
+    const FlightBuffer *trail = &engine->trail;
     for (size_t k = 1; k <= (flown > 0 ? flown : 1); k++) {
-        const size_t sample = flown > 0 ? frame->sample - flown + k : frame->sample;
-        memcpy(engine->track + (sample - 1) % TRAIL_MAX * frame->padded,
-               flown > 0 ? trail->q + k * trail->padded : frame->q,
-               frame->mode_count * sizeof *engine->track);
+        const size_t sample = flown > 0 ? state->sample - flown + k : state->sample;
+        memcpy(engine->track + (sample - 1) % FLIGHT_BUFFER_MAX * state->padded,
+               flown > 0 ? trail->q + k * trail->padded : state->q,
+               state->mode_count * sizeof *engine->track);
     }
 }
 
-Status frame_engine_step(FrameEngine *engine, size_t until) {
-    Frame *frame = &engine->frame;
+Status event_engine_step(EventEngine *engine, size_t until) {
+    ModalState *state = &engine->state;
     const size_t flown = fly(engine, until);
     if (flown > 0) {
-        TRY(count_steps(engine, (double)flown * each(engine, FRAME_WORK_FLIGHT)));
+        TRY(count_steps(engine, (double)flown * each(engine, STEP_WORK_FLIGHT)));
     } else {
-        TRY(frame_engine_cross(engine, frame->interval));
-        frame->run->work.mode_samples += frame->mode_count;
-        frame->sample++;
-        frame->offset = 0;
-        frame_engine_take_sample(engine);
+        TRY(event_engine_cross(engine, state->interval));
+        state->run->work.mode_samples += state->mode_count;
+        state->sample++;
+        state->offset = 0;
+        event_engine_take_sample(engine);
     }
     if (engine->track != NULL)
         track(engine, flown);
-    balance(frame);
+    balance(state);
     return STATUS_OK;
 }
 
-Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Response *response,
+Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Response *response,
                          Problem *problem) {
-    Frame *frame = &engine->frame;
-    TRY(frame_make(frame, run, problem));
-    TRY(frame_arc_room(&engine->arc, frame, problem));
-    TRY(frame_flight_make(&engine->flight, frame, problem));
-    TRY(frame_press_make(&engine->pressing, frame, problem));
-    TRY(frame_ode_make(&engine->ode, frame, tolerance, problem));
-    TRY(frame_trail_make(&engine->trail, frame, problem));
-    TRY(frame_record_start(&engine->record, &engine->trail, frame, response, problem));
-    const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_max, &energy);
+    ModalState *state = &engine->state;
+    TRY(modal_state_make(state, run, problem));
+    TRY(taylor_step_room(&engine->arc, state, problem));
+    TRY(flight_make(&engine->flight, state, problem));
+    TRY(sustained_contact_make(&engine->pressing, state, problem));
+    TRY(power_contact_make(&engine->ode, state, tolerance, problem));
+    TRY(flight_buffer_make(&engine->trail, state, problem));
+    TRY(recorder_start(&engine->record, &engine->trail, state, response, problem));
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     // What contacts may be wrong by each, of many of them.
-    frame->ledger.gain_max =
-        fmax(LEDGER_GAIN_EXACT, tolerance > FRAME_ODE_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
+    state->impacts.gain_max = fmax(
+        IMPACT_LOG_GAIN_EXACT, tolerance > POWER_CONTACT_TOLERANCE ? GAIN_CONTACTS * tolerance : 0);
     return STATUS_OK;
 }
 
-Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run, double tolerance,
+Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run, double tolerance,
                            Response *response) {
-    Frame *frame = &engine->frame;
-    TRY(frame_make(frame, run, NULL));
-    TRY(frame_ode_make(&engine->ode, frame, tolerance, NULL));
+    ModalState *state = &engine->state;
+    TRY(modal_state_make(state, run, NULL));
+    TRY(power_contact_make(&engine->ode, state, tolerance, NULL));
     engine->arc = of->arc;
     engine->flight = of->flight;
     engine->pressing = of->pressing;
     engine->trail = of->trail;
-    frame->is_shadow = true;
-    const EnergyState energy = frame_energy(frame);
-    ledger_start(&frame->ledger, response, run->impacts_max, &energy);
+    state->is_shadow = true;
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_start(&state->impacts, response, run->impacts_max, &energy);
     return STATUS_OK;
 }
 
-void frame_engine_clear(FrameEngine *engine) {
-    frame_record_clear(&engine->record);
-    frame_trail_clear(&engine->trail);
-    frame_flight_clear(&engine->flight);
-    frame_press_clear(&engine->pressing);
-    frame_ode_clear(&engine->ode);
-    frame_arc_clear(&engine->arc);
-    frame_clear(&engine->frame);
+void event_engine_clear(EventEngine *engine) {
+    recorder_clear(&engine->record);
+    flight_buffer_clear(&engine->trail);
+    flight_clear(&engine->flight);
+    sustained_contact_clear(&engine->pressing);
+    power_contact_clear(&engine->ode);
+    taylor_step_clear(&engine->arc);
+    modal_state_clear(&engine->state);
 }

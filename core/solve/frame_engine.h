@@ -1,6 +1,6 @@
 // The stepping of the general engine: from sample to sample, past all events between.
-// Not the whole run (frame.c) and not the motion of one stretch (frame_arc.h, frame_flight.h,
-// frame_press.h, frame_ode.h). Used by frame.c and frame_neighbour.c.
+// Not the whole run (state.c) and not the motion of one stretch (taylor_step.h, flight.h,
+// sustained_contact.h, power_contact.h). Used by state.c and companion_run.c.
 #ifndef CORE_SOLVE_FRAME_ENGINE_H
 #define CORE_SOLVE_FRAME_ENGINE_H
 
@@ -13,43 +13,43 @@
 #include "core/solve/taylor_step.h"
 
 // All zero is empty.
-typedef struct FrameEngine {
-    Frame frame;
-    FrameArc arc;
-    FrameFlight flight;
-    FramePress pressing;
-    FrameOde ode;
-    FrameTrail trail;
-    FrameRecord record;
+typedef struct EventEngine {
+    ModalState state;
+    TaylorStep arc;
+    Flight flight;
+    SustainedContact pressing;
+    PowerContact ode;
+    FlightBuffer trail;
+    Recorder record;
     double work;   // since the progress was asked
     size_t idle;   // steps of contact in a row that took no time
-    double *track; // of the last TRAIL_MAX samples, all modes: sample k at (k - 1) % TRAIL_MAX;
-                   // NULL: not wanted
-} FrameEngine;
+    double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
+                   // FLIGHT_BUFFER_MAX; NULL: not wanted
+} EventEngine;
 
-// `tolerance` is of contacts under a power law. Cleared by frame_engine_clear, also after a
+// `tolerance` is of contacts under a power law. Cleared by event_engine_clear, also after a
 // failure.
-Status frame_engine_make(FrameEngine *engine, Run *run, double tolerance, Response *response,
+Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Response *response,
                          Problem *problem);
-void frame_engine_clear(FrameEngine *engine);
+void event_engine_clear(EventEngine *engine);
 
 // A run of its own that shares what the other has made once, and of which only the motion matters.
-// Its own are `frame` and `ode`; the rest is the other's to clear.
-Status frame_engine_shadow(FrameEngine *engine, const FrameEngine *of, Run *run, double tolerance,
+// Its own are `state` and `ode`; the rest is the other's to clear.
+Status event_engine_shadow(EventEngine *engine, const EventEngine *of, Run *run, double tolerance,
                            Response *response);
 
 // A mass that starts on a stop may touch it at t = 0; the first sample shows the moment after.
-Status frame_engine_settle(FrameEngine *engine);
+Status event_engine_settle(EventEngine *engine);
 
 // To the next sample or several, but not beyond sample `until`, and takes them; a shadow takes
 // none.
-Status frame_engine_step(FrameEngine *engine, size_t until);
-void frame_engine_take_sample(FrameEngine *engine);
+Status event_engine_step(EventEngine *engine, size_t until);
+void event_engine_take_sample(EventEngine *engine);
 
 // From the present sample over `length` [s].
-Status frame_engine_cross(FrameEngine *engine, double length);
+Status event_engine_cross(EventEngine *engine, double length);
 
 // Whether the motion is finite, the limits are kept and the progress lets the run go on.
-Status frame_engine_check(FrameEngine *engine);
+Status event_engine_check(EventEngine *engine);
 
 #endif

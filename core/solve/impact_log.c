@@ -2,8 +2,9 @@
 
 #include <stdlib.h>
 
-void ledger_start(Ledger *ledger, Response *response, size_t most, const EnergyState *energy) {
-    *ledger = (Ledger){.response = response, .most = most};
+void impact_log_start(ImpactLog *ledger, Response *response, size_t most,
+                      const EnergyState *energy) {
+    *ledger = (ImpactLog){.response = response, .most = most};
     ledger->energy.initial = energy->kinetic + energy->strain;
     ledger->largest_energy = ledger->energy.initial;
 }
@@ -17,7 +18,7 @@ static void meet(Approaches *met, double speed) {
 }
 
 // What is told of an impact whether or not it is listed.
-static void count(Ledger *ledger, const Impact *impact) {
+static void count(ImpactLog *ledger, const Impact *impact) {
     Response *response = ledger->response;
     const size_t damper = (size_t)impact->damper - 1;
     if (impact->kind != IMPACT_IMPACT) {
@@ -28,10 +29,10 @@ static void count(Ledger *ledger, const Impact *impact) {
             response->approaches[2 * damper + (size_t)impact->side].is_ranged)
             meet(&response->approaches[2 * damper + (size_t)impact->side], impact->approach_speed);
     }
-    ledger->impulse[damper] = ledger_larger(ledger->impulse[damper], impact->impulse);
+    ledger->impulse[damper] = impact_log_larger(ledger->impulse[damper], impact->impulse);
 }
 
-static void add(Ledger *ledger, const Impact *impact) {
+static void add(ImpactLog *ledger, const Impact *impact) {
     Impacts *impacts = &ledger->response->impacts;
     if (ledger->status != STATUS_OK)
         return;
@@ -57,8 +58,8 @@ static void add(Ledger *ledger, const Impact *impact) {
     count(ledger, impact);
 }
 
-void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Side side,
-                 double approach) {
+void impact_log_open(ImpactRow *row, ImpactKind kind, double time, size_t damper, Side side,
+                     double approach) {
     row->is_open = true;
     row->impact = (Impact){.kind = (int)kind,
                            .start = time,
@@ -70,7 +71,7 @@ void ledger_open(LedgerRow *row, ImpactKind kind, double time, size_t damper, Si
                            .restitution = NAN};
 }
 
-void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation) {
+void impact_log_close(ImpactLog *ledger, ImpactRow *row, double time, double separation) {
     Impact *open = &row->impact;
     open->end = time;
     open->separation_speed = separation;
@@ -81,8 +82,8 @@ void ledger_close(Ledger *ledger, LedgerRow *row, double time, double separation
     row->is_open = false;
 }
 
-void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double approach,
-                   double separation, double mass) {
+void impact_log_bounce(ImpactLog *ledger, double time, size_t damper, Side side, double approach,
+                       double separation, double mass) {
     const Impact impact = {.kind = IMPACT_IMPACT,
                            .start = time,
                            .end = time,
@@ -100,18 +101,18 @@ void ledger_bounce(Ledger *ledger, double time, size_t damper, Side side, double
     add(ledger, &impact);
 }
 
-void ledger_balance(Ledger *ledger, const EnergyState *state) {
+void impact_log_balance(ImpactLog *ledger, const EnergyState *state) {
     const Energy *energy = &ledger->energy;
     const double held = state->kinetic + state->strain;
     const double balance =
         held - energy->initial - energy->input + energy->structural_damping + energy->contact;
     ledger->largest_energy =
-        ledger_larger(ledger->largest_energy, ledger_larger(held, fabs(energy->input)));
-    ledger->largest_balance = ledger_larger(ledger->largest_balance, fabs(balance));
-    ledger->largest_gain = ledger_larger(ledger->largest_gain, balance);
+        impact_log_larger(ledger->largest_energy, impact_log_larger(held, fabs(energy->input)));
+    ledger->largest_balance = impact_log_larger(ledger->largest_balance, fabs(balance));
+    ledger->largest_gain = impact_log_larger(ledger->largest_gain, balance);
 }
 
-void ledger_count(const Ledger *ledger, Work *work) {
+void impact_log_count(const ImpactLog *ledger, Work *work) {
     const Response *response = ledger->response;
     work->contacts = response->impact_count - ledger->bounces;
     work->bounces = ledger->bounces;
@@ -119,13 +120,13 @@ void ledger_count(const Ledger *ledger, Work *work) {
     work->ledger_rows = response->impacts.count;
 }
 
-void ledger_forget_peaks(Ledger *ledger, const Moment *at) {
+void impact_log_forget_peaks(ImpactLog *ledger, const Instant *at) {
     Response *response = ledger->response;
-    response->earlier = ledger_larger(response->earlier, response->peaks.displacement);
+    response->earlier = impact_log_larger(response->earlier, response->peaks.displacement);
     response->peaks = (Peaks){.contact_force = fabs(at->force)};
 }
 
-Status ledger_status(const Ledger *ledger, Problem *problem) {
+Status impact_log_status(const ImpactLog *ledger, Problem *problem) {
     if (ledger->status == STATUS_LIMIT)
         return problem_set(problem, STATUS_LIMIT,
                            "more than %zu impacts; the last one kept was at t = %.6g s",
@@ -151,8 +152,8 @@ static int by_start(const void *a, const void *b) {
     return (first->side > second->side) - (first->side < second->side);
 }
 
-Status ledger_finish(Ledger *ledger, LedgerRow *rows, size_t count, const EnergyState *state,
-                     Problem *problem) {
+Status impact_log_finish(ImpactLog *ledger, ImpactRow *rows, size_t count, const EnergyState *state,
+                         Problem *problem) {
     for (size_t i = 0; i < count; i++) {
         if (!rows[i].is_open)
             continue;
@@ -164,12 +165,12 @@ Status ledger_finish(Ledger *ledger, LedgerRow *rows, size_t count, const Energy
     Impacts *impacts = &ledger->response->impacts;
     if (count > 1 && impacts->count > 1)
         qsort(impacts->at, impacts->count, sizeof *impacts->at, by_start);
-    ledger_balance(ledger, state);
+    impact_log_balance(ledger, state);
     Energy *energy = &ledger->energy;
     energy->kinetic = state->kinetic;
     energy->strain = state->strain;
     energy->residual =
         ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
     ledger->response->energy = *energy;
-    return ledger_status(ledger, problem);
+    return impact_log_status(ledger, problem);
 }

@@ -7,166 +7,167 @@
 
 #include "core/math/symmetric_eigen.h"
 
-double frame_time(const Frame *frame) {
-    return (double)frame->sample / frame->plan->sample_rate + frame->offset;
+double modal_state_time(const ModalState *state) {
+    return (double)state->sample / state->plan->sample_rate + state->offset;
 }
 
-double frame_clock(const Frame *frame) {
-    return 4 * DBL_EPSILON * fmax(frame_time(frame), frame->interval);
+double modal_state_clock(const ModalState *state) {
+    return 4 * DBL_EPSILON * fmax(modal_state_time(state), state->interval);
 }
 
-double frame_room(const FrameDamper *damper, Side side) {
-    if (damper->origin == FRAME_FROM_MIDDLE)
+double modal_state_room(const DamperState *damper, Side side) {
+    if (damper->origin == FROM_MIDDLE)
         return damper->plan->clearance / 2;
-    return damper->origin == (FrameOrigin)side ? 0 : damper->plan->clearance;
+    return damper->origin == (ContactOrigin)side ? 0 : damper->plan->clearance;
 }
 
-double frame_middle(const FrameDamper *damper) {
+double modal_state_middle(const DamperState *damper) {
     const double stop = damper->plan->clearance / 2;
     const double origin =
-        damper->origin == FRAME_FROM_MIDDLE ? 0 : frame_sign((Side)damper->origin) * stop;
+        damper->origin == FROM_MIDDLE ? 0 : modal_state_sign((Side)damper->origin) * stop;
     return damper->plan->offset + origin;
 }
 
-void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out) {
-    const size_t padded = frame->padded;
-    if (frame->diagonal != NULL) {
-        frame->lanes->mix(padded, 1, frame->diagonal, p, frame->omega2, q, out);
+void modal_state_elastic(const ModalState *state, const double *q, const double *p,
+                         double *restrict out) {
+    const size_t padded = state->padded;
+    if (state->diagonal != NULL) {
+        state->lanes->mix(padded, 1, state->diagonal, p, state->omega2, q, out);
         return;
     }
-    frame->lanes->multiply(frame->coupled, padded, p, frame_even(frame->mode_count), out);
+    state->lanes->multiply(state->coupled, padded, p, modal_state_even(state->mode_count), out);
     for (size_t i = 0; i < padded; i++)
-        out[i] += frame->omega2[i] * q[i];
+        out[i] += state->omega2[i] * q[i];
 }
 
 // What a power law says of the present contact.
-static ContactForce power_now(const Frame *frame, const FrameDamper *damper) {
-    const double sign = frame_sign(damper->side);
-    return frame->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
+static ContactForce power_now(const ModalState *state, const DamperState *damper) {
+    const double sign = modal_state_sign(damper->side);
+    return state->plan->law->force(&damper->contact, sign * damper->r, sign * damper->w);
 }
 
-void frame_feel(Frame *frame) {
-    frame_elastic(frame, frame->q, frame->p, frame->elastic);
-    if (frame->unmoved != NULL)
-        frame->elastic[frame->mode_count] = frame->ground;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        FrameDamper *damper = &frame->damper[d];
+void modal_state_forces(ModalState *state) {
+    modal_state_elastic(state, state->q, state->p, state->elastic);
+    if (state->residual_influence != NULL)
+        state->elastic[state->mode_count] = state->base_acceleration;
+    for (size_t d = 0; d < state->dampers; d++) {
+        DamperState *damper = &state->damper[d];
         damper->force = 0;
-        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
-            damper->force = frame_sign(damper->side) * power_now(frame, damper).value;
-        else if (damper->phase == FRAME_CONTACT)
+        if (damper->phase == PHASE_CONTACT && state->plan->form == CONTACT_POWER)
+            damper->force = modal_state_sign(damper->side) * power_now(state, damper).value;
+        else if (damper->phase == PHASE_CONTACT)
             damper->force =
                 damper->contact.stiffness * damper->r + damper->contact.damping * damper->w;
-        if (damper->phase != FRAME_RESTING)
+        if (damper->phase != PHASE_RESTING)
             continue;
-        for (size_t e = 0; e < frame->dampers; e++)
-            if (frame->damper[e].phase == FRAME_RESTING)
+        for (size_t e = 0; e < state->dampers; e++)
+            if (state->damper[e].phase == PHASE_RESTING)
                 damper->force +=
-                    frame->hold[d * frame->dampers + e] *
-                    (frame_dot(frame->damper[e].shape, frame->elastic, frame->mode_count) +
-                     frame->damper[e].lean * frame->ground);
+                    state->constraint_mass[d * state->dampers + e] *
+                    (modal_state_dot(state->damper[e].shape, state->elastic, state->mode_count) +
+                     state->damper[e].base_coupling * state->base_acceleration);
     }
 }
 
-const double *frame_spread_four(const Frame *frame, const double *modal) {
-    frame->lanes->multiply_four(frame->spread, frame->tall, modal, frame->padded,
-                                frame_even(frame->slot_count), frame->seen);
-    return frame->seen;
+const double *modal_state_expand_four(const ModalState *state, const double *modal) {
+    state->lanes->multiply_four(state->shape_matrix, state->tall, modal, state->padded,
+                                modal_state_even(state->slot_count), state->storey_values);
+    return state->storey_values;
 }
 
-const double *frame_spread(const Frame *frame, const double *modal) {
-    frame->lanes->multiply(frame->spread, frame->tall, modal, frame_even(frame->slot_count),
-                           frame->seen);
-    return frame->seen;
+const double *modal_state_expand(const ModalState *state, const double *modal) {
+    state->lanes->multiply(state->shape_matrix, state->tall, modal,
+                           modal_state_even(state->slot_count), state->storey_values);
+    return state->storey_values;
 }
 
-double frame_displacement(const Frame *frame, size_t storey) {
-    return frame_dot(frame->modes->shapes + storey * frame->mode_count, frame->q,
-                     frame->mode_count);
+double modal_state_displacement(const ModalState *state, size_t storey) {
+    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->q,
+                           state->mode_count);
 }
 
-double frame_velocity(const Frame *frame, size_t storey) {
-    return frame_dot(frame->modes->shapes + storey * frame->mode_count, frame->p,
-                     frame->mode_count);
+double modal_state_velocity(const ModalState *state, size_t storey) {
+    return modal_state_dot(state->modes->shapes + storey * state->mode_count, state->p,
+                           state->mode_count);
 }
 
-double frame_storey_acceleration(const Frame *frame, size_t storey) {
-    const size_t n = frame->mode_count;
-    double sum = -frame_dot(frame->modes->shapes + storey * n, frame->elastic, n);
-    if (frame->unmoved != NULL)
-        sum += frame->unmoved[storey] * frame->ground;
-    for (size_t d = 0; d < frame->dampers; d++)
-        sum += frame->mobility[d * frame->storey_count + storey] * frame->damper[d].force;
+double modal_state_storey_acceleration(const ModalState *state, size_t storey) {
+    const size_t n = state->mode_count;
+    double sum = -modal_state_dot(state->modes->shapes + storey * n, state->elastic, n);
+    if (state->residual_influence != NULL)
+        sum += state->residual_influence[storey] * state->base_acceleration;
+    for (size_t d = 0; d < state->dampers; d++)
+        sum += state->mobility[d * state->storey_count + storey] * state->damper[d].force;
     return sum;
 }
 
-double frame_acceleration(const Frame *frame, size_t d) {
-    const FrameDamper *damper = &frame->damper[d];
-    double sum =
-        damper->lean * frame->ground + frame_dot(damper->shape, frame->elastic, frame->mode_count);
-    for (size_t e = 0; e < frame->dampers; e++)
-        sum -= frame->yield[d * frame->dampers + e] * frame->damper[e].force;
+double modal_state_acceleration(const ModalState *state, size_t d) {
+    const DamperState *damper = &state->damper[d];
+    double sum = damper->base_coupling * state->base_acceleration +
+                 modal_state_dot(damper->shape, state->elastic, state->mode_count);
+    for (size_t e = 0; e < state->dampers; e++)
+        sum -= state->delassus[d * state->dampers + e] * state->damper[e].force;
     return sum;
 }
 
-EnergyState frame_energy(const Frame *frame) {
-    EnergyState energy = {0.5 * frame_dot(frame->p, frame->p, frame->mode_count), 0};
-    for (size_t i = 0; i < frame->mode_count; i++)
-        energy.strain += 0.5 * frame->omega2[i] * frame->q[i] * frame->q[i];
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const double z = frame_dot(damper->shape, frame->p, frame->mode_count) + damper->w;
+EnergyState modal_state_energy(const ModalState *state) {
+    EnergyState energy = {0.5 * modal_state_dot(state->p, state->p, state->mode_count), 0};
+    for (size_t i = 0; i < state->mode_count; i++)
+        energy.strain += 0.5 * state->omega2[i] * state->q[i] * state->q[i];
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        const double z = modal_state_dot(damper->shape, state->p, state->mode_count) + damper->w;
         energy.kinetic += 0.5 * damper->plan->mass * z * z;
-        if (damper->phase == FRAME_CONTACT && frame->plan->form == CONTACT_POWER)
-            energy.strain += power_now(frame, damper).strain;
-        else if (damper->phase == FRAME_CONTACT)
+        if (damper->phase == PHASE_CONTACT && state->plan->form == CONTACT_POWER)
+            energy.strain += power_now(state, damper).strain;
+        else if (damper->phase == PHASE_CONTACT)
             energy.strain += 0.5 * damper->contact.stiffness * damper->r * damper->r;
     }
     return energy;
 }
 
-double frame_size_of(const Frame *frame, const double *q, const double *p) {
+double modal_state_size_of(const ModalState *state, const double *q, const double *p) {
     double squares[4] = {0, 0, 0, 0};
     size_t i = 0;
-    for (; i + 2 <= frame->mode_count; i += 2)
+    for (; i + 2 <= state->mode_count; i += 2)
         for (size_t j = 0; j < 2; j++) {
             squares[j] += p[i + j] * p[i + j];
-            squares[2 + j] += frame->omega2[i + j] * q[i + j] * q[i + j];
+            squares[2 + j] += state->omega2[i + j] * q[i + j] * q[i + j];
         }
-    if (i < frame->mode_count)
-        squares[0] += p[i] * p[i] + frame->omega2[i] * q[i] * q[i];
+    if (i < state->mode_count)
+        squares[0] += p[i] * p[i] + state->omega2[i] * q[i] * q[i];
     return sqrt((squares[0] + squares[1]) + (squares[2] + squares[3]));
 }
 
-double frame_size(const Frame *frame) {
-    return frame_size_of(frame, frame->q, frame->p);
+double modal_state_size(const ModalState *state) {
+    return modal_state_size_of(state, state->q, state->p);
 }
 
 // With lambda^2 + c lambda + k = 0 for the Rayleigh quotients c and k of any mode, |lambda| is at
 // most the larger of c and sqrt(k); a contact adds to each quotient no more than its own over m_e.
-double frame_rate(const Frame *frame) {
-    double stiff = frame->stiff, viscous = frame->viscous;
+double modal_state_rate(const ModalState *state) {
+    double stiff = state->stiff, viscous = state->viscous;
     bool is_touching = false;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        if (damper->phase != FRAME_CONTACT)
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        if (damper->phase != PHASE_CONTACT)
             continue;
         is_touching = true;
         stiff += damper->contact.stiffness / damper->effective_mass;
         viscous += damper->contact.damping / damper->effective_mass;
     }
-    return is_touching ? fmax(fmax(sqrt(stiff), viscous), frame->rate) : frame->rate;
+    return is_touching ? fmax(fmax(sqrt(stiff), viscous), state->rate) : state->rate;
 }
 
 // The inverse of `yield` among the dampers that rest, by Gauss and Jordan; it is positive definite.
-static void invert_hold(Frame *frame) {
-    const size_t n = frame->dampers;
-    double *left = frame->scratch, *right = frame->hold;
+static void invert_hold(ModalState *state) {
+    const size_t n = state->dampers;
+    double *left = state->scratch, *right = state->constraint_mass;
     for (size_t i = 0; i < n; i++) {
-        const bool is_held = frame->damper[i].phase == FRAME_RESTING;
+        const bool is_held = state->damper[i].phase == PHASE_RESTING;
         for (size_t j = 0; j < n; j++) {
-            const bool are_held = is_held && frame->damper[j].phase == FRAME_RESTING;
-            left[i * n + j] = are_held ? frame->yield[i * n + j] : i == j;
+            const bool are_held = is_held && state->damper[j].phase == PHASE_RESTING;
+            left[i * n + j] = are_held ? state->delassus[i * n + j] : i == j;
             right[i * n + j] = is_held && i == j;
         }
     }
@@ -188,10 +189,10 @@ static void invert_hold(Frame *frame) {
     }
 }
 
-void frame_hold_make(Frame *frame) {
-    frame->resting = 0;
-    for (size_t d = 0; d < frame->dampers; d++)
-        frame->resting += frame->damper[d].phase == FRAME_RESTING;
-    if (frame->resting > 0)
-        invert_hold(frame);
+void modal_state_constrain(ModalState *state) {
+    state->resting = 0;
+    for (size_t d = 0; d < state->dampers; d++)
+        state->resting += state->damper[d].phase == PHASE_RESTING;
+    if (state->resting > 0)
+        invert_hold(state);
 }

@@ -1,63 +1,65 @@
 // What the general engine knows while it runs, and how it looks from outside: rooms, forces,
-// energies. Not the stepping (frame.c), the events (frame_events.c) nor what is written down of it
-// (frame_record.c). Used by core/solve/frame*.c.
+// energies. Not the stepping (state.c), the events (frame_events.c) nor what is written down of it
+// (frame_record.c). Used by core/solve/state*.c.
 #ifndef CORE_SOLVE_MODAL_STATE_H
 #define CORE_SOLVE_MODAL_STATE_H
 
 #include "core/plan/modes.h"
 #include "core/solve/base_motion_cursor.h"
-#include "core/solve/simd_kernels.h"
 #include "core/solve/impact_log.h"
+#include "core/solve/simd_kernels.h"
 #include "core/solve/solver.h"
 
-// FRAME_INSIDE: out of contact by the force's end, but not yet out of the buffer.
-typedef enum FramePhase { FRAME_FLIGHT, FRAME_CONTACT, FRAME_INSIDE, FRAME_RESTING } FramePhase;
-typedef enum FrameOrigin {
-    FRAME_FROM_LEFT = SIDE_LEFT,
-    FRAME_FROM_RIGHT = SIDE_RIGHT,
-    FRAME_FROM_MIDDLE
-} FrameOrigin;
+// PHASE_INSIDE: out of contact by the force's end, but not yet out of the buffer.
+typedef enum ContactPhase { PHASE_FLIGHT, PHASE_CONTACT, PHASE_INSIDE, PHASE_RESTING } ContactPhase;
+typedef enum ContactOrigin {
+    FROM_LEFT = SIDE_LEFT,
+    FROM_RIGHT = SIDE_RIGHT,
+    FROM_MIDDLE
+} ContactOrigin;
 
-typedef struct FrameDamper {
+typedef struct DamperState {
     const PlanDamper *plan;
     const double *shape;   // of its storey, mode after mode
-    double lean;           // a_g's part in r''
+    double base_coupling;  // a_g's part in r''
     double effective_mass; // m_e, 1 / (1/m + (M^-1)_jj), of the modes kept [kg]
-    double thrust;         // a force N on its storey accelerates none by more than this N [1/kg]
-    double reach;          // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
+    double max_mobility;   // a force N on its storey accelerates none by more than this N [1/kg]
+    double elastic_bound;  // |[M^-1 (C v + K x)]_j| is at most this times sqrt(p'p + q'W^2 q) [1/s]
 
-    FramePhase phase;
-    Side side;          // of all phases but flight
-    FrameOrigin origin; // what r is counted from
-    int leaving; // terms of the gap, from the constant one on, that are exactly 0: it was released
-                 // from rest a moment ago
-    bool is_fresh;             // the present phase has lasted for no time yet
+    ContactPhase phase;
+    Side side;            // of all phases but flight
+    ContactOrigin origin; // what r is counted from
+    int zero_gap_terms;   // terms of the gap, from the constant one on, that are exactly 0: it was
+                        // released from rest a moment ago
+    bool just_begun;           // the present phase has lasted for no time yet
     double r, w;               // displacement and speed relative to the storey [m], [m/s]
-    double force;              // N on the structure as of the last frame_feel [N]
+    double force;              // N on the structure as of the last modal_state_forces [N]
     ContactParameters contact; // frozen at the touch
-    LedgerRow row;             // of the present contact or rest
+    ImpactRow row;             // of the present contact or rest
 
-    // Of a long step beside another's contact (frame_press.c): speed of the storey before it, and
-    // what r gains.
+    // Of a long step beside another's contact (sustained_contact.c): speed of the storey before it,
+    // and what r gains.
     double storey_speed, gained;
     // Of a collision: speed towards the stop, speed away from it that is asked for, and the impulse
-    // that presses it [m/s], [m/s], [N s]; the rest is frame_collide's own.
-    bool is_met, is_bounced; // is_met: takes part; is_bounced: not from rest
-    double closing, parting, pressed;
-    bool is_pressing, is_spent;
+    // that presses it [m/s], [m/s], [N s]; the rest is collision_resolve's own.
+    bool in_collision, is_bounced; // in_collision: takes part; is_bounced: not from rest
+    double approach_speed, separation_speed, impulse;
+    bool is_pressing, is_finished;
     double wanted;
-    bool is_held; // taken into `hold`
-} FrameDamper;
+    bool is_locked; // taken into `constraint_mass`
+} DamperState;
 
 // In modal coordinates, x = shapes q:
 //   q'' = -(D q' + W^2 q) - participation a_g + sum of shape_d N_d
-//   r_d'' = lean_d a_g + shape_d . (D q' + W^2 q) - sum over e of yield_de N_e
-// with lean_d = shape_d . participation - 1, which is r_j - 1 where all modes are kept. Where they
-// are not, what the base does to the others is theirs: a storey's absolute acceleration is
-//   unmoved_j a_g - shape_j . (D q' + W^2 q) + ...,   unmoved_j = r_j - shape_j . participation,
+//   r_d'' = base_coupling_d a_g + shape_d . (D q' + W^2 q) - sum over e of delassus_de N_e
+// with base_coupling_d = shape_d . participation - 1, which is r_j - 1 where all modes are kept.
+// Where they are not, what the base does to the others is theirs: a storey's absolute acceleration
+// is
+//   residual_influence_j a_g - shape_j . (D q' + W^2 q) + ...,   residual_influence_j = r_j -
+//   shape_j . participation,
 // and arrays over modes have a_g in one slot more behind `elastic`, which the storeys see with
-// -unmoved.
-typedef struct Frame {
+// -residual_influence.
+typedef struct ModalState {
     Run *run;
     const Plan *plan;
     const Modes *modes;
@@ -68,66 +70,70 @@ typedef struct Frame {
     bool is_shadow; // only the motion is wanted: no peaks, no energies
 
     size_t storey_count, mode_count;
-    size_t slot_count;       // mode_count, and a_g's slot where modes are left out
-    size_t padded;           // values of each array over modes here, zeros behind the slots
-    size_t tall;             // likewise of an array over storeys
-    const FrameLanes *lanes; // what this processor has
-    double *omega2;          // [1/s^2]
-    const double *damping;   // D, modes x modes
-    double *diagonal;        // of D, where it is diagonal; else NULL
-    double *coupled;         // D, where it is not: columns of `padded` values; else NULL
-    double *share;           // participation
-    double *shapes;          // of the dampers' storeys
-    double *spread;          // of all storeys: columns of `tall` values, one a slot
-    double *seen;            // scratch of frame_spread
-    double *widest;          // of each slot, the largest |shape| of any storey
-    double *unmoved;         // of the storeys; NULL where all modes are kept [-]
-    double *carry;         // participation + sum of m_d shape_d: -a_g carry . p is the base's work
+    size_t slot_count;          // mode_count, and a_g's slot where modes are left out
+    size_t padded;              // values of each array over modes here, zeros behind the slots
+    size_t tall;                // likewise of an array over storeys
+    const SimdKernels *lanes;   // what this processor has
+    double *omega2;             // [1/s^2]
+    const double *damping;      // D, modes x modes
+    double *diagonal;           // of D, where it is diagonal; else NULL
+    double *coupled;            // D, where it is not: columns of `padded` values; else NULL
+    double *participation;      // participation
+    double *shapes;             // of the dampers' storeys
+    double *shape_matrix;       // of all storeys: columns of `tall` values, one a slot
+    double *storey_values;      // scratch of modal_state_expand
+    double *max_shape;          // of each slot, the largest |shape| of any storey
+    double *residual_influence; // of the storeys; NULL where all modes are kept [-]
+    double
+        *momentum_weights; // participation + sum of m_d shape_d: -a_g carry . p is the base's work
     double rate;           // no eigenvalue of flight is larger [1/s]
-    double turning;        // of a base that turns over whole sample intervals, else 0 [rad/s]
-    double turned[2];      // cosine and sine of what it turns in one of them
-    double stiff, viscous; // largest of W^2 and of D
-    double drive;          // |participation|
-    double growth;         // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
+    double base_omega;     // of a base that turns over whole sample intervals, else 0 [rad/s]
+    double base_rotation[2];   // cosine and sine of what it turns in one of them
+    double stiff, viscous;     // largest of W^2 and of D
+    double participation_norm; // |participation|
+    double growth;             // sqrt(p'p + q'W^2 q) grows by no more than this in flight [1/s]
 
     size_t dampers;
-    FrameDamper *damper;
-    double *yield; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
-    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]; as `yield`
-                      // of the modes kept
-    double *hold;     // dampers x dampers: constraint forces are hold . (r'' without them) [kg]
-    size_t resting;   // how many are
+    DamperState *damper;
+    double
+        *delassus; // dampers x dampers: (M^-1) between their storeys, + 1/m on the diagonal [1/kg]
+    double *mobility; // dampers x storeys: (M^-1) between their storey and all [1/kg]; as
+                      // `delassus` of the modes kept
+    double *constraint_mass; // dampers x dampers: constraint forces are constraint_mass . (r''
+                             // without them) [kg]
+    size_t resting;          // how many are
 
-    double *q, *p;   // modal displacements and speeds
-    double *elastic; // D p + W^2 q, as of the last frame_feel
-    double ground;   // a_g now [m/s^2]
-    double *scratch; // of frame_hold_make and frame_collide
-    double *block;   // all arrays above, but for coupled
+    double *q, *p;            // modal displacements and speeds
+    double *elastic;          // D p + W^2 q, as of the last modal_state_forces
+    double base_acceleration; // a_g now [m/s^2]
+    double *scratch;          // of modal_state_constrain and collision_resolve
+    double *block;            // all arrays above, but for coupled
 
     size_t sample; // the last one passed
     double offset; // time since then [s]
     double interval;
     BaseCursor base;
-    Ledger ledger;
+    ImpactLog impacts;
     size_t events;            // all so far
-    size_t still_events;      // in a row, without time passing
-    size_t storm_events;      // without more time passing than the clock tells from none
-    double storm_time;        // what has passed nevertheless [s]
-    double stall, stalled_at; // how long events were last passed over, and when that was [s]
-} Frame;
+    size_t events_at_instant; // in a row, without time passing
+    size_t chatter_events;    // without more time passing than the clock tells from none
+    double chatter_time;      // what has passed nevertheless [s]
+    double suppress_time,
+        suppressed_at; // how long events were last passed over, and when that was [s]
+} ModalState;
 
 // +1 for the right stop, -1 for the left.
-static inline double frame_sign(Side side) {
+static inline double modal_state_sign(Side side) {
     return side == SIDE_RIGHT ? 1 : -1;
 }
 
 // Columns of a matrix go in pairs.
-static inline size_t frame_even(size_t count) {
+static inline size_t modal_state_even(size_t count) {
     return count + count % 2;
 }
 
 // In a fixed order that processors can do two by two.
-static inline double frame_dot(const double *a, const double *b, size_t count) {
+static inline double modal_state_dot(const double *a, const double *b, size_t count) {
     double sum[4] = {0, 0, 0, 0};
     size_t i = 0;
     for (; i + 4 <= count; i += 4)
@@ -138,41 +144,42 @@ static inline double frame_dot(const double *a, const double *b, size_t count) {
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-// Everything but the ledger. Freed by frame_clear, also after a failure.
-Status frame_make(Frame *frame, Run *run, Problem *problem);
-void frame_clear(Frame *frame);
+// Everything but the ledger. Freed by modal_state_clear, also after a failure.
+Status modal_state_make(ModalState *state, Run *run, Problem *problem);
+void modal_state_clear(ModalState *state);
 
-double frame_time(const Frame *frame); // [s]
+double modal_state_time(const ModalState *state); // [s]
 // The shortest time that can be told from none, at the present one [s].
-double frame_clock(const Frame *frame);
+double modal_state_clock(const ModalState *state);
 // Between free mass and stop at r = 0 of the present origin [m].
-double frame_room(const FrameDamper *damper, Side side);
+double modal_state_room(const DamperState *damper, Side side);
 // Displacement of the free mass relative to its storey at r = 0 [m].
-double frame_middle(const FrameDamper *damper);
+double modal_state_middle(const DamperState *damper);
 
 // out = D p + W^2 q; arrays of `padded` values.
-void frame_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
+void modal_state_elastic(const ModalState *state, const double *q, const double *p,
+                         double *restrict out);
 // Brings elastic and the dampers' forces up to the present state.
-void frame_feel(Frame *frame);
+void modal_state_forces(ModalState *state);
 // Values of all storeys from those of all modes, until the next call.
-const double *frame_spread(const Frame *frame, const double *modal);
-// Likewise of FRAME_FOUR rows of modes, one after the other; `tall` values of each.
-const double *frame_spread_four(const Frame *frame, const double *modal);
-// Of one storey, relative to the base [m], [m/s]; absolute, after frame_feel [m/s^2].
-double frame_displacement(const Frame *frame, size_t storey);
-double frame_velocity(const Frame *frame, size_t storey);
-double frame_storey_acceleration(const Frame *frame, size_t storey);
-// r'' of a damper in flight, after frame_feel [m/s^2].
-double frame_acceleration(const Frame *frame, size_t damper);
-EnergyState frame_energy(const Frame *frame);
-double frame_size(const Frame *frame); // sqrt(p'p + q'W^2 q)
-double frame_size_of(const Frame *frame, const double *q, const double *p);
+const double *modal_state_expand(const ModalState *state, const double *modal);
+// Likewise of FLIGHT_ROWS rows of modes, one after the other; `tall` values of each.
+const double *modal_state_expand_four(const ModalState *state, const double *modal);
+// Of one storey, relative to the base [m], [m/s]; absolute, after modal_state_forces [m/s^2].
+double modal_state_displacement(const ModalState *state, size_t storey);
+double modal_state_velocity(const ModalState *state, size_t storey);
+double modal_state_storey_acceleration(const ModalState *state, size_t storey);
+// r'' of a damper in flight, after modal_state_forces [m/s^2].
+double modal_state_acceleration(const ModalState *state, size_t damper);
+EnergyState modal_state_energy(const ModalState *state);
+double modal_state_size(const ModalState *state); // sqrt(p'p + q'W^2 q)
+double modal_state_size_of(const ModalState *state, const double *q, const double *p);
 
 // No eigenvalue of the present motion is larger [1/s].
-double frame_rate(const Frame *frame);
+double modal_state_rate(const ModalState *state);
 
-// Makes `hold` anew, the inverse of `yield` between those that rest: after every change of who
-// does.
-void frame_hold_make(Frame *frame);
+// Makes `constraint_mass` anew, the inverse of `delassus` between those that rest: after every
+// change of who does.
+void modal_state_constrain(ModalState *state);
 
 #endif

@@ -36,14 +36,14 @@ static void swap(double *a, double *b) {
 }
 
 static Status no_memory(const Steps *steps) {
-    return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
-                       steps->frame.mode_count);
+    return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
+                       steps->state.mode_count);
 }
 
 static Status newmark_make(Steps *steps) {
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count, m = frame->dampers, size = steps->size;
-    const size_t square = frame->diagonal != NULL ? n : n * n;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count, m = state->dampers, size = steps->size;
+    const size_t square = state->diagonal != NULL ? n : n * n;
     Newmark *own = calloc(1, sizeof *own);
     steps->own = own;
     if (own == NULL)
@@ -64,8 +64,8 @@ static Status newmark_make(Steps *steps) {
         at += sizes[i];
     }
     for (size_t d = 0; d < m; d++)
-        own->shift[d] = frame->damper[d].lean -
-                        frame_dot(frame->damper[d].shape, frame->modes->participation, n);
+        own->shift[d] = state->damper[d].base_coupling -
+                        modal_state_dot(state->damper[d].shape, state->modes->participation, n);
     return STATUS_OK;
 }
 
@@ -112,12 +112,12 @@ static bool eliminate(double *left, double *right, size_t n, size_t columns) {
 
 static Status invert(const Steps *steps, double length) {
     const Newmark *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count;
     const double half = length / 2, quarter = length * length / 4;
-    if (frame->diagonal != NULL) {
+    if (state->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
-            own->inverse[i] = 1 / (1 + half * frame->diagonal[i] + quarter * frame->omega2[i]);
+            own->inverse[i] = 1 / (1 + half * state->diagonal[i] + quarter * state->omega2[i]);
         return STATUS_OK;
     }
     double *G = malloc(n * n * sizeof *G);
@@ -126,13 +126,13 @@ static Status invert(const Steps *steps, double length) {
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             G[i * n + j] =
-                half * frame->damping[i * n + j] + (i == j ? 1 + quarter * frame->omega2[i] : 0);
+                half * state->damping[i * n + j] + (i == j ? 1 + quarter * state->omega2[i] : 0);
             own->inverse[i * n + j] = i == j;
         }
     const bool is_found = eliminate(G, own->inverse, n, n);
     free(G);
     return is_found ? STATUS_OK
-                    : problem_set(frame->problem, STATUS_UNSTABLE,
+                    : problem_set(state->problem, STATUS_UNSTABLE,
                                   "newmark's matrices leave what double precision can hold with a "
                                   "step of %.4g s",
                                   length);
@@ -141,23 +141,23 @@ static Status invert(const Steps *steps, double length) {
 // out = G^-1 in.
 static void solve(const Steps *steps, const double *in, double *restrict out) {
     const Newmark *own = steps->own;
-    const size_t n = steps->frame.mode_count;
+    const size_t n = steps->state.mode_count;
     for (size_t i = 0; i < n; i++)
-        out[i] = steps->frame.diagonal != NULL ? own->inverse[i] * in[i]
-                                               : frame_dot(own->inverse + i * n, in, n);
+        out[i] = steps->state.diagonal != NULL ? own->inverse[i] * in[i]
+                                               : modal_state_dot(own->inverse + i * n, in, n);
 }
 
 static Status make_tables(Steps *steps, double length) {
     Newmark *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count, m = frame->dampers;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count, m = state->dampers;
     TRY(invert(steps, length));
     own->length = length;
     for (size_t d = 0; d < m; d++) {
-        solve(steps, frame->damper[d].shape, own->lift + d * n);
+        solve(steps, state->damper[d].shape, own->lift + d * n);
         for (size_t e = 0; e < m; e++)
-            own->soften[e * m + d] = frame_dot(frame->damper[e].shape, own->lift + d * n, n) +
-                                     (d == e ? 1 / frame->damper[d].plan->mass : 0);
+            own->soften[e * m + d] = modal_state_dot(state->damper[e].shape, own->lift + d * n, n) +
+                                     (d == e ? 1 / state->damper[d].plan->mass : 0);
     }
     return STATUS_OK;
 }
@@ -166,13 +166,13 @@ static Status make_tables(Steps *steps, double length) {
 // with r'' = 0 at the end, `bare` is r'' without any force.
 static Status find_forces(Steps *steps, double length, const double *r, const double *w) {
     const Newmark *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t m = frame->dampers;
+    const ModalState *state = &steps->state;
+    const size_t m = state->dampers;
     const double half = length / 2, quarter = length * length / 4;
-    const bool is_linear = frame->plan->form == CONTACT_LINEAR;
+    const bool is_linear = state->plan->form == CONTACT_LINEAR;
     bool is_any = false;
     for (size_t d = 0; d < m; d++)
-        is_any = is_any || frame->damper[d].phase == FRAME_CONTACT;
+        is_any = is_any || state->damper[d].phase == PHASE_CONTACT;
     for (int round = 0; is_any && round < NEWTON_MAX; round++) {
         for (size_t d = 0; d < m; d++) {
             double pull = own->bare[d];
@@ -181,10 +181,10 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
                 own->left[d * m + e] = d == e;
             }
             own->right[d] = 0;
-            if (frame->damper[d].phase != FRAME_CONTACT)
+            if (state->damper[d].phase != PHASE_CONTACT)
                 continue;
             const ContactForce law =
-                steps_contact(frame, d, r[d] + quarter * pull, w[d] + half * pull);
+                steps_contact(state, d, r[d] + quarter * pull, w[d] + half * pull);
             own->right[d] = law.value - own->force[d];
             const double yielding = quarter * law.by_penetration + half * law.by_speed;
             for (size_t e = 0; e < m; e++)
@@ -201,16 +201,16 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
             return STATUS_OK;
     }
     return !is_any ? STATUS_OK
-                   : problem_set(frame->problem, STATUS_UNSTABLE,
+                   : problem_set(state->problem, STATUS_UNSTABLE,
                                  "newmark finds no contact force at t = %.6g s with a step of %.4g "
                                  "s: the step is too long for the contact, take %.2g s",
-                                 frame_time(frame), length, length / 10);
+                                 modal_state_time(state), length, length / 10);
 }
 
 static Status newmark_step(Steps *steps, double length) {
     Newmark *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count, m = frame->dampers;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count, m = state->dampers;
     const double half = length / 2, quarter = length * length / 4, ground = steps->ground[2];
     if (length != own->length)
         TRY(make_tables(steps, length));
@@ -218,7 +218,7 @@ static Status newmark_step(Steps *steps, double length) {
     memcpy(own->from, steps->y, steps->size * sizeof *own->from);
     for (size_t d = 0; d < m; d++)
         own->force[d] =
-            frame->damper[d].phase == FRAME_CONTACT ? steps_contact(frame, d, r[d], w[d]).value : 0;
+            state->damper[d].phase == PHASE_CONTACT ? steps_contact(state, d, r[d], w[d]).value : 0;
     steps_rate(steps, steps->y, steps->ground[0], own->force, own->rates);
     // As it would be without an acceleration at the end.
     for (size_t i = 0; i < n + m; i++) {
@@ -227,12 +227,13 @@ static Status newmark_step(Steps *steps, double length) {
         *place += length * *speed + quarter * a;
         *speed += half * a;
     }
-    steps_elastic(frame, q, p, steps->elastic);
+    steps_elastic(state, q, p, steps->elastic);
     for (size_t i = 0; i < n; i++)
-        steps->elastic[i] = -steps->elastic[i] - frame->modes->participation[i] * ground;
+        steps->elastic[i] = -steps->elastic[i] - state->modes->participation[i] * ground;
     solve(steps, steps->elastic, own->end);
     for (size_t d = 0; d < m; d++)
-        own->bare[d] = own->shift[d] * ground - frame_dot(frame->damper[d].shape, own->end, n);
+        own->bare[d] =
+            own->shift[d] * ground - modal_state_dot(state->damper[d].shape, own->end, n);
     TRY(find_forces(steps, length, r, w));
     for (size_t d = 0; d < m; d++) {
         double pull = own->bare[d];

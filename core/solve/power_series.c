@@ -23,12 +23,12 @@ typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
 enum { GAP_MIN = 3 };
 static const double NEAR = 0.3; // Y, of its scale: nearer it is as if it were 0
 
-Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *problem) {
-    const size_t n = frame->mode_count, m = frame->dampers;
+Status power_series_room(PowerSeries *series, const ModalState *state, Problem *problem) {
+    const size_t n = state->mode_count, m = state->dampers;
     memset(series, 0, sizeof *series);
     series->modes = n;
     series->dampers = m;
-    series->is_sine = frame->base.base->omega > 0;
+    series->is_sine = state->base.base->omega > 0;
     series->at_t = m;
     series->at_q = m + 1;
     series->at_p = series->at_q + n;
@@ -36,11 +36,11 @@ Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *probl
     series->at_r = series->at_a + (series->is_sine ? 2 : 0);
     series->stride = (series->at_r + (m > 1 ? m : 0) + 3) / 4 * 4;
     series->block =
-        calloc(frame_lanes_room(2 * SERIES_ROW * series->stride + n + 8), sizeof *series->block);
+        calloc(simd_kernels_room(2 * SERIES_ROW * series->stride + n + 8), sizeof *series->block);
     series->contact = calloc(m, sizeof *series->contact);
     if (series->block == NULL || series->contact == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for contacts of %zu dampers", m);
-    series->z = frame_lanes_start(series->block);
+    series->z = simd_kernels_start(series->block);
     series->rate = series->z + SERIES_ROW * series->stride;
     series->elastic = series->rate + SERIES_ROW * series->stride;
     for (size_t i = 0; i < ARC_RULES; i++)
@@ -51,7 +51,7 @@ Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *probl
     return STATUS_OK;
 }
 
-void frame_series_clear(FrameSeries *series) {
+void power_series_clear(PowerSeries *series) {
     free(series->contact);
     free(series->block);
 }
@@ -94,7 +94,7 @@ static double power_order(const double *b, double exponent, const double *power,
     return sum / ((double)k * b[0]);
 }
 
-INLINE void contact_order(FrameSeries *series, SeriesContact *contact, size_t k, bool is_leader) {
+INLINE void contact_order(PowerSeries *series, SeriesContact *contact, size_t k, bool is_leader) {
     const SeriesLaw *law = contact->law;
     if (!contact->is_felt) {
         contact->force[k] = 0;
@@ -136,26 +136,27 @@ INLINE void put_contact(SeriesContact *contact, size_t k, bool is_whole) {
 }
 
 // D p + W^2 q.
-INLINE void elastic_order(FrameSeries *series, const Frame *frame, const double *row, size_t n) {
+INLINE void elastic_order(PowerSeries *series, const ModalState *state, const double *row,
+                          size_t n) {
     const double *q = row + series->at_q, *p = row + series->at_p;
     double *restrict out = series->elastic;
-    if (n == 1 || frame->diagonal != NULL) {
+    if (n == 1 || state->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
             out[i] =
-                (n == 1 ? frame->damping[0] : frame->diagonal[i]) * p[i] + frame->omega2[i] * q[i];
+                (n == 1 ? state->damping[0] : state->diagonal[i]) * p[i] + state->omega2[i] * q[i];
         return;
     }
     for (size_t i = 0; i < n; i++)
-        out[i] = frame->omega2[i] * q[i];
+        out[i] = state->omega2[i] * q[i];
     for (size_t j = 0; j < n; j++) {
-        const double *column = frame->coupled + j * frame->padded;
+        const double *column = state->coupled + j * state->padded;
         for (size_t i = 0; i < n; i++)
             out[i] += column[i] * p[j];
     }
 }
 
 // The derivatives in t.
-INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *slice, size_t k,
+INLINE void rate_order(PowerSeries *series, const ModalState *state, const Slice *slice, size_t k,
                        size_t n, size_t m) {
     const double *row = series->z + k * series->stride;
     double *restrict rate = series->rate + k * series->stride;
@@ -163,14 +164,14 @@ INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *sli
     const double base = series->is_sine ? row[series->at_a]
                         : k == 0        ? slice->value
                                         : slice->slope * row[series->at_t];
-    elastic_order(series, frame, row, n);
+    elastic_order(series, state, row, n);
     for (size_t i = 0; i < n; i++) {
         rate[series->at_q + i] = row[series->at_p + i];
-        rate[series->at_p + i] = -elastic[i] - frame->share[i] * base;
+        rate[series->at_p + i] = -elastic[i] - state->participation[i] * base;
     }
     for (size_t d = 0; d < m; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        double push = damper->lean * base;
+        const DamperState *damper = &state->damper[d];
+        double push = damper->base_coupling * base;
         for (size_t i = 0; i < n; i++)
             push += damper->shape[i] * elastic[i];
         rate[d] = push;
@@ -180,11 +181,11 @@ INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *sli
     for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
         const SeriesContact *contact = &series->contact[c];
         const double force = contact->sign * contact->force[k];
-        const double *shape = frame->damper[contact->damper].shape;
+        const double *shape = state->damper[contact->damper].shape;
         for (size_t i = 0; i < n; i++)
             rate[series->at_p + i] += shape[i] * force;
         for (size_t d = 0; d < m; d++)
-            rate[d] -= frame->yield[d * m + contact->damper] * force;
+            rate[d] -= state->delassus[d * m + contact->damper] * force;
     }
     rate[series->at_t] = k == 0;
     if (series->is_sine) {
@@ -194,7 +195,7 @@ INLINE void rate_order(FrameSeries *series, const Frame *frame, const Slice *sli
 }
 
 // Order k + 1 of the state: what is between is times Y^(root - 1).
-INLINE void state_order(FrameSeries *series, const Series *pace, size_t k, size_t stride) {
+INLINE void state_order(PowerSeries *series, const Series *pace, size_t k, size_t stride) {
     const double scale = series->length * series->root / (double)(k + 1);
     double *restrict next = series->z + (k + 1) * stride;
     const double *rate = series->rate, *last = rate + k * stride;
@@ -230,26 +231,26 @@ INLINE void state_order(FrameSeries *series, const Series *pace, size_t k, size_
 }
 
 // The largest coefficient of order k, over its scale.
-INLINE double size_of(const FrameSeries *series, const SeriesScale *scale, size_t k, size_t n,
+INLINE double size_of(const PowerSeries *series, const SeriesScale *scale, size_t k, size_t n,
                       size_t m) {
     const double *row = series->z + k * series->stride;
-    double most = ledger_larger(fabs(series->powers[1].now) * scale->per_root,
-                                fabs(row[series->at_t]) * scale->per_time);
+    double most = impact_log_larger(fabs(series->powers[1].now) * scale->per_root,
+                                    fabs(row[series->at_t]) * scale->per_time);
     for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++) {
         const size_t d = series->contact[c].damper;
-        most = ledger_larger(most, fabs(row[d]) * scale->per_speed[d]);
+        most = impact_log_larger(most, fabs(row[d]) * scale->per_speed[d]);
         // Powers that follow from those before them spread their rounding, of which w need not
         // tell.
         if (c > 0 || !series->contact[c].law->is_whole)
-            most = ledger_larger(most, fabs(series->contact[c].force[k - 1]) *
-                                           series->contact[c].per_force);
+            most = impact_log_larger(most, fabs(series->contact[c].force[k - 1]) *
+                                               series->contact[c].per_force);
     }
     for (size_t i = 0; i < n; i++)
-        most = ledger_larger(most, fabs(row[series->at_p + i]) * scale->per_modal[i]);
+        most = impact_log_larger(most, fabs(row[series->at_p + i]) * scale->per_modal[i]);
     return most;
 }
 
-INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
+INLINE double make(PowerSeries *series, const ModalState *state, const Slice *slice,
                    const SeriesScale *scale, size_t n, size_t m, size_t stride) {
     const SeriesContact *leader = &series->contact[0];
     const SeriesLaw *law = leader->law;
@@ -279,7 +280,7 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
                 product(&series->powers[law->left[i]], &series->powers[law->right[i]], k);
         for (size_t c = 0; c < (m == 1 ? 1 : series->contacts); c++)
             contact_order(series, &series->contact[c], k, c == 0);
-        rate_order(series, frame, slice, k, n, m);
+        rate_order(series, state, slice, k, n, m);
         state_order(series, pace, k, stride);
         for (int i = 0; i < powers; i++)
             put(&series->powers[i], k);
@@ -304,19 +305,19 @@ INLINE double make(FrameSeries *series, const Frame *frame, const Slice *slice,
     return exp(fmin(wide + log(scale->error) / (double)(k + 1), 1));
 }
 
-double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *slice, double Y,
+double power_series_make(PowerSeries *series, const ModalState *state, const Slice *slice, double Y,
                          double length, const SeriesScale *scale) {
     double *row = series->z;
     const size_t n = series->modes, m = series->dampers;
     series->length = length;
     memset(row, 0, series->stride * sizeof *row);
     for (size_t d = 0; d < m; d++) {
-        row[d] = frame->damper[d].w;
+        row[d] = state->damper[d].w;
         if (m > 1)
-            row[series->at_r + d] = frame->damper[d].r;
+            row[series->at_r + d] = state->damper[d].r;
     }
-    memcpy(row + series->at_q, frame->q, n * sizeof *row);
-    memcpy(row + series->at_p, frame->p, n * sizeof *row);
+    memcpy(row + series->at_q, state->q, n * sizeof *row);
+    memcpy(row + series->at_p, state->p, n * sizeof *row);
     if (series->is_sine) {
         row[series->at_a] = slice->value;
         row[series->at_a + 1] = slice->slope;
@@ -325,13 +326,13 @@ double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *s
     begin(&series->powers[1], Y);
     // The usual case is made for its own numbers.
     if (n == 1 && m == 1 && series->stride == 4)
-        return make(series, frame, slice, scale, 1, 1, 4);
+        return make(series, state, slice, scale, 1, 1, 4);
     if (n == 1 && m == 1 && series->stride == 8)
-        return make(series, frame, slice, scale, 1, 1, 8);
-    return make(series, frame, slice, scale, n, m, series->stride);
+        return make(series, state, slice, scale, 1, 1, 8);
+    return make(series, state, slice, scale, n, m, series->stride);
 }
 
-void frame_series_cut(FrameSeries *series, double s) {
+void power_series_cut(PowerSeries *series, double s) {
     double power = s;
     series->length *= s;
     for (size_t k = 1; k <= series->degree; k++, power *= s) {
@@ -344,12 +345,12 @@ void frame_series_cut(FrameSeries *series, double s) {
     }
 }
 
-void frame_series_of(const FrameSeries *series, size_t place, double *out) {
+void power_series_of(const PowerSeries *series, size_t place, double *out) {
     for (size_t k = 0; k <= series->degree; k++)
         out[k] = series->z[k * series->stride + place];
 }
 
-void frame_series_at(const FrameSeries *series, double s, double *row) {
+void power_series_at(const PowerSeries *series, double s, double *row) {
     const size_t stride = series->stride;
     for (size_t i = 0; i < stride; i += 4) {
         const double *at = series->z + series->degree * stride + i;
@@ -364,7 +365,7 @@ void frame_series_at(const FrameSeries *series, double s, double *row) {
     }
 }
 
-void frame_series_end(const FrameSeries *series, double *row) {
+void power_series_end(const PowerSeries *series, double *row) {
     const size_t stride = series->stride;
     for (size_t i = 0; i < stride; i += 4) {
         const double *at = series->z + series->degree * stride + i;
@@ -379,7 +380,7 @@ void frame_series_end(const FrameSeries *series, double *row) {
     }
 }
 
-void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+void power_series_nodes(const PowerSeries *series, size_t rule, const double *c, size_t stride,
                         size_t degree, double *out) {
     const double *power = series->node_power[rule];
     Two sum[SERIES_NODES / 2] = {{0}};

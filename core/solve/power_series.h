@@ -1,12 +1,12 @@
 // The motion during contacts under power laws as Taylor polynomials in a time of its own, in which
 // it is smooth where a contact begins and ends too. Not the choice of steps nor the events on them:
-// those are frame_ode.h. Used by frame_ode.c.
+// those are power_contact.h. Used by frame_ode.c.
 #ifndef CORE_SOLVE_POWER_SERIES_H
 #define CORE_SOLVE_POWER_SERIES_H
 
 #include "core/contact/contact.h"
-#include "core/solve/frame_series_law.h"
 #include "core/solve/modal_state.h"
+#include "core/solve/power_series_law.h"
 
 enum { SERIES_DEGREE = 26, SERIES_ROW = 28, SERIES_NODES = 8 };
 
@@ -32,7 +32,7 @@ typedef struct SeriesContact {
 
 // Coefficients in s = tau / length, where dt = root Y^(root - 1) dtau and Y = p^(1/root) is that of
 // one contact, the leader: Y' = p'.
-typedef struct FrameSeries {
+typedef struct PowerSeries {
     size_t modes, dampers;
     size_t stride;                 // of a row
     size_t at_t, at_q, at_p, at_a; // places in it; w comes first, r last where dampers > 1
@@ -48,10 +48,10 @@ typedef struct FrameSeries {
     Series powers[SERIES_POWERS];                            // of Y
     double node_power[ARC_RULES][SERIES_ROW * SERIES_NODES]; // of the nodes of arc_rules
     double *block;
-} FrameSeries;
+} PowerSeries;
 
-Status frame_series_room(FrameSeries *series, const Frame *frame, Problem *problem);
-void frame_series_clear(FrameSeries *series);
+Status power_series_room(PowerSeries *series, const ModalState *state, Problem *problem);
+void power_series_clear(PowerSeries *series);
 
 // What is large for each, and the error that is allowed relative to that.
 typedef struct SeriesScale {
@@ -64,23 +64,23 @@ typedef struct SeriesScale {
 
 // From the present state, Y being the leader's: as many orders as the error needs over `length`, or
 // scale->order. Returns the s up to which that error is kept.
-double frame_series_make(FrameSeries *series, const Frame *frame, const Slice *slice, double Y,
+double power_series_make(PowerSeries *series, const ModalState *state, const Slice *slice, double Y,
                          double length, const SeriesScale *scale);
 
 // Keeps only the part up to s, of which s = 1 becomes the end.
-void frame_series_cut(FrameSeries *series, double s);
+void power_series_cut(PowerSeries *series, double s);
 
-static inline const double *frame_series_root(const FrameSeries *series) {
+static inline const double *power_series_root(const PowerSeries *series) {
     return series->powers[1].up;
 }
 
 // One component's coefficients.
-void frame_series_of(const FrameSeries *series, size_t place, double *out);
+void power_series_of(const PowerSeries *series, size_t place, double *out);
 // The whole row at s, and at s = 1.
-void frame_series_at(const FrameSeries *series, double s, double *row);
-void frame_series_end(const FrameSeries *series, double *row);
+void power_series_at(const PowerSeries *series, double s, double *row);
+void power_series_end(const PowerSeries *series, double *row);
 // A polynomial's values at the nodes of one of arc_rules; its coefficients are `stride` apart.
-void frame_series_nodes(const FrameSeries *series, size_t rule, const double *c, size_t stride,
+void power_series_nodes(const PowerSeries *series, size_t rule, const double *c, size_t stride,
                         size_t degree, double *out);
 
 #endif

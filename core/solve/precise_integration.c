@@ -36,13 +36,13 @@ typedef struct Precise {
 } Precise;
 
 static Status no_memory(const Steps *steps) {
-    return problem_set(steps->frame.problem, STATUS_NO_MEMORY,
-                       "no memory for the exponentials of %zu modes", steps->frame.mode_count);
+    return problem_set(steps->state.problem, STATUS_NO_MEMORY,
+                       "no memory for the exponentials of %zu modes", steps->state.mode_count);
 }
 
 static Status precise_make(Steps *steps) {
-    const Frame *frame = &steps->frame;
-    const size_t m = frame->dampers, size = steps->size;
+    const ModalState *state = &steps->state;
+    const size_t m = state->dampers, size = steps->size;
     Precise *own = calloc(1, sizeof *own);
     steps->own = own;
     if (own == NULL)
@@ -84,8 +84,8 @@ static void precise_clear(Steps *steps) {
 // The columns of A are what the equations of motion make of unit states.
 static void make_system(Steps *steps, double *A) {
     Precise *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count, m = frame->dampers, size = steps->size, wide = own->wide;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count, m = state->dampers, size = steps->size, wide = own->wide;
     for (size_t column = 0; column <= size; column++) {
         memset(own->y, 0, size * sizeof *own->y);
         if (column < size)
@@ -125,7 +125,7 @@ static Status compress(const Precise *own, size_t size, const double *T, Table *
 
 static Status make_table(Steps *steps, Table *table) {
     const Precise *own = steps->own;
-    const Frame *frame = &steps->frame;
+    const ModalState *state = &steps->state;
     const size_t square = own->wide * own->wide;
     double *A = calloc(square, 4 * sizeof *A);
     table->key = malloc(own->key_size * sizeof *table->key);
@@ -133,29 +133,30 @@ static Status make_table(Steps *steps, Table *table) {
     if (A != NULL && table->key != NULL) {
         memcpy(table->key, own->key, own->key_size * sizeof *table->key);
         make_system(steps, A);
-        status =
-            exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square,
-                                  frame->run->progress, frame_time(frame) / frame->plan->duration)
-                ? compress(own, steps->size, A + square, table)
-                : STATUS_CANCELLED;
+        status = exponential_doublings(A, own->wide, own->key[0], A + square, A + 2 * square,
+                                       state->run->progress,
+                                       modal_state_time(state) / state->plan->duration)
+                     ? compress(own, steps->size, A + square, table)
+                     : STATUS_CANCELLED;
     }
     free(A);
     if (status == STATUS_OK)
         return STATUS_OK;
     forget(table);
     return status == STATUS_CANCELLED
-               ? problem_set(frame->problem, status, "cancelled at t = %.6g s", frame_time(frame))
+               ? problem_set(state->problem, status, "cancelled at t = %.6g s",
+                             modal_state_time(state))
                : no_memory(steps);
 }
 
 static Status find_table(Steps *steps, double length, const Table **table) {
     Precise *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t m = frame->dampers;
+    const ModalState *state = &steps->state;
+    const size_t m = state->dampers;
     own->key[0] = length;
     for (size_t d = 0; d < m; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const bool is_pressed = damper->phase == FRAME_CONTACT;
+        const DamperState *damper = &state->damper[d];
+        const bool is_pressed = damper->phase == PHASE_CONTACT;
         own->key[1 + d] = is_pressed ? damper->contact.stiffness : 0;
         own->key[1 + m + d] = is_pressed ? damper->contact.damping : 0;
     }
@@ -175,8 +176,8 @@ static Status find_table(Steps *steps, double length, const Table **table) {
     if (at == own->count)
         own->count++;
     double making;
-    (void)steps->stepper->cost(frame->mode_count, m, frame->diagonal == NULL, &making);
-    frame->run->steps += making / 2; // two are in what was foretold
+    (void)steps->stepper->cost(state->mode_count, m, state->diagonal == NULL, &making);
+    state->run->steps += making / 2; // two are in what was foretold
     own->last = at;
     *table = &own->tables[at];
     return STATUS_OK;

@@ -89,7 +89,7 @@ INLINE bool press_is_known(const Press *press, const Four *end, double length) {
     const double bend = p->size2[0] * slow + p->n_sway * press->exact->stretch.base_max;
     const double most = (one > other ? one : other) + 2 * fast + bend * length * length / 8;
     if (exact_effective_mass(press->exact) * most <=
-        ledger_least_force(&press->exact->ledger, &press->exact->row))
+        impact_log_least_force(&press->exact->ledger, &press->exact->row))
         return true;
     return fast <= 1e-13 * one && from[1] * to[1] > 0;
 }

@@ -9,317 +9,319 @@
 #include <string.h>
 
 // Of the storey that a column is of, or its damper's.
-static const double *shape_of(const Frame *frame, const RunColumn *column) {
+static const double *shape_of(const ModalState *state, const RunColumn *column) {
     switch (column->channel) {
     case CHANNEL_DISPLACEMENT:
     case CHANNEL_VELOCITY:
     case CHANNEL_ACCELERATION:
     case CHANNEL_MEAN_ACCELERATION:
-        return frame->modes->shapes + column->number * frame->mode_count;
+        return state->modes->shapes + column->number * state->mode_count;
     case CHANNEL_BASE_ACCELERATION:
-        return frame->modes->shapes; // of no use
+        return state->modes->shapes; // of no use
     default:
-        return frame->damper[column->number].shape;
+        return state->damper[column->number].shape;
     }
 }
 
-Status frame_record_start(FrameRecord *record, const FrameTrail *trail, const Frame *frame,
-                          Response *response, Problem *problem) {
-    const size_t n = frame->mode_count, columns = frame->run->column_count, padded = trail->padded;
+Status recorder_start(Recorder *record, const FlightBuffer *trail, const ModalState *state,
+                      Response *response, Problem *problem) {
+    const size_t n = state->mode_count, columns = state->run->column_count, padded = trail->padded;
     const size_t square = padded * padded;
     memset(record, 0, sizeof *record);
-    record->block =
-        calloc(2 * (square + TRAIL_MAX * padded) + columns * (1 + padded), sizeof *record->block);
+    record->block = calloc(2 * (square + FLIGHT_BUFFER_MAX * padded) + columns * (1 + padded),
+                           sizeof *record->block);
     if (record->block == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes", n);
     record->trail = trail;
     for (size_t k = 0; k < 2; k++) {
         record->squares[k] = record->block + k * square;
-        record->batch[k] = record->block + 2 * square + k * TRAIL_MAX * padded;
+        record->batch[k] = record->block + 2 * square + k * FLIGHT_BUFFER_MAX * padded;
     }
-    record->shapes = record->batch[1] + TRAIL_MAX * padded;
+    record->shapes = record->batch[1] + FLIGHT_BUFFER_MAX * padded;
     record->last_velocity = record->shapes + columns * padded;
     for (size_t i = 0; i < columns; i++) {
-        const RunColumn *column = &frame->run->columns[i];
-        memcpy(record->shapes + i * padded, shape_of(frame, column), n * sizeof *record->shapes);
-        if (frame->unmoved != NULL && column->channel == CHANNEL_ACCELERATION)
-            record->shapes[i * padded + n] = -frame->unmoved[column->number];
+        const RunColumn *column = &state->run->columns[i];
+        memcpy(record->shapes + i * padded, shape_of(state, column), n * sizeof *record->shapes);
+        if (state->residual_influence != NULL && column->channel == CHANNEL_ACCELERATION)
+            record->shapes[i * padded + n] = -state->residual_influence[column->number];
     }
     record->statistics_start =
-        (size_t)ceil(frame->run->statistics_from * frame->plan->sample_rate * (1 - 1e-12));
-    response->sample_rate = frame->plan->sample_rate;
-    response->count = frame->plan->count;
+        (size_t)ceil(state->run->statistics_from * state->plan->sample_rate * (1 - 1e-12));
+    response->sample_rate = state->plan->sample_rate;
+    response->count = state->plan->count;
     return STATUS_OK;
 }
 
-void frame_record_clear(FrameRecord *record) {
+void recorder_clear(Recorder *record) {
     free(record->block);
 }
 
 // Speeds to means over the intervals before.
-static void take_means(FrameRecord *record, const Frame *frame, size_t column, double *values,
+static void take_means(Recorder *record, const ModalState *state, size_t column, double *values,
                        size_t count) {
-    const double share = frame->plan->influence[frame->run->columns[column].number];
+    const double share = state->plan->influence[state->run->columns[column].number];
     for (size_t k = 0; k < count; k++) {
         const double velocity = values[k];
         values[k] = (velocity - record->last_velocity[column] + share * record->trail->ground[k]) *
-                    frame->plan->sample_rate;
+                    state->plan->sample_rate;
         record->last_velocity[column] = velocity;
     }
 }
 
-static void take_storey(FrameRecord *record, const Frame *frame, size_t column, double *values,
+static void take_storey(Recorder *record, const ModalState *state, size_t column, double *values,
                         size_t count) {
-    const FrameTrail *trail = record->trail;
-    const ChannelId channel = frame->run->columns[column].channel;
-    const size_t padded = trail->padded, storey = frame->run->columns[column].number;
+    const FlightBuffer *trail = record->trail;
+    const ChannelId channel = state->run->columns[column].channel;
+    const size_t padded = trail->padded, storey = state->run->columns[column].number;
     const double *rows = channel == CHANNEL_ACCELERATION   ? trail->elastic
                          : channel == CHANNEL_DISPLACEMENT ? trail->q
                                                            : trail->p;
     const double *shape = record->shapes + column * padded;
-    frame->lanes->dot(padded, count, shape, rows + padded, values);
+    state->lanes->dot(padded, count, shape, rows + padded, values);
     if (channel == CHANNEL_MEAN_ACCELERATION) {
-        take_means(record, frame, column, values, count);
-        if (frame->sample == 0)
-            values[0] = frame_storey_acceleration(frame, storey);
+        take_means(record, state, column, values, count);
+        if (state->sample == 0)
+            values[0] = modal_state_storey_acceleration(state, storey);
     }
     if (channel != CHANNEL_ACCELERATION)
         return;
     double push = 0;
-    for (size_t d = 0; d < frame->dampers; d++)
-        push += frame->mobility[d * frame->storey_count + storey] * frame->damper[d].force;
+    for (size_t d = 0; d < state->dampers; d++)
+        push += state->mobility[d * state->storey_count + storey] * state->damper[d].force;
     for (size_t k = 0; k < count; k++)
         values[k] = push - values[k];
 }
 
-static void take_damper(FrameRecord *record, const Frame *frame, size_t column, double *values,
+static void take_damper(Recorder *record, const ModalState *state, size_t column, double *values,
                         size_t count) {
-    const FrameTrail *trail = record->trail;
-    const RunColumn *wanted = &frame->run->columns[column];
-    const FrameDamper *damper = &frame->damper[wanted->number];
+    const FlightBuffer *trail = record->trail;
+    const RunColumn *wanted = &state->run->columns[column];
+    const DamperState *damper = &state->damper[wanted->number];
     const double *r = trail->r + wanted->number * TRAIL_ROWS + 1;
     const double *z = trail->z + wanted->number * TRAIL_ROWS + 1;
     if (wanted->channel == CHANNEL_DAMPER_DISPLACEMENT) {
-        const double middle = frame_middle(damper);
-        frame->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
+        const double middle = modal_state_middle(damper);
+        state->lanes->dot(trail->padded, count, record->shapes + column * trail->padded,
                           trail->q + trail->padded, values);
         for (size_t k = 0; k < count; k++)
             values[k] += middle + r[k];
         return;
     }
-    const bool is_inside = damper->phase == FRAME_CONTACT || damper->phase == FRAME_INSIDE;
+    const bool is_inside = damper->phase == PHASE_CONTACT || damper->phase == PHASE_INSIDE;
     for (size_t k = 0; k < count; k++)
         values[k] = wanted->channel == CHANNEL_DAMPER_VELOCITY ? z[k]
                     : wanted->channel == CHANNEL_CONTACT_FORCE ? damper->force
-                    : is_inside ? fmax(frame_sign(damper->side) * r[k], 0)
+                    : is_inside ? fmax(modal_state_sign(damper->side) * r[k], 0)
                                 : 0;
 }
 
-static void take_column(FrameRecord *record, const Frame *frame, size_t column, size_t count) {
-    const size_t first = frame->sample + 1 - count;
-    double *values = frame->run->columns[column].values + first;
-    switch (frame->run->columns[column].channel) {
+static void take_column(Recorder *record, const ModalState *state, size_t column, size_t count) {
+    const size_t first = state->sample + 1 - count;
+    double *values = state->run->columns[column].values + first;
+    switch (state->run->columns[column].channel) {
     case CHANNEL_DISPLACEMENT:
     case CHANNEL_VELOCITY:
     case CHANNEL_ACCELERATION:
     case CHANNEL_MEAN_ACCELERATION:
-        take_storey(record, frame, column, values, count);
+        take_storey(record, state, column, values, count);
         return;
     case CHANNEL_BASE_ACCELERATION:
         for (size_t k = 0; k < count; k++)
-            values[k] = base_cursor_at(&frame->base, first + k);
+            values[k] = base_cursor_at(&state->base, first + k);
         return;
     default:
-        take_damper(record, frame, column, values, count);
+        take_damper(record, state, column, values, count);
     }
 }
 
-static void add_batch(FrameRecord *record, const Frame *frame, size_t count) {
-    const FrameTrail *trail = record->trail;
+static void add_batch(Recorder *record, const ModalState *state, size_t count) {
+    const FlightBuffer *trail = record->trail;
     for (size_t k = 0; k < 2; k++)
-        frame->lanes->square(frame->slot_count, trail->padded, count, record->batch[k],
+        state->lanes->square(state->slot_count, trail->padded, count, record->batch[k],
                              record->squares[k]);
 }
 
 // Of accelerations the sign does not matter.
-static void add_squares(FrameRecord *record, const Frame *frame, size_t row) {
-    const size_t padded = record->trail->padded, at = record->count++ % TRAIL_MAX;
+static void add_squares(Recorder *record, const ModalState *state, size_t row) {
+    const size_t padded = record->trail->padded, at = record->count++ % FLIGHT_BUFFER_MAX;
     double *restrict pull = record->batch[1] + at * padded;
     memcpy(record->batch[0] + at * padded, record->trail->q + row * padded, padded * sizeof *pull);
     memcpy(pull, record->trail->elastic + row * padded, padded * sizeof *pull);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const double force = frame->damper[d].force, *shape = frame->damper[d].shape;
-        for (size_t i = 0; i < frame->mode_count && force != 0; i++)
+    for (size_t d = 0; d < state->dampers; d++) {
+        const double force = state->damper[d].force, *shape = state->damper[d].shape;
+        for (size_t i = 0; i < state->mode_count && force != 0; i++)
             pull[i] -= shape[i] * force;
     }
-    if (at + 1 == TRAIL_MAX)
-        add_batch(record, frame, TRAIL_MAX);
+    if (at + 1 == FLIGHT_BUFFER_MAX)
+        add_batch(record, state, FLIGHT_BUFFER_MAX);
 }
 
-void frame_record_take(FrameRecord *record, Frame *frame, size_t count) {
-    for (size_t i = 0; i < frame->run->column_count; i++)
-        take_column(record, frame, i, count);
-    if (frame->sample >= record->statistics_start)
+void recorder_take(Recorder *record, ModalState *state, size_t count) {
+    for (size_t i = 0; i < state->run->column_count; i++)
+        take_column(record, state, i, count);
+    if (state->sample >= record->statistics_start)
         for (size_t k = 1; k <= count; k++)
-            add_squares(record, frame, k);
+            add_squares(record, state, k);
     record->base_speed = 0;
 }
 
 // The largest shape' squares shape of any storey, over all slots.
-static double largest_sum(const FrameRecord *record, const double *squares, const Frame *frame) {
-    const size_t n = frame->mode_count, padded = record->trail->padded;
+static double largest_sum(const Recorder *record, const double *squares, const ModalState *state) {
+    const size_t n = state->mode_count, padded = record->trail->padded;
     double most = 0;
-    for (size_t j = 0; j < frame->storey_count; j++) {
-        const double *shape = frame->modes->shapes + j * n;
+    for (size_t j = 0; j < state->storey_count; j++) {
+        const double *shape = state->modes->shapes + j * n;
         double sum = 0;
         for (size_t i = 0; i < n; i++) {
             const double *row = squares + i * padded;
-            sum += shape[i] * (2 * frame_dot(row, shape, i) + row[i] * shape[i]);
+            sum += shape[i] * (2 * modal_state_dot(row, shape, i) + row[i] * shape[i]);
         }
-        if (frame->unmoved != NULL) {
-            const double *row = squares + n * padded, own = -frame->unmoved[j];
-            sum += own * (2 * frame_dot(row, shape, n) + row[n] * own);
+        if (state->residual_influence != NULL) {
+            const double *row = squares + n * padded, own = -state->residual_influence[j];
+            sum += own * (2 * modal_state_dot(row, shape, n) + row[n] * own);
         }
         most = fmax(most, sum);
     }
     return most;
 }
 
-void frame_record_finish(FrameRecord *record, const Frame *frame, Response *response) {
-    add_batch(record, frame, record->count % TRAIL_MAX);
-    response->sum_squares_displacement = largest_sum(record, record->squares[0], frame);
-    response->sum_squares_acceleration = largest_sum(record, record->squares[1], frame);
+void recorder_finish(Recorder *record, const ModalState *state, Response *response) {
+    add_batch(record, state, record->count % FLIGHT_BUFFER_MAX);
+    response->sum_squares_displacement = largest_sum(record, record->squares[0], state);
+    response->sum_squares_acceleration = largest_sum(record, record->squares[1], state);
     response->statistics_count = record->count;
 }
 
 // No storey's value can be larger where its modes' are these.
-static double bound(const Frame *frame, const double *modal) {
+static double bound(const ModalState *state, const double *modal) {
     double most;
-    frame->lanes->reach(frame->padded, 1, frame->widest, modal, &most);
+    state->lanes->weighted_abs(state->padded, 1, state->max_shape, modal, &most);
     return most;
 }
 
 // Eight at a time: behind `count` values come zeros to whole vectors.
 static double largest_of(const double *values, size_t count) {
-    double most[FRAME_LANES] = {0};
-    for (size_t j = 0; j < count; j += FRAME_LANES)
-        for (size_t i = 0; i < FRAME_LANES; i++)
-            most[i] = ledger_larger(most[i], fabs(values[j + i]));
-    for (size_t i = 1; i < FRAME_LANES; i++)
-        most[0] = ledger_larger(most[0], most[i]);
+    double most[SIMD_WIDTH] = {0};
+    for (size_t j = 0; j < count; j += SIMD_WIDTH)
+        for (size_t i = 0; i < SIMD_WIDTH; i++)
+            most[i] = impact_log_larger(most[i], fabs(values[j + i]));
+    for (size_t i = 1; i < SIMD_WIDTH; i++)
+        most[0] = impact_log_larger(most[0], most[i]);
     return most[0];
 }
 
 // The largest of all storeys.
-static double largest(const Frame *frame, const double *modal) {
-    return largest_of(frame_spread(frame, modal), frame->storey_count);
+static double largest(const ModalState *state, const double *modal) {
+    return largest_of(modal_state_expand(state, modal), state->storey_count);
 }
 
-void frame_record_acceleration(Frame *frame) {
-    double most = bound(frame, frame->elastic), at = 0;
-    for (size_t d = 0; d < frame->dampers; d++)
-        most += frame->damper[d].thrust * fabs(frame->damper[d].force);
-    if (!(most > frame->ledger.response->peaks.acceleration))
+void recorder_acceleration(ModalState *state) {
+    double most = bound(state, state->elastic), at = 0;
+    for (size_t d = 0; d < state->dampers; d++)
+        most += state->damper[d].max_mobility * fabs(state->damper[d].force);
+    if (!(most > state->impacts.response->peaks.acceleration))
         return;
-    const double *pull = frame_spread(frame, frame->elastic);
-    for (size_t j = 0; j < frame->storey_count; j++) {
+    const double *pull = modal_state_expand(state, state->elastic);
+    for (size_t j = 0; j < state->storey_count; j++) {
         double sum = -pull[j];
-        for (size_t d = 0; d < frame->dampers; d++)
-            sum += frame->mobility[d * frame->storey_count + j] * frame->damper[d].force;
-        at = ledger_larger(at, fabs(sum));
+        for (size_t d = 0; d < state->dampers; d++)
+            sum += state->mobility[d * state->storey_count + j] * state->damper[d].force;
+        at = impact_log_larger(at, fabs(sum));
     }
-    ledger_acceleration(&frame->ledger, at);
+    impact_log_acceleration(&state->impacts, at);
 }
 
-void frame_record_peaks(Frame *frame) {
-    const Peaks *peaks = &frame->ledger.response->peaks;
-    const double far = bound(frame, frame->q);
-    Moment at = {0};
+void recorder_peaks(ModalState *state) {
+    const Peaks *peaks = &state->impacts.response->peaks;
+    const double far = bound(state, state->q);
+    Instant at = {0};
     if (far > peaks->displacement)
-        at.x = largest(frame, frame->q);
-    if (bound(frame, frame->p) > peaks->velocity)
-        at.v = largest(frame, frame->p);
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const double relative = frame_middle(damper) + damper->r;
+        at.x = largest(state, state->q);
+    if (bound(state, state->p) > peaks->velocity)
+        at.v = largest(state, state->p);
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        const double relative = modal_state_middle(damper) + damper->r;
         if (far + fabs(relative) > peaks->damper_displacement)
             at.damper_x =
-                fmax(at.damper_x, fabs(frame_displacement(frame, damper->plan->storey) + relative));
+                fmax(at.damper_x,
+                     fabs(modal_state_displacement(state, damper->plan->storey) + relative));
     }
-    ledger_peaks(&frame->ledger, &at);
-    frame_record_acceleration(frame);
+    impact_log_peaks(&state->impacts, &at);
+    recorder_acceleration(state);
 }
 
 // The largest of all storeys in rows 1 to `count`, where that is more than `least`; `most` gets
 // what no row can be beyond.
-static double rise(const Frame *frame, const double *rows, size_t count, double least,
+static double rise(const ModalState *state, const double *rows, size_t count, double least,
                    double *most) {
-    const size_t padded = frame->padded;
-    frame->lanes->reach(padded, count, frame->widest, rows + padded, most);
-    for (size_t k = 0; k < count; k += FRAME_FOUR) {
+    const size_t padded = state->padded;
+    state->lanes->weighted_abs(padded, count, state->max_shape, rows + padded, most);
+    for (size_t k = 0; k < count; k += FLIGHT_ROWS) {
         bool may_rise = false;
-        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
+        for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
             may_rise = may_rise || most[j] > least;
         if (!may_rise)
             continue;
         // Of rows behind the last one no use is made.
-        const double *values = frame_spread_four(frame, rows + (k + 1) * padded);
-        for (size_t j = k; j < k + FRAME_FOUR && j < count; j++)
-            least = ledger_larger(least,
-                                  largest_of(values + (j - k) * frame->tall, frame->storey_count));
+        const double *values = modal_state_expand_four(state, rows + (k + 1) * padded);
+        for (size_t j = k; j < k + FLIGHT_ROWS && j < count; j++)
+            least = impact_log_larger(
+                least, largest_of(values + (j - k) * state->tall, state->storey_count));
     }
     return least;
 }
 
-void frame_record_flight_peaks(FrameRecord *record, Frame *frame, size_t count) {
-    const FrameTrail *trail = record->trail;
-    const Peaks *peaks = &frame->ledger.response->peaks;
-    double far[TRAIL_MAX], most[TRAIL_MAX];
-    Moment at = {
-        .v = rise(frame, trail->p, count, peaks->velocity, most),
-        .acceleration = rise(frame, trail->elastic, count, peaks->acceleration, most),
-        .x = rise(frame, trail->q, count, peaks->displacement, far),
+void recorder_flight_peaks(Recorder *record, ModalState *state, size_t count) {
+    const FlightBuffer *trail = record->trail;
+    const Peaks *peaks = &state->impacts.response->peaks;
+    double far[FLIGHT_BUFFER_MAX], most[FLIGHT_BUFFER_MAX];
+    Instant at = {
+        .v = rise(state, trail->p, count, peaks->velocity, most),
+        .acceleration = rise(state, trail->elastic, count, peaks->acceleration, most),
+        .x = rise(state, trail->q, count, peaks->displacement, far),
         .damper_x = peaks->damper_displacement,
     };
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = frame_middle(damper);
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        const double *r = trail->r + d * TRAIL_ROWS + 1, middle = modal_state_middle(damper);
         for (size_t k = 0; k < count; k++)
             if (far[k] + fabs(middle + r[k]) > at.damper_x)
-                at.damper_x = fmax(at.damper_x,
-                                   fabs(frame_dot(damper->shape, trail->q + (k + 1) * trail->padded,
-                                                  frame->mode_count) +
-                                        (middle + r[k])));
+                at.damper_x =
+                    fmax(at.damper_x,
+                         fabs(modal_state_dot(damper->shape, trail->q + (k + 1) * trail->padded,
+                                              state->mode_count) +
+                              (middle + r[k])));
     }
-    ledger_peaks(&frame->ledger, &at);
+    impact_log_peaks(&state->impacts, &at);
 }
 
-void frame_record_forget(Frame *frame) {
-    Moment at = {0};
-    for (size_t d = 0; d < frame->dampers; d++)
-        at.force = fmax(at.force, fabs(frame->damper[d].force));
-    ledger_forget_peaks(&frame->ledger, &at);
+void recorder_forget(ModalState *state) {
+    Instant at = {0};
+    for (size_t d = 0; d < state->dampers; d++)
+        at.force = fmax(at.force, fabs(state->damper[d].force));
+    impact_log_forget_peaks(&state->impacts, &at);
 }
 
-void frame_record_note(Frame *frame) {
-    if (frame->is_shadow)
+void recorder_note(ModalState *state) {
+    if (state->is_shadow)
         return;
-    frame_feel(frame);
-    frame_record_peaks(frame);
-    const EnergyState energy = frame_energy(frame);
-    ledger_balance(&frame->ledger, &energy);
+    modal_state_forces(state);
+    recorder_peaks(state);
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_balance(&state->impacts, &energy);
 }
 
-Status frame_record_ledger(Frame *frame) {
-    LedgerRow *rows = calloc(frame->dampers + 1, sizeof *rows);
+Status recorder_ledger(ModalState *state) {
+    ImpactRow *rows = calloc(state->dampers + 1, sizeof *rows);
     if (rows == NULL)
-        return problem_set(frame->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
-    for (size_t d = 0; d < frame->dampers; d++)
-        rows[d] = frame->damper[d].row;
-    const EnergyState energy = frame_energy(frame);
+        return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for the list of impacts");
+    for (size_t d = 0; d < state->dampers; d++)
+        rows[d] = state->damper[d].row;
+    const EnergyState energy = modal_state_energy(state);
     const Status status =
-        ledger_finish(&frame->ledger, rows, frame->dampers, &energy, frame->problem);
-    ledger_count(&frame->ledger, &frame->run->work);
+        impact_log_finish(&state->impacts, rows, state->dampers, &energy, state->problem);
+    impact_log_count(&state->impacts, &state->run->work);
     free(rows);
     return status;
 }

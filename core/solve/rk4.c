@@ -16,15 +16,15 @@ typedef struct Rk4 {
 } Rk4;
 
 static Status rk4_make(Steps *steps) {
-    const size_t size = steps->size, m = steps->frame.dampers;
+    const size_t size = steps->size, m = steps->state.dampers;
     Rk4 *own = malloc(sizeof *own);
     steps->own = own;
     if (own == NULL)
-        return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run");
+        return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run");
     own->row = size + TOTALS + 2 * m;
     own->at = calloc(size + STAGES * own->row + m, sizeof *own->at);
     if (own->at == NULL)
-        return problem_set(steps->frame.problem, STATUS_NO_MEMORY, "no memory for a run");
+        return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run");
     own->slopes = own->at + size;
     own->force = own->slopes + STAGES * own->row;
     return STATUS_OK;
@@ -40,41 +40,42 @@ static void rk4_clear(Steps *steps) {
 
 // N at r and r'. A mass that flies when the step begins meets its stop with the speed `approach`.
 static double feel(const Steps *steps, size_t d, double r, double w, double approach) {
-    const Frame *frame = &steps->frame;
-    FrameDamper *damper = &frame->damper[d];
-    if (frame->plan->form == CONTACT_IMPULSIVE)
+    const ModalState *state = &steps->state;
+    DamperState *damper = &state->damper[d];
+    if (state->plan->form == CONTACT_IMPULSIVE)
         return 0;
-    const double right = r - frame_room(damper, SIDE_RIGHT);
-    const double left = -r - frame_room(damper, SIDE_LEFT);
+    const double right = r - modal_state_room(damper, SIDE_RIGHT);
+    const double left = -r - modal_state_room(damper, SIDE_LEFT);
     const Side side = right > left ? SIDE_RIGHT : SIDE_LEFT;
-    const double sign = frame_sign(side), p = side == SIDE_RIGHT ? right : left;
+    const double sign = modal_state_sign(side), p = side == SIDE_RIGHT ? right : left;
     if (!(p > 0))
         return 0;
-    if (damper->phase == FRAME_FLIGHT || damper->side != side) {
-        if (damper->phase != FRAME_FLIGHT)
+    if (damper->phase == PHASE_FLIGHT || damper->side != side) {
+        if (damper->phase != PHASE_FLIGHT)
             return 0; // through all the clearance: the next step sees to it
         damper->side = side;
         damper->contact = stops_freeze(&damper->plan->stops[side], approach);
     }
-    const double force = steps_contact(frame, d, sign * p, w).value;
-    return frame->plan->separation == SEPARATION_ZERO_FORCE && sign * force < 0 ? 0 : force;
+    const double force = steps_contact(state, d, sign * p, w).value;
+    return state->plan->separation == SEPARATION_ZERO_FORCE && sign * force < 0 ? 0 : force;
 }
 
 static void slope(Steps *steps, const double *y, double ground, double *restrict out) {
     const Rk4 *own = steps->own;
-    const Frame *frame = &steps->frame;
-    const size_t n = frame->mode_count, m = frame->dampers;
+    const ModalState *state = &steps->state;
+    const size_t n = state->mode_count, m = state->dampers;
     const double *p = y + n, *r = y + 2 * n, *w = r + m, *approach = steps->y + 2 * n + m;
-    double *totals = out + steps->size, momentum = frame_dot(frame->carry, p, n), loss = 0;
+    double *totals = out + steps->size, momentum = modal_state_dot(state->momentum_weights, p, n),
+           loss = 0;
     for (size_t d = 0; d < m; d++) {
         own->force[d] = feel(steps, d, r[d], w[d], approach[d] < 0 ? -approach[d] : approach[d]);
-        momentum += frame->damper[d].plan->mass * w[d];
+        momentum += state->damper[d].plan->mass * w[d];
         totals[TOTALS + d] = own->force[d];
         totals[TOTALS + m + d] = own->force[d] * w[d];
     }
     steps_rate(steps, y, ground, own->force, out);
     for (size_t i = 0; i < n; i++)
-        loss += (steps->elastic[i] - frame->omega2[i] * y[i]) * p[i];
+        loss += (steps->elastic[i] - state->omega2[i] * y[i]) * p[i];
     totals[0] = -ground * momentum;
     totals[1] = loss;
 }
@@ -82,8 +83,8 @@ static void slope(Steps *steps, const double *y, double ground, double *restrict
 static Status rk4_step(Steps *steps, double length) {
     static const double nodes[STAGES] = {0, 0.5, 0.5, 1};
     const Rk4 *own = steps->own;
-    const size_t size = steps->size, row = own->row, n = steps->frame.mode_count,
-                 m = steps->frame.dampers;
+    const size_t size = steps->size, row = own->row, n = steps->state.mode_count,
+                 m = steps->state.dampers;
     for (size_t k = 0; k < STAGES; k++) {
         const double *last = own->slopes + (k - 1) * row, part = nodes[k] * length;
         for (size_t i = 0; i < size; i++)
@@ -119,7 +120,7 @@ static const Stepper stepper = {.name = "rk4",
                                 .between = "it is of order 4",
                                 .order = 4,
                                 .is_by_place = true,
-                                .reach = 2.785,
+                                .stability_limit = 2.785,
                                 .make = rk4_make,
                                 .step = rk4_step,
                                 .clear = rk4_clear,

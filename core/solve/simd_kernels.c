@@ -7,7 +7,7 @@
 #include "core/solve/lanes.h"
 
 enum { LARGE = 4096 };
-_Static_assert((int)LANES == (int)FRAME_LANES, "one width for both");
+_Static_assert((int)LANES == (int)SIMD_WIDTH, "one width for both");
 
 static inline double total(const double s[LANES]) {
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
@@ -17,7 +17,7 @@ static inline double total(const double s[LANES]) {
 #define KIND(name)                                                                                 \
     {.fly = fly_##name, .sum = sum_##name, .mix = mix_##name, .dot = dot_##name,                   \
      .weigh = weigh_##name, .order = order_##name, .series = series_##name,                        \
-     .reach = reach_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
+     .weighted_abs = weighted_abs_##name, .square = square_##name, .multiply = multiply_##name, .multiply_four = multiply_four_##name}
 // clang-format on
 
 #define WIDTH 2
@@ -36,11 +36,11 @@ static inline double total(const double s[LANES]) {
 #define TARGET __attribute__((target("avx512f,avx512dq")))
 #include "core/solve/simd_kernels.inc"
 
-const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(avx2), KIND(avx512)};
+const SimdKernels simd_kernels_kinds[SIMD_KINDS] = {KIND(plain), KIND(avx2), KIND(avx512)};
 #else
-const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS] = {KIND(plain), KIND(plain), KIND(plain)};
+const SimdKernels simd_kernels_kinds[SIMD_KINDS] = {KIND(plain), KIND(plain), KIND(plain)};
 #endif
 
-size_t frame_lanes_widest(void) {
+size_t simd_kernels_widest(void) {
     return (size_t)lanes_widest();
 }

@@ -1,52 +1,52 @@
 // The general engine's long loops over modes, eight at once, by whatever vectors the processor has.
-// Not their physics: frame_flight.h, frame_record.h. Used by core/solve/frame*.c.
+// Not their physics: flight.h, recorder.h. Used by core/solve/state*.c.
 #ifndef CORE_SOLVE_SIMD_KERNELS_H
 #define CORE_SOLVE_SIMD_KERNELS_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-enum { FRAME_LANES = 8 };
+enum { SIMD_WIDTH = 8 };
 
 // Values of all modes, filled up with zeros to whole vectors.
-static inline size_t frame_lanes_padded(size_t modes) {
-    return (modes + FRAME_LANES - 1) / FRAME_LANES * FRAME_LANES;
+static inline size_t simd_kernels_padded(size_t modes) {
+    return (modes + SIMD_WIDTH - 1) / SIMD_WIDTH * SIMD_WIDTH;
 }
 
 // Whole vectors lie in whole lines of the processor's memory: how much to ask for, and where such
 // room begins.
-static inline size_t frame_lanes_room(size_t values) {
-    return values + FRAME_LANES;
+static inline size_t simd_kernels_room(size_t values) {
+    return values + SIMD_WIDTH;
 }
-static inline double *frame_lanes_start(double *room) {
-    const size_t line = FRAME_LANES * sizeof *room;
+static inline double *simd_kernels_start(double *room) {
+    const size_t line = SIMD_WIDTH * sizeof *room;
     return room + (line - (uintptr_t)room % line) % line / sizeof *room;
 }
 
 // What q and p of each mode gain in a step from (q, p, a, b).
-typedef struct FrameGains {
+typedef struct FlightGains {
     double *q[4], *p[4];
-} FrameGains;
-enum { FRAME_FOUR = 4 };
-enum { FRAME_SUMS = 7 }; // over (q q, q p, p p, q a, q b, p a, p b)
+} FlightGains;
+enum { FLIGHT_ROWS = 4 };
+enum { FLIGHT_SUMS = 7 }; // over (q q, q p, p p, q a, q b, p a, p b)
 
-// One order of an arc's series (frame_arc.h): from q's orders k and k + 1, which follow each other,
-// elastic = viscous per_time q_{k+1} + omega2 q_k, after = -scale (elastic + share base) and
+// One order of an arc's series (taylor_step.h): from q's orders k and k + 1, which follow each
+// other, elastic = viscous per_time q_{k+1} + omega2 q_k, after = -scale (elastic + share base) and
 // push[d] = shapes_d . elastic. Where viscous is NULL elastic is given.
-typedef struct FrameOrder {
+typedef struct TaylorOrder {
     size_t padded, dampers;
     const double *viscous, *omega2, *share, *shapes, *q;
     double per_time, base, scale;
     double *elastic, *after, *push;
-} FrameOrder;
+} TaylorOrder;
 
 // Rows are of `padded` values each, one after the other. The bytes are the same with all vectors.
-typedef struct FrameLanes {
+typedef struct SimdKernels {
     // Rows 1 to count of q and p, and of what they have gained since row 0, from the one before
     // each; a and b have one value a step.
-    void (*fly)(const FrameGains *gains, size_t padded, size_t count, const double *a,
+    void (*fly)(const FlightGains *gains, size_t padded, size_t count, const double *a,
                 const double *b, double *q, double *p, double *moved, double *sped);
-    // FRAME_SUMS rows of sums over rows 0 to count - 1.
+    // FLIGHT_SUMS rows of sums over rows 0 to count - 1.
     void (*sum)(size_t padded, size_t count, const double *a, const double *b, const double *q,
                 const double *p, double *sums);
     // out = first x + second y, row after row.
@@ -57,14 +57,14 @@ typedef struct FrameLanes {
     // out[k] = sum of weights rows[k]^2.
     void (*weigh)(size_t padded, size_t count, const double *weights, const double *rows,
                   double *out);
-    void (*order)(const FrameOrder *order);
+    void (*order)(const TaylorOrder *order);
     // out[j] = sum over k of factors[j * stride + k] rows[k], j and j + 1 together: out has an even
     // number of rows. The last of the rows, of degree + 1 of them, first.
     void (*series)(size_t padded, size_t degree, const double *rows, size_t count,
                    const double *factors, size_t stride, double *out);
     // out[k] = sum of weights |rows[k]|.
-    void (*reach)(size_t padded, size_t count, const double *weights, const double *rows,
-                  double *out);
+    void (*weighted_abs)(size_t padded, size_t count, const double *weights, const double *rows,
+                         double *out);
     // squares += rows' rows, of the first `modes` columns: row after row, whole vectors of rows,
     // those beyond the diagonal being of no use.
     void (*square)(size_t modes, size_t padded, size_t count, const double *rows, double *squares);
@@ -75,10 +75,10 @@ typedef struct FrameLanes {
     // Four times the same with y's that lie `stride` values apart, to four rows of out.
     void (*multiply_four)(const double *matrix, size_t rows, const double *y, size_t stride,
                           size_t columns, double *out);
-} FrameLanes;
+} SimdKernels;
 
-enum { FRAME_LANES_KINDS = 3 };
-extern const FrameLanes frame_lanes_kinds[FRAME_LANES_KINDS]; // the narrowest vectors first
-size_t frame_lanes_widest(void);                              // that this processor has
+enum { SIMD_KINDS = 3 };
+extern const SimdKernels simd_kernels_kinds[SIMD_KINDS]; // the narrowest vectors first
+size_t simd_kernels_widest(void);                        // that this processor has
 
 #endif

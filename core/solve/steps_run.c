@@ -152,7 +152,7 @@ typedef struct Pair {
     double longer;                 // the neighbour's step over the run's
     bool is_kinked;                // the base has kinks within steps
     bool is_known;                 // the neighbour has not failed
-    bool is_spent;                 // nothing more to learn
+    bool is_finished;              // nothing more to learn
     size_t compared;               // samples
     double largest, worst;         // displacement, and difference of displacements [m]
     double horizon;                // [s]; NAN: not reached
@@ -163,10 +163,10 @@ typedef struct Pair {
 
 // How much of the difference is the run's error.
 static bool is_touched(const Pair *pair) {
-    const Response *response = pair->run.frame.ledger.response;
+    const Response *response = pair->run.state.impacts.response;
     bool is_touched = response->impact_count + response->resting_count > 0;
-    for (size_t d = 0; d < pair->run.frame.dampers; d++)
-        is_touched = is_touched || pair->run.frame.damper[d].row.is_open;
+    for (size_t d = 0; d < pair->run.state.dampers; d++)
+        is_touched = is_touched || pair->run.state.damper[d].row.is_open;
     return is_touched;
 }
 
@@ -180,29 +180,29 @@ static double part_of(const Pair *pair) {
 }
 
 static void compare(Pair *pair) {
-    const Frame *frame = &pair->run.frame, *near = &pair->near.frame;
-    const size_t n = frame->mode_count;
+    const ModalState *state = &pair->run.state, *near = &pair->near.state;
+    const size_t n = state->mode_count;
     double difference = 0, bound = 0;
     pair->compared++;
     for (size_t i = 0; i < n; i++) {
-        pair->apart[i] = frame->q[i] - near->q[i];
-        bound += frame->widest[i] * fabs(pair->apart[i]);
+        pair->apart[i] = state->q[i] - near->q[i];
+        bound += state->max_shape[i] * fabs(pair->apart[i]);
     }
-    pair->largest = fmax(pair->largest, frame->ledger.response->peaks.displacement);
+    pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
     if (bound <= pair->worst)
         return;
-    for (size_t j = 0; j < frame->storey_count; j++)
+    for (size_t j = 0; j < state->storey_count; j++)
         difference =
-            fmax(difference, fabs(frame_dot(frame->modes->shapes + j * n, pair->apart, n)));
+            fmax(difference, fabs(modal_state_dot(state->modes->shapes + j * n, pair->apart, n)));
     pair->worst = fmax(pair->worst, difference);
     if (isnan(pair->horizon) && !(part_of(pair) * difference <= RESPONSE_PARTING * pair->largest))
-        pair->horizon = (double)(frame->sample - pair->stride) / frame->plan->sample_rate;
-    pair->is_spent = part_of(pair) * difference > pair->largest;
+        pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
+    pair->is_finished = part_of(pair) * difference > pair->largest;
 }
 
 static Status follow(Pair *pair) {
-    Run *run = pair->run.frame.run;
-    if (pair->is_spent || pair->run.frame.sample % pair->stride != 0)
+    Run *run = pair->run.state.run;
+    if (pair->is_finished || pair->run.state.sample % pair->stride != 0)
         return STATUS_OK;
     pair->near_run.steps = run->steps;
     const Status status = steps_interval(&pair->near);
@@ -212,14 +212,14 @@ static Status follow(Pair *pair) {
         compare(pair);
         return STATUS_OK;
     }
-    pair->is_spent = true;
+    pair->is_finished = true;
     pair->is_known = false;
     return steps_check(&pair->run); // it may have been told to stop
 }
 
 // So many samples in one interval of the neighbour, and so many steps in that.
 static void set_pace(Pair *pair, size_t stride, size_t share) {
-    const Plan *plan = pair->run.frame.plan;
+    const Plan *plan = pair->run.state.plan;
     pair->stride = stride;
     pair->longer = (double)(pair->run.share * stride) / (double)share;
     pair->plan = *plan;
@@ -228,25 +228,25 @@ static void set_pace(Pair *pair, size_t stride, size_t share) {
 }
 
 static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double tolerance) {
-    const Frame *frame = &pair->run.frame;
+    const ModalState *state = &pair->run.state;
     // Of the pieces that the base's kinks make.
     const size_t own = pair->run.share / kinks;
     const size_t share = tolerance > 0 ? 2
                          : own > 1     ? kinks * (own > 2 ? own / 2 + 1 : 1)
                          : kinks > 1   ? 2 * kinks // none is longer: a shorter one
                                        : 1;
-    const Base *base = frame->run->base;
+    const Base *base = state->run->base;
     pair->is_kinked = base->form == BASE_PIECES ||
-                      (base->form == BASE_SAMPLED && kinks == 1 && frame->base.ratio == 0);
+                      (base->form == BASE_SAMPLED && kinks == 1 && state->base.ratio == 0);
     pair->horizon = pair->touched_at = NAN;
     set_pace(pair, pair->run.share > 1 || tolerance > 0 ? 1 : 2, share);
     pair->near_run = (Run){.plan = &pair->plan,
-                           .base = frame->run->base,
-                           .progress = frame->run->progress,
-                           .steps_max = frame->run->steps_max,
-                           .is_clear = frame->run->is_clear};
+                           .base = state->run->base,
+                           .progress = state->run->progress,
+                           .steps_max = state->run->steps_max,
+                           .is_clear = state->run->is_clear};
     pair->near_response.is_unlisted = true;
-    pair->apart = malloc(frame->mode_count * sizeof *pair->apart);
+    pair->apart = malloc(state->mode_count * sizeof *pair->apart);
     const double finer = fmax(tolerance / FINER, tolerance > 0 ? ODE_TOLERANCE : 0);
     Status status = pair->apart == NULL ? STATUS_NO_MEMORY
                                         : steps_make(&pair->near, stepper, &pair->near_run, share,
@@ -261,57 +261,57 @@ static void start_near(Pair *pair, const Stepper *stepper, size_t kinks, double 
                             &pair->near_response, NULL);
     }
     pair->is_known = status == STATUS_OK;
-    pair->is_spent = !pair->is_known;
+    pair->is_finished = !pair->is_known;
 }
 
 // What one contact a step late moves a storey by, within the time that its speed turns in [m]: both
 // runs may be as late by chance.
-static double jolt_of(const Pair *pair, const FrameDamper *damper, double impulse) {
-    const Frame *frame = &pair->run.frame;
-    const Peaks *peaks = &frame->ledger.response->peaks;
-    const double h = pair->run.length, speed = pair->slowest[damper - frame->damper];
+static double jolt_of(const Pair *pair, const DamperState *damper, double impulse) {
+    const ModalState *state = &pair->run.state;
+    const Peaks *peaks = &state->impacts.response->peaks;
+    const double h = pair->run.length, speed = pair->slowest[damper - state->damper];
     double slowest = INFINITY, late = h / 2;
-    for (size_t i = 0; i < frame->mode_count; i++)
-        slowest = fmin(slowest, sqrt(frame->omega2[i]));
+    for (size_t i = 0; i < state->mode_count; i++)
+        slowest = fmin(slowest, sqrt(state->omega2[i]));
     // Peaks may be those of the end of the run alone.
-    const bool is_whole = !(frame->run->statistics_from > 0);
-    const double velocity = is_whole ? peaks->velocity : pair->largest * frame->rate;
+    const bool is_whole = !(state->run->statistics_from > 0);
+    const double velocity = is_whole ? peaks->velocity : pair->largest * state->rate;
     // Of a long contact no more than acts while that lasts.
-    if (is_whole && frame->plan->form != CONTACT_IMPULSIVE &&
+    if (is_whole && state->plan->form != CONTACT_IMPULSIVE &&
         peaks->contact_force < impulse * slowest)
         impulse = peaks->contact_force / slowest;
     // A power law's factors are the speed's, which changes while the mass is not yet seen.
-    if (frame->plan->form == CONTACT_POWER && speed > 0)
-        late = fmax(late, fmin(velocity * frame->rate * h / speed, 1) *
-                              fmin(1 / slowest, frame->plan->duration));
-    return impulse * damper->thrust * late;
+    if (state->plan->form == CONTACT_POWER && speed > 0)
+        late = fmax(late, fmin(velocity * state->rate * h / speed, 1) *
+                              fmin(1 / slowest, state->plan->duration));
+    return impulse * damper->max_mobility * late;
 }
 
 static double largest_jolt(const Pair *pair) {
-    const Frame *frame = &pair->run.frame;
+    const ModalState *state = &pair->run.state;
     double most = 0;
-    for (size_t d = 0; d < frame->dampers && !(pair->run.tolerance > 0); d++) {
-        const FrameDamper *damper = &frame->damper[d];
+    for (size_t d = 0; d < state->dampers && !(pair->run.tolerance > 0); d++) {
+        const DamperState *damper = &state->damper[d];
         const double open = damper->row.is_open ? fabs(damper->row.impact.impulse) : 0;
-        most = fmax(most, jolt_of(pair, damper, fmax(frame->ledger.impulse[d], open)));
+        most = fmax(most, jolt_of(pair, damper, fmax(state->impacts.impulse[d], open)));
     }
     return most;
 }
 
 // What a storey moves by at most that the steps did not see of the base [m].
 static double largest_unseen(const Pair *pair) {
-    const Frame *frame = &pair->run.frame;
+    const ModalState *state = &pair->run.state;
     double most = 0;
-    for (size_t i = 0; i < frame->mode_count && pair->run.most_unseen > 0; i++)
-        most += frame->widest[i] * fabs(frame->modes->participation[i]) *
-                fmin(1 / sqrt(frame->omega2[i]), frame->plan->duration);
+    for (size_t i = 0; i < state->mode_count && pair->run.most_unseen > 0; i++)
+        most += state->max_shape[i] * fabs(state->modes->participation[i]) *
+                fmin(1 / sqrt(state->omega2[i]), state->plan->duration);
     return most * pair->run.most_unseen;
 }
 
 static void tell(const Pair *pair, Response *response) {
     const double unseen = largest_unseen(pair);
     const double size = fmax(fmax(pair->largest, response->peaks.displacement), unseen);
-    const Ledger *ledger = &pair->run.frame.ledger;
+    const ImpactLog *ledger = &pair->run.state.impacts;
     const double balance =
         ledger->largest_energy > 0 ? ledger->largest_balance / ledger->largest_energy : 0;
     const double error =
@@ -330,16 +330,16 @@ static void tell(const Pair *pair, Response *response) {
 }
 
 static Status solve(Pair *pair, Response *response) {
-    Frame *frame = &pair->run.frame;
-    const Plan *plan = frame->plan;
+    ModalState *state = &pair->run.state;
+    const Plan *plan = state->plan;
     steps_take_sample(&pair->run);
-    while (frame->sample + 1 < plan->count) {
-        const double before = frame_time(frame);
+    while (state->sample + 1 < plan->count) {
+        const double before = modal_state_time(state);
         TRY(steps_interval(&pair->run));
         if (isnan(pair->touched_at) && is_touched(pair))
             pair->touched_at = before;
-        for (size_t d = 0; d < frame->dampers; d++) {
-            const double speed = frame->damper[d].contact.speed;
+        for (size_t d = 0; d < state->dampers; d++) {
+            const double speed = state->damper[d].contact.speed;
             if (speed > 0 && !(pair->slowest[d] > 0 && pair->slowest[d] <= speed))
                 pair->slowest[d] = speed;
         }
@@ -347,8 +347,8 @@ static Status solve(Pair *pair, Response *response) {
     }
     tell(pair, response);
     // The duration may end between samples.
-    TRY(steps_finish(&pair->run, plan->duration - (double)frame->sample / plan->sample_rate));
-    return frame_record_ledger(frame);
+    TRY(steps_finish(&pair->run, plan->duration - (double)state->sample / plan->sample_rate));
+    return recorder_ledger(state);
 }
 
 Status steps_run_pair(Run *run, const Stepper *stepper, size_t share, size_t kinks,
@@ -363,7 +363,7 @@ Status steps_run_pair(Run *run, const Stepper *stepper, size_t share, size_t kin
         status = solve(pair, response);
     }
     if (pair->run.record.block != NULL)
-        frame_record_finish(&pair->run.record, &pair->run.frame, response);
+        recorder_finish(&pair->run.record, &pair->run.state, response);
     steps_clear(&pair->run);
     steps_clear(&pair->near);
     response_clear(&pair->near_response);

@@ -18,8 +18,8 @@ typedef struct Stepper {
     // The contact force follows from where the masses are, whether or not a contact has begun, and
     // the method freezes its parameters; otherwise the contacts of a step are those of its start.
     bool is_by_place;
-    bool is_linear_only; // serves no power law
-    double reach;        // unstable where an eigenvalue times the step is larger; 0: never
+    bool is_linear_only;    // serves no power law
+    double stability_limit; // unstable where an eigenvalue times the step is larger; 0: never
     Status (*make)(Steps *steps);
     // From steps->y over `length` seconds: changes y and the sums of the step.
     Status (*step)(Steps *steps, double length);
@@ -38,9 +38,9 @@ typedef struct StepSums {
 } StepSums;
 
 struct Steps {
-    Frame frame;
-    FrameTrail trail; // of one sample
-    FrameRecord record;
+    ModalState state;
+    FlightBuffer trail; // of one sample
+    Recorder record;
     const Stepper *stepper;
     void *own;        // the stepper's
     size_t share;     // steps in a sample interval
@@ -74,12 +74,12 @@ void steps_take_sample(Steps *steps);
 Status steps_finish(Steps *steps, double length);
 
 // out = D p + W^2 q.
-void steps_elastic(const Frame *frame, const double *q, const double *p, double *restrict out);
+void steps_elastic(const ModalState *state, const double *q, const double *p, double *restrict out);
 // y' under forces N on the dampers' storeys; elastic becomes that of y.
 void steps_rate(Steps *steps, const double *y, double ground, const double *force,
                 double *restrict out);
 // N of a damper that is in contact, at these r and r', and its derivatives.
-ContactForce steps_contact(const Frame *frame, size_t damper, double r, double w);
+ContactForce steps_contact(const ModalState *state, size_t damper, double r, double w);
 // Adds to the sums what the two ends of a step say: by the trapezoidal rule, or corrected by the
 // derivatives there, which makes it one of order 4.
 void steps_sum(Steps *steps, const double *from, const double *to, double length,

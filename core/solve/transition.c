@@ -14,8 +14,8 @@ enum { TERMS = 22, NODES = 8, WATCH_PRODUCTS = 1000000 };
 typedef long double Real;
 
 typedef struct DenseWork {
-    const Frame *frame;
-    const FrameDamper *contact; // or NULL
+    const ModalState *state;
+    const DamperState *contact; // or NULL
     size_t modes;
     size_t n, size; // n: freedoms, the damper's the last
     bool is_sine;
@@ -47,11 +47,11 @@ static void base_series(const DenseWork *work, bool is_slope, Real *a) {
 
 // Before so many products.
 static bool goes_on(DenseWork *work, size_t products) {
-    const Frame *frame = work->frame;
+    const ModalState *state = work->state;
     if ((work->done += products) < WATCH_PRODUCTS)
         return true;
     work->done = 0;
-    return progress_advance(frame->run->progress, frame_time(frame) / frame->plan->duration);
+    return progress_advance(state->run->progress, modal_state_time(state) / state->plan->duration);
 }
 
 // Four sums, so that none waits long for the one before.
@@ -80,23 +80,23 @@ static Real dot_long(const Real *row, const Real *values, size_t count) {
 // Of all freedoms.
 static void accelerate(const DenseWork *work, const Real *at, const Real *speed, Real base,
                        Real *out) {
-    const Frame *frame = work->frame;
-    const FrameDamper *contact = work->contact;
+    const ModalState *state = work->state;
+    const DamperState *contact = work->contact;
     const size_t n = work->modes;
     const Real force =
         contact == NULL ? 0
                         : contact->contact.stiffness * at[n] + contact->contact.damping * speed[n];
     Real push = 0;
     for (size_t i = 0; i < n; i++) {
-        const Real elastic = frame->omega2[i] * at[i] + dot(frame->damping + i * n, speed, n);
-        out[i] = -elastic - frame->modes->participation[i] * base;
+        const Real elastic = state->omega2[i] * at[i] + dot(state->damping + i * n, speed, n);
+        out[i] = -elastic - state->modes->participation[i] * base;
         if (contact == NULL)
             continue;
         out[i] += contact->shape[i] * force;
         push += contact->shape[i] * elastic;
     }
     if (contact != NULL)
-        out[n] = push + contact->lean * base - force / contact->effective_mass;
+        out[n] = push + contact->base_coupling * base - force / contact->effective_mass;
 }
 
 // The freedoms' series from a unit of component j of y.
@@ -171,7 +171,7 @@ static bool make_small(DenseWork *work, const Quadrature *rule) {
 static bool make_forms(DenseWork *work, const Quadrature *rule) {
     const size_t n = work->n, size = work->size, modes = work->modes;
     const Real viscous = work->contact == NULL ? 0 : work->contact->contact.damping;
-    const double *damping = work->frame->damping;
+    const double *damping = work->state->damping;
     memset(work->F, 0, size * size * sizeof *work->F);
     memset(work->C, 0, size * size * sizeof *work->C);
     memset(work->G, 0, 2 * size * sizeof *work->G);
@@ -275,7 +275,7 @@ static bool twice(DenseWork *work) {
     return true;
 }
 
-static void fill(FrameDense *dense, const DenseWork *work) {
+static void fill(Transition *dense, const DenseWork *work) {
     const size_t size = work->size, gains = 2 * work->n;
     for (size_t j = 0; j < size; j++) {
         for (size_t i = 0; i < gains; i++)
@@ -289,12 +289,12 @@ static void fill(FrameDense *dense, const DenseWork *work) {
     }
 }
 
-static double rate_of(const Frame *frame) {
-    return fmax(frame_rate(frame), frame->turning);
+static double rate_of(const ModalState *state) {
+    return fmax(modal_state_rate(state), state->base_omega);
 }
 
-static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
-    const size_t size = 2 * freedoms + 2, rows = frame_lanes_padded(size);
+static Status make_room(Transition *dense, size_t freedoms, bool is_contact) {
+    const size_t size = 2 * freedoms + 2, rows = simd_kernels_padded(size);
     dense->block = calloc((is_contact ? 3 : 2) * rows * size + 2 * size, sizeof *dense->block);
     if (dense->block == NULL)
         return STATUS_NO_MEMORY;
@@ -309,10 +309,10 @@ static Status make_room(FrameDense *dense, size_t freedoms, bool is_contact) {
     return STATUS_OK;
 }
 
-static Status make(FrameDense *dense, size_t levels, DenseWork *work, Problem *problem) {
-    const Frame *frame = work->frame;
+static Status make(Transition *dense, size_t levels, DenseWork *work, Problem *problem) {
+    const ModalState *state = work->state;
     size_t left = 0; // doublings
-    for (; work->h * rate_of(frame) > 0.5L; work->h /= 2)
+    for (; work->h * rate_of(state) > 0.5L; work->h /= 2)
         left++;
     const Quadrature *rule = arc_quadrature(0.5);
     bool is_whole = make_small(work, rule) && make_forms(work, rule);
@@ -320,33 +320,34 @@ static Status make(FrameDense *dense, size_t levels, DenseWork *work, Problem *p
         if (left < levels) {
             if (make_room(&dense[left], work->n, work->contact != NULL) != STATUS_OK)
                 return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
-                                   frame->mode_count);
+                                   state->mode_count);
             fill(&dense[left], work);
         }
         if (left == 0)
             return STATUS_OK;
         is_whole = twice(work);
     }
-    return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s", frame_time(frame));
+    return problem_set(problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
+                       modal_state_time(state));
 }
 
-Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
-                        const FrameDamper *contact, Problem *problem) {
-    const size_t n = frame->mode_count + (contact != NULL), size = 2 * n + 2, square = size * size;
+Status transition_make(Transition *dense, size_t levels, const ModalState *state,
+                       const DamperState *contact, Problem *problem) {
+    const size_t n = state->mode_count + (contact != NULL), size = 2 * n + 2, square = size * size;
     memset(dense, 0, levels * sizeof *dense);
     Real *room =
         malloc((4 * square + 2 * size + (2 + TERMS) * n + NODES * size * n) * sizeof *room);
     if (room == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
-                           frame->mode_count);
-    DenseWork work = {.frame = frame,
+                           state->mode_count);
+    DenseWork work = {.state = state,
                       .contact = contact,
-                      .modes = frame->mode_count,
+                      .modes = state->mode_count,
                       .n = n,
                       .size = size,
-                      .is_sine = frame->turning > 0,
-                      .omega = frame->turning,
-                      .h = frame->interval};
+                      .is_sine = state->base_omega > 0,
+                      .omega = state->base_omega,
+                      .h = state->interval};
     work.T = room;
     work.F = work.T + square;
     work.C = work.F + square;
@@ -357,22 +358,22 @@ Status frame_dense_make(FrameDense *dense, size_t levels, const Frame *frame,
     work.series = work.pulls + n;
     work.speeds = work.series + TERMS * n;
     const double mass = contact == NULL ? 0 : contact->plan->mass;
-    for (size_t i = 0; i < frame->mode_count; i++)
+    for (size_t i = 0; i < state->mode_count; i++)
         work.share[i] =
-            frame->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
+            state->modes->participation[i] + (contact == NULL ? 0 : (Real)mass * contact->shape[i]);
     if (contact != NULL)
-        work.share[frame->mode_count] = mass;
+        work.share[state->mode_count] = mass;
     const Status status = make(dense, levels, &work, problem);
     free(room);
     return status;
 }
 
-double frame_dense_form(const FrameDense *dense, const FrameLanes *lanes, const double *form,
-                        const double *y, double *scratch) {
+double transition_form(const Transition *dense, const SimdKernels *lanes, const double *form,
+                       const double *y, double *scratch) {
     lanes->multiply(form, dense->rows, y, dense->size, scratch);
-    return frame_dot(y, scratch, dense->size);
+    return modal_state_dot(y, scratch, dense->size);
 }
 
-void frame_dense_clear(FrameDense *dense) {
+void transition_clear(Transition *dense) {
     free(dense->block);
 }

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/solve/exact_accuracy.h"
 #include "core/solve/event_engine.h"
+#include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
 #include "core/solve/steps_run.h"
 #include "server/base/clock.h"
@@ -97,7 +97,7 @@ static double measure(const Case *from, const char *model, const char *solver, d
         run.steps = 0;
         const int64_t start = clock_thread_cpu_ns();
         const Status status = strcmp(solver, "exact") == 0
-                                  ? frame_run(&run, &result->response, &problem)
+                                  ? event_engine_run(&run, &result->response, &problem)
                                   : solver_adaptive.run(&run, &result->response, &problem);
         if (status != STATUS_OK) {
             printf("%s\n", problem.detail);
@@ -145,7 +145,8 @@ int main(int argc, char **argv) {
         printf("%s: %llu impacts, flight %.0f us\n", at->name,
                (unsigned long long)best.response.impacts.count, flight * 1e6);
         show(at, "exact", 1e-15, flight, &best);
-        for (double tolerance = argc > 3 ? 1e-7 : 1e-12; tolerance < 0.5; tolerance *= argc > 3 ? 3 : 1e3)
+        for (double tolerance = argc > 3 ? 1e-7 : 1e-12;
+             tolerance<0.5; tolerance *= argc> 3 ? 3 : 1e3)
             show(at, "exact", tolerance, flight, &best);
         show(at, "exact", 1e-1, flight, &best);
         if (argc > 2)

@@ -45,7 +45,7 @@ void peer_sample(const PeerSystem *system, double t, const double *y, PeerAnswer
 // Positive until the present phase ends: the gap to a stop in flight, the penetration in contact.
 double peer_gap(const PeerSystem *system, const double *y, int stop);
 
-// Flight ends at `stop`, or contact ends.
+// ExactFlight ends at `stop`, or contact ends.
 void peer_switch(PeerSystem *system, double t, int stop, PeerAnswer *answer);
 
 // GSL's rk8pd, a step at most a sample; an event is searched for by steps of other lengths from the

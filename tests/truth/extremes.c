@@ -53,12 +53,12 @@ enum { FREE, RANDOM, SINE, RECORD, HALF_SINE, TRIANGULAR, CHIRP };
 static const double TURN = 6.283185307179586;
 
 // What the rest of a scene is drawn from.
-typedef struct Frame {
+typedef struct ModalState {
     size_t storeys, law, solver, kind;
     double mass, frequency, ratio; // of the structure [kg], [Hz], damping
     double rate, duration;
     double level, reach; // of the base [m/s^2], of the start [m]
-} Frame;
+} ModalState;
 
 static void put_list(Pen *pen, const char *name, size_t count, const double *values) {
     put(pen, "\"%s\": [", name);
@@ -67,7 +67,7 @@ static void put_list(Pen *pen, const char *name, size_t count, const double *val
     put(pen, "]");
 }
 
-static void put_structure(Pen *pen, const Frame *frame) {
+static void put_structure(Pen *pen, const ModalState *frame) {
     enum { MOST = 40 };
     const double omega = TURN * frame->frequency, stiffness = frame->mass * omega * omega;
     const double damping = 2 * frame->ratio * frame->mass * omega;
@@ -94,7 +94,7 @@ static void put_structure(Pen *pen, const Frame *frame) {
     put(pen, "}");
 }
 
-static void put_buffer(Pen *pen, const char *name, const Frame *frame, double restitution,
+static void put_buffer(Pen *pen, const char *name, const ModalState *frame, double restitution,
                        double contact_time, bool is_plain) {
     if (frame->law == HERTZ && chance(pen, 0.95))
         restitution = 1; // another one is a fault
@@ -122,7 +122,7 @@ static void put_buffer(Pen *pen, const char *name, const Frame *frame, double re
     }
 }
 
-static void put_excitation(Pen *pen, const Frame *frame) {
+static void put_excitation(Pen *pen, const ModalState *frame) {
     const double turn = fmax(frame->frequency, 1e-3);
     put(pen, ", \"excitation\": {\"kind\": \"%s\"", kinds[frame->kind]);
     switch (frame->kind) {
@@ -168,7 +168,7 @@ static void put_excitation(Pen *pen, const Frame *frame) {
     put(pen, "}");
 }
 
-static void put_rest(Pen *pen, const Frame *frame, bool is_plain) {
+static void put_rest(Pen *pen, const ModalState *frame, bool is_plain) {
     put(pen, ", \"contact\": {\"model\": \"%s\"}", laws[frame->law]);
     put_excitation(pen, frame);
     const bool is_refused = frame->solver == PRECISE && frame->law >= POWER && chance(pen, 0.95);
@@ -193,7 +193,7 @@ static double pick(uint64_t *corner, double low, double high) {
 }
 
 static void draw_corner(Pen *pen, uint64_t corner) {
-    Frame frame = {.storeys = 1, .mass = 1, .reach = 0.1};
+    ModalState frame = {.storeys = 1, .mass = 1, .reach = 0.1};
     frame.law = corner % CORNER_LAWS;
     corner /= CORNER_LAWS;
     frame.solver = corner % SOLVERS;
@@ -215,7 +215,7 @@ static void draw_corner(Pen *pen, uint64_t corner) {
     put_rest(pen, &frame, true);
 }
 
-static void put_damper(Pen *pen, const Frame *frame) {
+static void put_damper(Pen *pen, const ModalState *frame) {
     const double clearances[] = {0, scattered(pen, 1e-6, 1), frame->reach * uniform(pen, 0, 3)};
     double clearance = clearances[below(pen, COUNT(clearances))];
     if (frame->law >= POWER)
@@ -250,11 +250,11 @@ static void draw_random(Pen *pen) {
     static const size_t storeys[] = {1, 1, 1, 1, 2, 3, 5, 10, 30};
     static const double rates[] = {5, 20, 50, 200, 1000}, samples[] = {50, 500, 3000, 20000};
     static const size_t several[] = {0, 1, 1, 1, 2, 3, 5}, few[] = {0, 1, 1, 1, 1, 1, 2};
-    Frame frame = {.storeys = storeys[below(pen, COUNT(storeys))],
-                   .law = chance(pen, 0.6) ? below(pen, POWER) : below(pen, COUNT(laws)),
-                   .solver = chance(pen, 0.5) ? EXACT : below(pen, SOLVERS),
-                   .kind = below(pen, COUNT(kinds)),
-                   .mass = scattered(pen, 1e-3, 1e6)};
+    ModalState frame = {.storeys = storeys[below(pen, COUNT(storeys))],
+                        .law = chance(pen, 0.6) ? below(pen, POWER) : below(pen, COUNT(laws)),
+                        .solver = chance(pen, 0.5) ? EXACT : below(pen, SOLVERS),
+                        .kind = below(pen, COUNT(kinds)),
+                        .mass = scattered(pen, 1e-3, 1e6)};
     frame.frequency = chance(pen, 0.05) ? 0 : scattered(pen, 1e-3, 1e4);
     const double ratios[] = {0, 0.016, uniform(pen, 0, 5), scattered(pen, 1e-6, 5)};
     frame.ratio = ratios[below(pen, COUNT(ratios))];

@@ -54,7 +54,7 @@ static bool look(const Walk *walk, size_t d, Quad *s, int *what) {
     return is_found;
 }
 
-// Ledger and state over the part up to s.
+// ImpactLog and state over the part up to s.
 static void pass(Walk *walk, Quad s) {
     const int degree = walk->degree;
     for (size_t d = 0; d < walk->m; d++) {

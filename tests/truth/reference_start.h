@@ -3,7 +3,12 @@
 // mid-clearance before. Under zero_force a contact ends where n comes to 0; until the mass is out
 // of the buffer (INSIDE) it flies, and n is what the buffer would press.
 
-typedef enum NAME(Phase) { NAME(FLIGHT), NAME(INSIDE), NAME(CONTACT), NAME(REST) } NAME(Phase);
+typedef enum NAME(ExactPhase) {
+    NAME(FLIGHT),
+    NAME(INSIDE),
+    NAME(CONTACT),
+    NAME(REST)
+} NAME(ExactPhase);
 
 typedef struct NAME(Series) {
     int degree;
@@ -17,7 +22,7 @@ typedef struct NAME(Walk) {
     real contact_omega2[2], contact_damping[2], restitution[2], rate[2], flight_rate;
     real t, x, v, r, w, origin;
     real room[2]; // to either stop at r = 0
-    NAME(Phase) phase;
+    NAME(ExactPhase) phase;
     int side;
     int leaving; // the stop whose force has just come to 0, so that only later crossings count; -1:
                  // none

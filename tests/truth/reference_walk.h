@@ -139,7 +139,7 @@ static bool NAME(list)(NAME(Walk) * walk, const ReferenceImpact *impact) {
     return true;
 }
 
-static void NAME(open)(NAME(Walk) * walk, NAME(Phase) phase) {
+static void NAME(open)(NAME(Walk) * walk, NAME(ExactPhase) phase) {
     walk->phase = phase;
     walk->open = (ReferenceImpact){
         phase == NAME(REST), walk->side, (double)walk->t, NAN, NAN, NAN, NAN, NAN, NAN};

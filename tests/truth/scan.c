@@ -14,7 +14,7 @@ static const Real ULP = 2.3e-16L;
 static const Real REACH = 0.5L; // longest piece, as an angle of the fastest motion
 
 // INSIDE: let go by zero_force and not yet out of the buffer.
-typedef enum Phase { FLIGHT, INSIDE, CONTACT, REST } Phase;
+typedef enum ExactPhase { FLIGHT, INSIDE, CONTACT, REST } ExactPhase;
 static const char *const phase_names[] = {"a gap closes", "a buffer presses again",
                                           "a contact opens", "a rest is pulled at"};
 
@@ -27,7 +27,7 @@ typedef struct Walk {
     Real contact_omega2[2], contact_damping[2], rate[2], flight_rate;
     Real t, x, v, r, w;
     Real room[2]; // to either stop at r = 0
-    Phase phase;
+    ExactPhase phase;
     int side;
     Real length, speed, push; // largest there are
 } Walk;

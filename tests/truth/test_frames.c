@@ -125,7 +125,7 @@ static DrawnFrame frame_draw(uint64_t number) {
     return drawn;
 }
 
-static void frame_clear(DrawnFrame *drawn) {
+static void modal_state_clear(DrawnFrame *drawn) {
     plan_free(drawn->plan);
     base_clear(&drawn->base);
 }
@@ -156,7 +156,7 @@ static bool engine_run(const DrawnFrame *drawn, FrameTruth *answer, double *resi
     answer->y = answer->z + m * plan->count;
     answer->force = answer->y + m * plan->count;
     Run run = {.plan = plan, .base = &drawn->base, .columns = columns, .column_count = 3 * (n + m)};
-    const Status status = frame_run(&run, &response, &problem);
+    const Status status = event_engine_run(&run, &response, &problem);
     if (status != STATUS_OK)
         printf("  refused: %s\n", problem.detail);
     answer->impact_count = response.impacts.count;
@@ -311,7 +311,7 @@ static Verdict judge(uint64_t number) {
     frame_truth(plan, &drawn.base, STEPS_MAX, &truth);
     if (!truth.is_whole) { // bounces within bounces: the engine too would go through millions
         frame_truth_clear(&truth);
-        frame_clear(&drawn);
+        modal_state_clear(&drawn);
         return UNFINISHED;
     }
     Verdict verdict = GOOD;
@@ -355,7 +355,7 @@ static Verdict judge(uint64_t number) {
         printf("    %-20s %.1e (digit %.1e)\n", metric_names[i], misses.of[i], digit.of[i]);
     frame_truth_clear(&truth);
     frame_truth_clear(&answer);
-    frame_clear(&drawn);
+    modal_state_clear(&drawn);
     return verdict;
 }
 

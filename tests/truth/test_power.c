@@ -131,7 +131,7 @@ static Answer power_run(const PowerScene *scene, double tolerance) {
                .column_count = 1,
                .steps_max = 1e9,
                .impacts_max = 100000};
-    answer.status = frame_run(&run, &answer.response, &problem);
+    answer.status = event_engine_run(&run, &answer.response, &problem);
     answer.steps = run.steps;
     if (answer.status != STATUS_OK && is_verbose)
         printf("%s\n", problem.detail);

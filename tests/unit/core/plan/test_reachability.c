@@ -125,7 +125,7 @@ static void judge(uint64_t seed, BaseForm form, Told *told) {
     }
     Response response = {0};
     const Regime regime = regime_find(plan, &base);
-    if (frame_run(&run, &response, &problem) != STATUS_OK)
+    if (event_engine_run(&run, &response, &problem) != STATUS_OK)
         fail_msg("seed %llu: %s", (unsigned long long)seed, problem.detail);
     if (is_shared)
         memcpy(structure + SAMPLES, structure, SAMPLES * sizeof *structure);

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "core/solve/frame_work.h"
+#include "core/solve/step_work.h"
 #include "tests/support/document.h"
 #include "tests/support/fields.h"
 
@@ -181,16 +181,16 @@ static void many_dampers_on_many_storeys_are_foretold_to_take_long(void **state)
 // A contact is followed with all other masses, each of which adds a little.
 static void a_contact_among_many_masses_is_foretold_by_their_number(void **state) {
     (void)state;
-    const double one = frame_work_steps(FRAME_WORK_POWER, 20, 1, false);
-    assert_true(frame_work_steps(FRAME_WORK_POWER, 20, 16, false) < 4 * one);
-    assert_true(frame_work_steps(FRAME_WORK_POWER, 20, 64, false) < 8 * one);
+    const double one = step_work_steps(STEP_WORK_POWER, 20, 1, false);
+    assert_true(step_work_steps(STEP_WORK_POWER, 20, 16, false) < 4 * one);
+    assert_true(step_work_steps(STEP_WORK_POWER, 20, 64, false) < 8 * one);
 }
 
 // As measured: 200 steps a sample of 100 storeys, 4000 of 200.
 static void coupled_flight_is_foretold_by_the_pairs_of_modes(void **state) {
     (void)state;
-    assert_in_range(frame_work_steps(FRAME_WORK_FLIGHT, 100, 0, true), 200, 600);
-    assert_in_range(frame_work_steps(FRAME_WORK_FLIGHT, 200, 0, true), 2000, 6000);
+    assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 100, 0, true), 200, 600);
+    assert_in_range(step_work_steps(STEP_WORK_FLIGHT, 200, 0, true), 2000, 6000);
 }
 
 int main(void) {

@@ -16,7 +16,7 @@ static const Base still = {.form = BASE_STILL};
 typedef struct Bench {
     Plan *plan;
     Run run;
-    Frame frame;
+    ModalState frame;
 } Bench;
 
 // Two storeys of 4 and 6 kg and three masses of 1, 2 and 3 kg, the last on the first storey.
@@ -32,33 +32,34 @@ static Bench make(double coupling) {
 
 static void start(Bench *bench) {
     bench->run = (Run){.plan = bench->plan, .base = &still};
-    assert_int_equal(frame_make(&bench->frame, &bench->run, NULL), STATUS_OK);
+    assert_int_equal(modal_state_make(&bench->frame, &bench->run, NULL), STATUS_OK);
 }
 
 static void clear(Bench *bench) {
-    frame_clear(&bench->frame);
+    modal_state_clear(&bench->frame);
     plan_free(bench->plan);
 }
 
 // Absolute momentum and kinetic energy of everything.
-static void measure(Frame *frame, double *momentum, double *energy) {
+static void measure(ModalState *frame, double *momentum, double *energy) {
     *momentum = 0;
     for (size_t i = 0; i < 2; i++)
         for (size_t j = 0; j < 2; j++)
-            *momentum += frame->plan->mass[i * 2 + j] * frame_velocity(frame, j);
+            *momentum += frame->plan->mass[i * 2 + j] * modal_state_velocity(frame, j);
     for (size_t d = 0; d < 3; d++)
-        *momentum += frame->damper[d].plan->mass *
-                     (frame_velocity(frame, frame->damper[d].plan->storey) + frame->damper[d].w);
-    *energy = frame_energy(frame).kinetic;
+        *momentum +=
+            frame->damper[d].plan->mass *
+            (modal_state_velocity(frame, frame->damper[d].plan->storey) + frame->damper[d].w);
+    *energy = modal_state_energy(frame).kinetic;
 }
 
-static void hit(Frame *frame, size_t d, Side side, double speed, double restitution) {
-    FrameDamper *damper = &frame->damper[d];
-    damper->is_met = true;
+static void hit(ModalState *frame, size_t d, Side side, double speed, double restitution) {
+    DamperState *damper = &frame->damper[d];
+    damper->in_collision = true;
     damper->side = side;
     damper->w = side == SIDE_RIGHT ? speed : -speed;
-    damper->closing = speed;
-    damper->parting = restitution * speed;
+    damper->approach_speed = speed;
+    damper->separation_speed = restitution * speed;
 }
 
 static void one_mass_takes_its_effective_mass(void **state) {
@@ -68,10 +69,10 @@ static void one_mass_takes_its_effective_mass(void **state) {
     double before, after, kinetic, left;
     hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
     measure(&bench.frame, &before, &kinetic);
-    frame_collide(&bench.frame);
+    collision_resolve(&bench.frame);
     measure(&bench.frame, &after, &left);
     const double m = 2 * 6 / (2 + 6.0);
-    assert_true(fabs(bench.frame.damper[1].pressed - m * 4.5) < 1e-14);
+    assert_true(fabs(bench.frame.damper[1].impulse - m * 4.5) < 1e-14);
     assert_true(fabs(bench.frame.damper[1].w + 1.5) < 1e-15);
     assert_true(fabs(after - before) < 1e-14);
     assert_true(fabs(kinetic - left - 0.5 * m * (9 - 2.25)) < 1e-13);
@@ -84,13 +85,13 @@ static void a_resting_mass_is_left_behind_by_a_hit_away_from_it(void **state) {
     (void)state;
     Bench bench = make(0);
     start(&bench);
-    bench.frame.damper[0].is_met = true;
+    bench.frame.damper[0].in_collision = true;
     bench.frame.damper[0].side = SIDE_RIGHT;
     hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
-    frame_collide(&bench.frame);
-    assert_true(bench.frame.damper[0].pressed == 0);
+    collision_resolve(&bench.frame);
+    assert_true(bench.frame.damper[0].impulse == 0);
     assert_true(bench.frame.damper[0].w < 0); // away from its stop
-    assert_true(fabs(bench.frame.damper[1].pressed - 2 * 6 / 8.0 * 4.5) < 1e-14);
+    assert_true(fabs(bench.frame.damper[1].impulse - 2 * 6 / 8.0 * 4.5) < 1e-14);
     clear(&bench);
 }
 
@@ -99,13 +100,13 @@ static void a_resting_mass_is_pushed_along_by_a_hit_towards_it(void **state) {
     (void)state;
     Bench bench = make(0);
     start(&bench);
-    bench.frame.damper[0].is_met = true;
+    bench.frame.damper[0].in_collision = true;
     bench.frame.damper[0].side = SIDE_LEFT;
     hit(&bench.frame, 1, SIDE_RIGHT, 3, 0.5);
-    frame_collide(&bench.frame);
+    collision_resolve(&bench.frame);
     const double m = 2 * 7 / (2 + 7.0); // of 2 kg and 6 + 1 kg
-    assert_true(fabs(bench.frame.damper[1].pressed - m * 4.5) < 1e-14);
-    assert_true(fabs(bench.frame.damper[0].pressed - m * 4.5 / 7) < 1e-14);
+    assert_true(fabs(bench.frame.damper[1].impulse - m * 4.5) < 1e-14);
+    assert_true(fabs(bench.frame.damper[0].impulse - m * 4.5 / 7) < 1e-14);
     assert_true(bench.frame.damper[0].w == 0);
     clear(&bench);
 }
@@ -117,14 +118,14 @@ static void a_hit_is_felt_on_other_storeys_through_the_mass_matrix(void **state)
     for (int i = 0; i < 2; i++) {
         Bench *bench = i == 0 ? &apart : &coupled;
         start(bench);
-        bench->frame.damper[2].is_met = true;
+        bench->frame.damper[2].in_collision = true;
         bench->frame.damper[2].side = SIDE_RIGHT; // at rest on the other storey
         hit(&bench->frame, 1, SIDE_RIGHT, 3, 0.5);
-        frame_collide(&bench->frame);
+        collision_resolve(&bench->frame);
     }
-    assert_true(apart.frame.damper[2].pressed == 0 && apart.frame.damper[2].w == 0);
+    assert_true(apart.frame.damper[2].impulse == 0 && apart.frame.damper[2].w == 0);
     // (M^-1)_12 is negative: the other storey goes left, into its mass.
-    assert_true(coupled.frame.damper[2].pressed > 0.01 && coupled.frame.damper[2].w == 0);
+    assert_true(coupled.frame.damper[2].impulse > 0.01 && coupled.frame.damper[2].w == 0);
     clear(&apart);
     clear(&coupled);
 }
@@ -146,21 +147,21 @@ static void random_collisions_meet_their_conditions(void **state) {
             const double speed = uniform(0, 1) < 0.4 ? 0 : uniform(0, 5);
             hit(&bench.frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT, speed,
                 uniform(0, 1));
-            closing[d] = bench.frame.damper[d].closing;
-            parting[d] = bench.frame.damper[d].parting;
+            closing[d] = bench.frame.damper[d].approach_speed;
+            parting[d] = bench.frame.damper[d].separation_speed;
         }
         bench.frame.p[0] = uniform(-1, 1);
         measure(&bench.frame, &before, &kinetic);
-        frame_collide(&bench.frame);
+        collision_resolve(&bench.frame);
         measure(&bench.frame, &after, &left);
         for (size_t d = 0; d < 3; d++) {
-            const FrameDamper *damper = &bench.frame.damper[d];
-            const double away = -frame_sign(damper->side) * damper->w;
-            assert_true(damper->pressed >= 0);
+            const DamperState *damper = &bench.frame.damper[d];
+            const double away = -modal_state_sign(damper->side) * damper->w;
+            assert_true(damper->impulse >= 0);
             assert_true(away >= parting[d] - 1e-13);
-            if (damper->pressed > 0)
+            if (damper->impulse > 0)
                 assert_true(fabs(away - parting[d]) < 1e-13);
-            taken += damper->pressed * (closing[d] - parting[d]) / 2;
+            taken += damper->impulse * (closing[d] - parting[d]) / 2;
         }
         assert_true(fabs(after - before) < 1e-12);
         assert_true(fabs(kinetic - left - taken) < 1e-11);
@@ -189,11 +190,11 @@ static void masses_heavier_than_their_storeys_are_no_worse(void **state) {
             size += speed * bench.plan->dampers[d].mass;
         }
         measure(&bench.frame, &before, &kinetic);
-        frame_collide(&bench.frame);
+        collision_resolve(&bench.frame);
         measure(&bench.frame, &after, &left);
         for (size_t d = 0; d < 3; d++)
-            taken +=
-                bench.frame.damper[d].pressed * (closing[d] - bench.frame.damper[d].parting) / 2;
+            taken += bench.frame.damper[d].impulse *
+                     (closing[d] - bench.frame.damper[d].separation_speed) / 2;
         assert_true(fabs(after - before) < 1e-8 * size);
         assert_true(fabs(kinetic - left - taken) < 1e-8 * kinetic);
         clear(&bench);
@@ -211,20 +212,21 @@ static void many_heavy_masses_on_one_storey_meet_their_conditions(void **state) 
         for (size_t d = 0; d < MANY; d++)
             frames_damper(bench.plan, d, 0, uniform(0.5, 1) * pow(10, i % 5), 0.1, 0.5, NAN);
         start(&bench);
-        Frame *frame = &bench.frame;
+        ModalState *frame = &bench.frame;
         for (size_t d = 0; d < MANY; d++)
             hit(frame, d, uniform(0, 1) < 0.5 ? SIDE_LEFT : SIDE_RIGHT,
                 uniform(0, 1) < 0.4 ? 0 : uniform(0, 5), uniform(0, 1));
-        frame_collide(frame);
+        collision_resolve(frame);
         size_t pressed = 0;
         double impulse = 0, size = 0;
         for (size_t d = 0; d < MANY; d++) {
-            const FrameDamper *damper = &frame->damper[d];
-            assert_true(damper->pressed >= 0);
-            assert_true(-frame_sign(damper->side) * damper->w >= damper->parting - 1e-8);
-            pressed += damper->pressed > 0;
-            impulse += frame_sign(damper->side) * damper->pressed;
-            size += damper->pressed;
+            const DamperState *damper = &frame->damper[d];
+            assert_true(damper->impulse >= 0);
+            assert_true(-modal_state_sign(damper->side) * damper->w >=
+                        damper->separation_speed - 1e-8);
+            pressed += damper->impulse > 0;
+            impulse += modal_state_sign(damper->side) * damper->impulse;
+            size += damper->impulse;
         }
         assert_true(pressed > 0 && pressed < MANY);
         // All that the storey gets.

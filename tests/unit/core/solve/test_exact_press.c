@@ -124,8 +124,8 @@ static Small *press(const Case *c, LanesWidth width, size_t most) {
     exact->key.base_omega = small->base.omega;
     base_cursor_make(&exact->base, &small->base, RATE);
     const EnergyState held = {0.2, 0}; // beside a base that jumps, closed forms want some
-    ledger_start(&exact->ledger, &small->response, 0, &held);
-    recorder_start(&exact->recorder, &small->run, &small->response);
+    impact_log_start(&exact->ledger, &small->response, 0, &held);
+    exact_record_start(&exact->recorder, &small->run, &small->response);
     small->run.columns = NULL;
     exact_stride_start(exact);
     assert_true(exact->has_hops);
@@ -140,8 +140,9 @@ static Small *press(const Case *c, LanesWidth width, size_t most) {
     exact->phase = CONTACT;
     exact->side = c->side;
     exact->origin = (Origin)c->side;
-    ledger_open(&exact->row, IMPACT_IMPACT, exact_time(exact), 0, c->side, fabs(exact->state.w));
-    ledger_force(&exact->ledger, &exact->row, stop.damping * fabs(exact->state.w));
+    impact_log_open(&exact->row, IMPACT_IMPACT, exact_time(exact), 0, c->side,
+                    fabs(exact->state.w));
+    impact_log_force(&exact->ledger, &exact->row, stop.damping * fabs(exact->state.w));
     small->passed = exact_stride_press(exact, most);
     return small;
 }

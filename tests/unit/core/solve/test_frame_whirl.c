@@ -38,7 +38,7 @@ static Response run(const Plan *plan, double *x_1, double *x_2) {
     Response response = {0};
     Problem problem;
     problem_clear(&problem);
-    if (frame_run(&with, &response, &problem) != STATUS_OK)
+    if (event_engine_run(&with, &response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return response;
 }

@@ -16,13 +16,13 @@ static Problem problem;
 // A run that starts with 2 J and ends with `end`, of which the base gave `input`.
 static Status balance(double end, double input, double gain_max) {
     Response response = {0};
-    Ledger ledger;
+    ImpactLog ledger;
     const EnergyState first = {1.5, 0.5}, last = {end, 0};
     problem_clear(&problem);
-    ledger_start(&ledger, &response, 0, &first);
+    impact_log_start(&ledger, &response, 0, &first);
     ledger.gain_max = gain_max;
-    ledger_work(&ledger, input, 0);
-    const Status status = ledger_finish(&ledger, NULL, 0, &last, &problem);
+    impact_log_work(&ledger, input, 0);
+    const Status status = impact_log_finish(&ledger, NULL, 0, &last, &problem);
     response_clear(&response);
     return status;
 }
@@ -49,15 +49,15 @@ static void a_loss_and_rounding_do_not_fail(void **state) {
 static void a_gain_on_the_way_fails_even_if_it_is_lost_again(void **state) {
     (void)state;
     Response response = {0};
-    Ledger ledger;
+    ImpactLog ledger;
     const EnergyState first = {2, 0}, middle = {3, 0};
     problem_clear(&problem);
-    ledger_start(&ledger, &response, 0, &first);
+    impact_log_start(&ledger, &response, 0, &first);
     ledger.gain_max = 1e-6;
-    assert_int_equal(ledger_status(&ledger, &problem), STATUS_OK);
-    ledger_balance(&ledger, &middle);
-    assert_int_equal(ledger_status(&ledger, &problem), STATUS_UNSTABLE);
-    assert_int_equal(ledger_finish(&ledger, NULL, 0, &first, &problem), STATUS_UNSTABLE);
+    assert_int_equal(impact_log_status(&ledger, &problem), STATUS_OK);
+    impact_log_balance(&ledger, &middle);
+    assert_int_equal(impact_log_status(&ledger, &problem), STATUS_UNSTABLE);
+    assert_int_equal(impact_log_finish(&ledger, NULL, 0, &first, &problem), STATUS_UNSTABLE);
     response_clear(&response);
 }
 

@@ -21,8 +21,8 @@ typedef struct Pair {
     Base base;
     Run run;
     Response response;
-    Frame frame;
-    FrameOde ode;
+    ModalState frame;
+    PowerContact ode;
 } Pair;
 
 static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double factor,
@@ -35,24 +35,24 @@ static void pair_make(Pair *pair, const ContactLaw *law, double exponent, double
     pair->plan->law = law;
     pair->plan->form = CONTACT_POWER;
     pair->run = (Run){.plan = pair->plan, .base = &pair->base};
-    assert_int_equal(frame_make(&pair->frame, &pair->run, &problem), STATUS_OK);
+    assert_int_equal(modal_state_make(&pair->frame, &pair->run, &problem), STATUS_OK);
     const EnergyState still = {0};
-    ledger_start(&pair->frame.ledger, &pair->response, 0, &still);
-    assert_int_equal(frame_ode_make(&pair->ode, &pair->frame, tolerance, &problem), STATUS_OK);
-    FrameDamper *damper = &pair->frame.damper[0];
-    damper->phase = FRAME_CONTACT;
+    impact_log_start(&pair->frame.impacts, &pair->response, 0, &still);
+    assert_int_equal(power_contact_make(&pair->ode, &pair->frame, tolerance, &problem), STATUS_OK);
+    DamperState *damper = &pair->frame.damper[0];
+    damper->phase = PHASE_CONTACT;
     damper->side = SIDE_RIGHT;
-    damper->origin = FRAME_FROM_RIGHT;
+    damper->origin = FROM_RIGHT;
     damper->r = 0;
     damper->w = 1;
     damper->contact = (ContactParameters){
         .stiffness = 1, .exponent = exponent, .factor = factor, .speed = 1, .mass = 0.5};
-    ledger_open(&damper->row, IMPACT_IMPACT, 0, 0, SIDE_RIGHT, 1);
+    impact_log_open(&damper->row, IMPACT_IMPACT, 0, 0, SIDE_RIGHT, 1);
 }
 
 static void pair_clear(Pair *pair) {
-    frame_ode_clear(&pair->ode);
-    frame_clear(&pair->frame);
+    power_contact_clear(&pair->ode);
+    modal_state_clear(&pair->frame);
     response_clear(&pair->response);
     plan_free(pair->plan);
 }
@@ -60,11 +60,11 @@ static void pair_clear(Pair *pair) {
 // To the contact's end; returns how many steps that took, *time how long it lasted.
 static int pair_part(Pair *pair, double *time) {
     const Slice still = {0, 0, 0};
-    FrameOdeStep step = {0};
+    PowerContactStep step = {0};
     int count = 0;
     *time = 0;
     do {
-        frame_ode_step(&pair->ode, &still, 1e3, &step);
+        power_contact_step(&pair->ode, &still, 1e3, &step);
         *time += step.length;
     } while (++count < 10000 && !step.is_event);
     assert_true(step.is_event && pair->frame.damper[0].r == 0);
@@ -113,12 +113,12 @@ static void roots_make_exponents_whole(void **state) {
 static void the_motion_is_smooth_at_the_touch(void **state) {
     (void)state;
     Pair pair;
-    pair_make(&pair, &contact_hertz, 1.5, 0, FRAME_ODE_TOLERANCE);
+    pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
     const Slice still = {0, 0, 0};
-    FrameOdeStep step;
-    frame_ode_step(&pair.ode, &still, 1e3, &step);
-    const FrameSeries *series = &pair.ode.series;
-    const double *Y = frame_series_root(series);
+    PowerContactStep step;
+    power_contact_step(&pair.ode, &still, 1e3, &step);
+    const PowerSeries *series = &pair.ode.series;
+    const double *Y = power_series_root(series);
     assert_int_equal(series->root, 2);
     // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
     for (size_t k = 0; k <= series->degree; k++)
@@ -142,7 +142,7 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
             const double factor = contacts[l]->factor != NULL ? contacts[l]->factor(0.6) : 0;
             Pair pair;
             double time;
-            pair_make(&pair, contacts[l], n, factor, FRAME_ODE_TOLERANCE);
+            pair_make(&pair, contacts[l], n, factor, POWER_CONTACT_TOLERANCE);
             const int steps = pair_part(&pair, &time);
             const double e = contacts[l]->reached(factor, n),
                          T = contacts[l]->duration(factor, n) * unit_of(n);
@@ -194,8 +194,8 @@ static void the_order_is_whole_over_a_whole_contact(void **state) {
         for (int half = 0; half < 2; half++) {
             Pair pair;
             double time = 0;
-            pair_make(&pair, &contact_hertz, 1.5, 0, FRAME_ODE_TOLERANCE);
-            FrameSeries *series = &pair.ode.series;
+            pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
+            PowerSeries *series = &pair.ode.series;
             // By hand: equal steps in tau, each cut where Y falls to 0.
             SeriesLaw law;
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
@@ -215,11 +215,11 @@ static void the_order_is_whole_over_a_whole_contact(void **state) {
             double Y = 0, s = 0;
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
-                (void)frame_series_make(series, &pair.frame, &still, Y, length, &scale);
-                if (root_first_crossing(frame_series_root(series), series->degree, &s))
-                    frame_series_cut(series, s);
-                frame_series_end(series, row);
-                Y = root_value(frame_series_root(series), series->degree, 1);
+                (void)power_series_make(series, &pair.frame, &still, Y, length, &scale);
+                if (root_first_crossing(power_series_root(series), series->degree, &s))
+                    power_series_cut(series, s);
+                power_series_end(series, row);
+                Y = root_value(power_series_root(series), series->degree, 1);
                 time += row[series->at_t];
                 pair.frame.damper[0].w = row[0];
                 pair.frame.q[0] = row[series->at_q];
@@ -242,18 +242,18 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
     static const double exponents[] = {1, 1.37, 1.5, 2.2};
     for (size_t i = 0; i < COUNT(exponents); i++) {
         Pair pair;
-        pair_make(&pair, &contact_hertz, exponents[i], 0, FRAME_ODE_TOLERANCE);
-        FrameDamper *damper = &pair.frame.damper[0];
+        pair_make(&pair, &contact_hertz, exponents[i], 0, POWER_CONTACT_TOLERANCE);
+        DamperState *damper = &pair.frame.damper[0];
         damper->w = 0;
         damper->row.impact.approach_speed = 0;
         damper->contact.speed = 1e-6;
-        damper->lean = 1e-3; // r'' = 1e-3 a_g, with a_g = 1
-        pair.frame.ground = 1;
+        damper->base_coupling = 1e-3; // r'' = 1e-3 a_g, with a_g = 1
+        pair.frame.base_acceleration = 1;
         const Slice push = {1, 0, 0};
-        FrameOdeStep step;
+        PowerContactStep step;
         double time = 0, deepest = 0;
         for (int k = 0; k < 1000 && time < 100; k++) {
-            frame_ode_step(&pair.ode, &push, 100 - time, &step);
+            power_contact_step(&pair.ode, &push, 100 - time, &step);
             assert_false(step.is_event && damper->r != 0);
             if (step.is_event)
                 break;

@@ -14,17 +14,17 @@ enum { MODES = 21, PADDED = 24, COUNT_MAX = 7, ROWS = COUNT_MAX + 1, COLUMNS = 6
 
 typedef struct Results {
     double q[ROWS][PADDED], p[ROWS][PADDED], moved[ROWS][PADDED], sped[ROWS][PADDED];
-    double sums[FRAME_SUMS][PADDED], mixed[ROWS][PADDED];
+    double sums[FLIGHT_SUMS][PADDED], mixed[ROWS][PADDED];
     double dots[ROWS], weighed[ROWS], reached[ROWS];
     double elastic[PADDED], after[PADDED], push[2];
     double series[4][PADDED], squares[PADDED][PADDED];
-    double product[PADDED], large[LARGE], four[FRAME_FOUR][PADDED];
+    double product[PADDED], large[LARGE], four[FLIGHT_ROWS][PADDED];
 } Results;
 
 typedef struct Given {
     double gains[8][PADDED], a[COUNT_MAX], b[COUNT_MAX];
     double rows[ROWS][PADDED], others[ROWS][PADDED], weights[2][PADDED];
-    double factors[4][ROWS], matrix[COLUMNS][PADDED], y[FRAME_FOUR][COLUMNS];
+    double factors[4][ROWS], matrix[COLUMNS][PADDED], y[FLIGHT_ROWS][COLUMNS];
     double large[LARGE][LARGE], many[LARGE];
 } Given;
 
@@ -48,14 +48,14 @@ static void make(Given *given) {
     fill(given->weights[0], 2, PADDED, MODES);
     fill(given->factors[0], 4, ROWS, ROWS);
     fill(given->matrix[0], COLUMNS, PADDED, MODES);
-    fill(given->y[0], FRAME_FOUR, COLUMNS, COLUMNS);
+    fill(given->y[0], FLIGHT_ROWS, COLUMNS, COLUMNS);
     fill(given->large[0], LARGE, LARGE, LARGE);
     fill(given->many, 1, LARGE, LARGE);
 }
 
-static void solve(Given *given, const FrameLanes *lanes, Results *out) {
+static void solve(Given *given, const SimdKernels *lanes, Results *out) {
     memset(out, 0, sizeof *out);
-    FrameGains gains;
+    FlightGains gains;
     for (size_t i = 0; i < 4; i++) {
         gains.q[i] = given->gains[i];
         gains.p[i] = given->gains[4 + i];
@@ -70,20 +70,20 @@ static void solve(Given *given, const FrameLanes *lanes, Results *out) {
                out->mixed[0]);
     lanes->dot(PADDED, ROWS, given->weights[0], given->rows[0], out->dots);
     lanes->weigh(PADDED, ROWS, given->weights[0], given->rows[0], out->weighed);
-    lanes->reach(PADDED, ROWS, given->weights[0], given->rows[0], out->reached);
-    const FrameOrder order = {.padded = PADDED,
-                              .dampers = 2,
-                              .viscous = given->gains[0],
-                              .omega2 = given->gains[1],
-                              .share = given->gains[2],
-                              .shapes = given->weights[0],
-                              .q = given->rows[0],
-                              .per_time = 3,
-                              .base = 0.7,
-                              .scale = 0.1,
-                              .elastic = out->elastic,
-                              .after = out->after,
-                              .push = out->push};
+    lanes->weighted_abs(PADDED, ROWS, given->weights[0], given->rows[0], out->reached);
+    const TaylorOrder order = {.padded = PADDED,
+                               .dampers = 2,
+                               .viscous = given->gains[0],
+                               .omega2 = given->gains[1],
+                               .share = given->gains[2],
+                               .shapes = given->weights[0],
+                               .q = given->rows[0],
+                               .per_time = 3,
+                               .base = 0.7,
+                               .scale = 0.1,
+                               .elastic = out->elastic,
+                               .after = out->after,
+                               .push = out->push};
     lanes->order(&order);
     lanes->series(PADDED, COUNT_MAX, given->rows[0], 4, given->factors[0], ROWS, out->series[0]);
     lanes->square(MODES, PADDED, ROWS, given->rows[0], out->squares[0]);
@@ -103,10 +103,10 @@ static void rows_are_what_plain_loops_make_of_them(void **state) {
     static Given given;
     static Results got;
     make(&given);
-    solve(&given, &frame_lanes_kinds[0], &got);
+    solve(&given, &simd_kernels_kinds[0], &got);
     for (size_t i = 0; i < MODES; i++) {
         double(*g)[PADDED] = given.gains, x = given.rows[0][i], v = given.rows[1][i];
-        double sums[FRAME_SUMS] = {0}, series = 0;
+        double sums[FLIGHT_SUMS] = {0}, series = 0;
         for (size_t k = 0; k < COUNT_MAX; k++) {
             const double a = given.a[k], b = given.b[k];
             const double dx = g[0][i] * x + g[1][i] * v + g[2][i] * a + g[3][i] * b;
@@ -118,11 +118,11 @@ static void rows_are_what_plain_loops_make_of_them(void **state) {
             near(got.moved[k + 1][i], x - given.rows[0][i]);
             near(got.sped[k + 1][i], v - given.rows[1][i]);
             const double q = given.rows[k][i], p = given.others[k][i];
-            const double terms[FRAME_SUMS] = {q * q, q * p, p * p, q * a, q * b, p * a, p * b};
-            for (size_t j = 0; j < FRAME_SUMS; j++)
+            const double terms[FLIGHT_SUMS] = {q * q, q * p, p * p, q * a, q * b, p * a, p * b};
+            for (size_t j = 0; j < FLIGHT_SUMS; j++)
                 sums[j] += terms[j];
         }
-        for (size_t j = 0; j < FRAME_SUMS; j++)
+        for (size_t j = 0; j < FLIGHT_SUMS; j++)
             near(got.sums[j][i], sums[j]);
         for (size_t k = 0; k < ROWS; k++) {
             near(got.mixed[k][i],
@@ -153,7 +153,7 @@ static void totals_are_what_plain_loops_make_of_them(void **state) {
     static Given given;
     static Results got;
     make(&given);
-    solve(&given, &frame_lanes_kinds[0], &got);
+    solve(&given, &simd_kernels_kinds[0], &got);
     for (size_t k = 0; k < ROWS; k++) {
         double dot = 0, weighed = 0, reached = 0;
         for (size_t i = 0; i < MODES; i++) {
@@ -184,9 +184,9 @@ static void all_widths_give_the_same_bytes(void **state) {
     static Given given;
     static Results plain, wide;
     make(&given);
-    solve(&given, &frame_lanes_kinds[0], &plain);
-    for (size_t kind = 1; kind <= frame_lanes_widest(); kind++) {
-        solve(&given, &frame_lanes_kinds[kind], &wide);
+    solve(&given, &simd_kernels_kinds[0], &plain);
+    for (size_t kind = 1; kind <= simd_kernels_widest(); kind++) {
+        solve(&given, &simd_kernels_kinds[kind], &wide);
         assert_memory_equal(&plain, &wide, sizeof plain);
     }
 }

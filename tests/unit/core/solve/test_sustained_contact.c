@@ -80,7 +80,7 @@ static Solved solve(const Choice *choice, bool is_by_arcs) {
     Run run = {.plan = plan, .base = &base, .columns = columns, .column_count = 2};
     Problem problem;
     problem_clear(&problem);
-    if (frame_run(&run, &solved.response, &problem) != STATUS_OK)
+    if (event_engine_run(&run, &solved.response, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     solved.steps = run.steps;
     plan_free(plan);

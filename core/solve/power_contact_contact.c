@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/contact/power_law.h"
-#include "core/solve/frame_ode_step.h"
+#include "core/solve/power_contact_step.h"
 
 static const double SPAN = 0.3;         // a step is about so long, in (root of depth) / speed
 static const double NEARLY_SMALL = 0.9; // of negligible: there it still is
@@ -22,13 +22,13 @@ static double depth_at(const ContactTerms *terms, double force) {
 }
 
 // Where N has slowed a mass by no more than `error` of its speed.
-static double small_depth(const FrameOdeContact *at, double error) {
+static double small_depth(const PowerContactContact *at, double error) {
     const double n = at->terms.exponent, m = at->terms.viscous_exponent;
     return at->depth * pow(error, 1 / ((at->terms.viscous > 0 ? fmin(n, m) : n) + 1));
 }
 
 // Below which p a contact that begins with this speed need not feel N.
-static double find_negligible(const FrameOdeContact *at, double error, double w, double mass) {
+static double find_negligible(const PowerContactContact *at, double error, double w, double mass) {
     const double m = at->terms.viscous_exponent;
     double p = at->law.is_whole ? 0 : small_depth(at, error);
     // Pressed rather than thrown: p = push t^2 / 2.
@@ -41,22 +41,22 @@ static double find_negligible(const FrameOdeContact *at, double error, double w,
 }
 
 // Brings what is known of a contact up to the present state.
-void frame_ode_look(FrameOde *ode, size_t d) {
-    const Frame *frame = ode->frame;
-    const FrameDamper *damper = &frame->damper[d];
-    FrameOdeContact *at = &ode->contact[d];
-    const double mass = damper->effective_mass, w = frame_sign(damper->side) * damper->w;
+void power_contact_look(PowerContact *ode, size_t d) {
+    const ModalState *state = ode->state;
+    const DamperState *damper = &state->damper[d];
+    PowerContactContact *at = &ode->contact[d];
+    const double mass = damper->effective_mass, w = modal_state_sign(damper->side) * damper->w;
     const ContactParameters *now = &damper->contact;
     if (memcmp(now, &at->parameters, sizeof *now) != 0) {
         at->parameters = *now;
-        at->terms = frame->plan->law->terms(now);
+        at->terms = state->plan->law->terms(now);
         series_law_make(&at->law, &at->terms);
         at->speed = 0;
     }
-    at->push =
-        frame_sign(damper->side) *
-        (damper->lean * frame->ground + frame_dot(damper->shape, ode->elastic, frame->mode_count));
-    const double n = at->terms.exponent, p = frame_ode_penetration(damper);
+    at->push = modal_state_sign(damper->side) *
+               (damper->base_coupling * state->base_acceleration +
+                modal_state_dot(damper->shape, ode->elastic, state->mode_count));
+    const double n = at->terms.exponent, p = power_contact_penetration(damper);
     double speed = fmax(fabs(w), damper->row.impact.approach_speed);
     if (!(speed <= at->speed) || !(speed >= at->speed / 4) || !(at->speed > 0)) {
         at->speed = speed;
@@ -73,35 +73,35 @@ void frame_ode_look(FrameOde *ode, size_t d) {
 }
 
 // Which side of the law's kink the motion is on. At a kink just passed rounding alone says so.
-static bool is_damped(const FrameOdeContact *at, const FrameDamper *damper) {
-    const double w = frame_sign(damper->side) * damper->w, off = w - at->terms.turn;
+static bool is_damped(const PowerContactContact *at, const DamperState *damper) {
+    const double w = modal_state_sign(damper->side) * damper->w, off = w - at->terms.turn;
     if (fabs(off) > 4 * DBL_EPSILON * fabs(w))
         return off > 0;
     if (at->passed != 0)
         return at->passed > 0;
     const double spring =
         at->terms.is_elastic_below
-            ? at->terms.stiffness * power_of(frame_ode_penetration(damper), at->terms.exponent)
+            ? at->terms.stiffness * power_of(power_contact_penetration(damper), at->terms.exponent)
             : 0;
     return at->push - spring / damper->effective_mass > 0;
 }
 
 // Lists those in contact; the leader comes first. Returns its Y.
-double frame_ode_contacts(FrameOde *ode) {
-    const Frame *frame = ode->frame;
-    FrameSeries *series = &ode->series;
+double power_contact_contacts(PowerContact *ode) {
+    const ModalState *state = ode->state;
+    PowerSeries *series = &ode->series;
     size_t first = 0;
     double nearest = INFINITY;
     series->contacts = 0;
-    for (size_t d = 0; d < frame->dampers; d++) {
-        const FrameDamper *damper = &frame->damper[d];
-        const FrameOdeContact *at = &ode->contact[d];
-        if (damper->phase != FRAME_CONTACT)
+    for (size_t d = 0; d < state->dampers; d++) {
+        const DamperState *damper = &state->damper[d];
+        const PowerContactContact *at = &ode->contact[d];
+        if (damper->phase != PHASE_CONTACT)
             continue;
-        const double p = frame_ode_penetration(damper);
+        const double p = power_contact_penetration(damper);
         SeriesContact *contact = &series->contact[series->contacts];
         contact->damper = d;
-        contact->sign = frame_sign(damper->side);
+        contact->sign = modal_state_sign(damper->side);
         contact->terms = at->terms;
         contact->law = &at->law;
         contact->is_felt = p >= NEARLY_SMALL * at->negligible;
@@ -122,29 +122,29 @@ double frame_ode_contacts(FrameOde *ode) {
     }
     // Another that is at 0 too has no series of its own until it is pressed.
     for (size_t c = 1; c < series->contacts; c++) {
-        FrameOdeContact *at = &ode->contact[all[c].damper];
-        if (frame_ode_penetration(&frame->damper[all[c].damper]) > 0)
+        PowerContactContact *at = &ode->contact[all[c].damper];
+        if (power_contact_penetration(&state->damper[all[c].damper]) > 0)
             continue;
         all[c].is_felt = false;
         at->negligible = fmax(at->negligible, small_depth(at, ode->error));
     }
     series->root = all[0].is_felt ? all[0].law->root : 1;
-    return root_of(frame_ode_penetration(&frame->damper[all[0].damper]), series->root);
+    return root_of(power_contact_penetration(&state->damper[all[0].damper]), series->root);
 }
 
 // What a step of tau is about as long as, and what is large for each component.
-double frame_ode_scale(FrameOde *ode, double Y, double length, SeriesScale *scale) {
-    const Frame *frame = ode->frame;
-    FrameSeries *series = &ode->series;
-    const size_t n = frame->mode_count;
+double power_contact_scale(PowerContact *ode, double Y, double length, SeriesScale *scale) {
+    const ModalState *state = ode->state;
+    PowerSeries *series = &ode->series;
+    const size_t n = state->mode_count;
     const int root = series->root;
     double span = INFINITY;
     for (size_t i = 0; i < n; i++)
-        ode->modal[i] = fabs(frame->p[i]) + DBL_MIN;
+        ode->modal[i] = fabs(state->p[i]) + DBL_MIN;
     for (size_t c = 0; c < series->contacts; c++) {
         const size_t d = series->contact[c].damper;
-        const FrameDamper *damper = &frame->damper[d];
-        const FrameOdeContact *at = &ode->contact[d];
+        const DamperState *damper = &state->damper[d];
+        const PowerContactContact *at = &ode->contact[d];
         const double speed = at->speed + DBL_MIN;
         ode->speed[d] = 1 / speed;
         for (size_t i = 0; i < n; i++)
@@ -156,7 +156,7 @@ double frame_ode_scale(FrameOde *ode, double Y, double length, SeriesScale *scal
     for (size_t i = 0; i < n; i++)
         ode->modal[i] = 1 / ode->modal[i];
     const size_t d = series->contact[0].damper;
-    const double w = series->contact[0].sign * frame->damper[d].w;
+    const double w = series->contact[0].sign * state->damper[d].w;
     const double large = root_of(ode->contact[d].depth, root) + DBL_MIN;
     *scale = (SeriesScale){.error = ode->error,
                            .per_root = 1 / large,
@@ -168,7 +168,7 @@ double frame_ode_scale(FrameOde *ode, double Y, double length, SeriesScale *scal
     double p = Y;
     for (int i = 1; i < root; i++)
         p *= Y;
-    const double end = root_of(ledger_larger(p + w * length, 0), root);
+    const double end = root_of(impact_log_larger(p + w * length, 0), root);
     double mean = 0, power = 1; // the sum of Y^i end^(root - 1 - i)
     for (int i = 0; i < root; i++, power *= Y)
         mean = mean * end + power;

@@ -1,4 +1,4 @@
-#include "core/solve/frame_series_law.h"
+#include "core/solve/power_series_law.h"
 
 #include <math.h>
 

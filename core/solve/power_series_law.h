@@ -1,7 +1,7 @@
 // Which root makes a power law's contact smooth, and what powers of it N is made of. Not the series
 // themselves (frame_series.h). Used by frame_series.c and frame_ode*.c.
-#ifndef CORE_SOLVE_FRAME_SERIES_LAW_H
-#define CORE_SOLVE_FRAME_SERIES_LAW_H
+#ifndef CORE_SOLVE_POWER_SERIES_LAW_H
+#define CORE_SOLVE_POWER_SERIES_LAW_H
 
 #include <stdbool.h>
 
