@@ -166,7 +166,7 @@ def sources():
     for half in FLOORS:
         for folder, _, files in os.walk(os.path.join(program.SOURCE, half)):
             for file in files:
-                if file.endswith((".c", ".h", ".cpp")):
+                if file.endswith((".c", ".h", ".inc", ".cpp")):
                     path = os.path.relpath(os.path.join(folder, file), program.SOURCE)
                     with open(os.path.join(program.SOURCE, path), encoding="utf-8") as source:
                         yield path, source.read()
