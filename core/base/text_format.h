@@ -1,5 +1,5 @@
 // A sentence for people, made of a format, that its owner frees. Not a fault (base/status.h) and
-// not a warning (plan/plan.h). Used by measure/ alone.
+// not a warning (base/report.h). Used by measure/ alone.
 #ifndef CORE_BASE_TEXT_FORMAT_H
 #define CORE_BASE_TEXT_FORMAT_H
 

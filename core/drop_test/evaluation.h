@@ -4,9 +4,9 @@
 #ifndef CORE_DROP_TEST_EVALUATION_H
 #define CORE_DROP_TEST_EVALUATION_H
 
+#include "core/base/report.h"
 #include "core/drop_test/drop_test.h"
 #include "core/drop_test/force_trace.h"
-#include "core/plan/plan.h"
 
 enum { EVALUATION_ROWS_MAX = 20000, EVALUATION_SAMPLES_MAX = 4 * TRACE_SAMPLES_MAX };
 #define EVALUATION_CONFIDENCE 0.95

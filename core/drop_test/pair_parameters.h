@@ -4,7 +4,7 @@
 #ifndef CORE_DROP_TEST_PAIR_PARAMETERS_H
 #define CORE_DROP_TEST_PAIR_PARAMETERS_H
 
-#include "core/plan/plan.h"
+#include "core/base/report.h"
 #include "core/scene/damper.h"
 #include "core/scene/material.h"
 

@@ -3,23 +3,11 @@
 #ifndef CORE_PLAN_PLAN_H
 #define CORE_PLAN_PLAN_H
 
-#include "core/base/field.h"
+#include "core/base/report.h"
 #include "core/contact/contact_parameters.h"
 #include "core/contact/identification.h"
 #include "core/plan/modes.h"
 #include "core/scene/scene.h"
-
-// One choice of the planner, for people. Texts are static or live as long as the Decisions.
-typedef struct Decision {
-    char *about, *chose, *why;
-    double value;  // NAN if there is none
-    char *unit;    // NULL if there is none
-    double saving; // of what is left out: the part of the foretold cost; NAN: nothing is left out
-} Decision;
-typedef struct Decisions {
-    Decision *at;
-    size_t count;
-} Decisions;
 
 // What a buffer came to for this pair of masses: one per damper and side. What is not known is NAN.
 typedef struct Derived {
@@ -47,14 +35,6 @@ typedef struct PlanModes {
     PlanMode *at;
     size_t count;
 } PlanModes;
-
-typedef struct Warning {
-    char *pointer, *detail;
-} Warning;
-typedef struct Warnings {
-    Warning *at;
-    size_t count;
-} Warnings;
 
 // One run on the way to a target.
 typedef struct PlanAttempt {
@@ -91,8 +71,7 @@ typedef struct PlanReport {
     PlanModes modes;
 } PlanReport;
 
-extern const Field plan_report_fields[], derived_fields[], decision_fields[], mode_fields[],
-    target_fields[], warning_fields[];
+extern const Field plan_report_fields[], derived_fields[], mode_fields[], target_fields[];
 
 // One stop's contact parameters, ready for a solver. The first three are those of every impact;
 // where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)
@@ -154,17 +133,5 @@ bool plan_is_single_in_flight(const Plan *plan);
 static inline size_t plan_mode_count(const Plan *plan) {
     return plan->modes.count > 0 ? plan->modes.count : plan->kept > 0 ? plan->kept : plan->storeys;
 }
-
-// Add one line; texts are copied. Lines beyond 256 are left out, and all where the
-// list is NULL. STATUS_NO_MEMORY leaves the list as it was.
-Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-void warnings_clear(Warnings *warnings);
-Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
-                     const char *unit, const char *format, ...)
-    __attribute__((format(printf, 6, 7)));
-// Of something the scene does not require: chose "left_out".
-Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
-                      double saving, const char *format, ...) __attribute__((format(printf, 6, 7)));
 
 #endif

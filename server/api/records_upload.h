@@ -3,7 +3,7 @@
 #ifndef SERVER_API_RECORDS_UPLOAD_H
 #define SERVER_API_RECORDS_UPLOAD_H
 
-#include "core/plan/plan.h"
+#include "core/base/report.h"
 #include "server/http/request.h"
 #include "server/store/record_rows.h"
 

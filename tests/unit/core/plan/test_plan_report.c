@@ -7,24 +7,6 @@
 
 #include "core/plan/plan.h"
 
-static void warnings_are_added_with_their_own_texts(void **state) {
-    (void)state;
-    Warnings warnings = {NULL, 0};
-    char pointer[] = "/dampers/0/clearance";
-    assert_int_equal(warnings_add(&warnings, pointer, "is %d m", 15), STATUS_OK);
-    pointer[1] = 'x';
-    assert_int_equal(warnings.count, 1);
-    assert_string_equal(warnings.at[0].pointer, "/dampers/0/clearance");
-    assert_string_equal(warnings.at[0].detail, "is 15 m");
-    for (int i = 0; i < 1000; i++)
-        assert_int_equal(warnings_add(&warnings, "", "%01000d", i), STATUS_OK);
-    assert_int_equal(warnings.count, 256);
-    for (size_t i = 0; i < warnings.count; i++)
-        fields_clear(warning_fields, &warnings.at[i]);
-    free(warnings.at);
-    assert_int_equal(warnings_add(NULL, "", "nobody listens"), STATUS_OK);
-}
-
 static void a_report_is_cleared_by_its_rows(void **state) {
     (void)state;
     PlanReport report, copy;
@@ -59,7 +41,6 @@ static void a_report_is_cleared_by_its_rows(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(warnings_are_added_with_their_own_texts),
         cmocka_unit_test(a_report_is_cleared_by_its_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

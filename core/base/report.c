@@ -1,0 +1,110 @@
+#include "core/base/report.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { REPORT_LINES_MAX = 256 };
+
+// clang-format off
+const Field warning_fields[] = {
+    FIELD_TEXT(Warning, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to what is doubtful"),
+    FIELD_TEXT(Warning, detail, 0, PRESENCE_OPTIONAL, 0, "what is doubtful about it"),
+    FIELD_END
+};
+
+const Field decision_fields[] = {
+    FIELD_TEXT(Decision, about, 0, PRESENCE_OPTIONAL, 0, "what was to be chosen"),
+    FIELD_TEXT(Decision, chose, 0, PRESENCE_OPTIONAL, 0, "what was chosen"),
+    FIELD_TEXT(Decision, why, 0, PRESENCE_OPTIONAL, 0, "the reason"),
+    FIELD_REAL(Decision, value, NULL, ANY, OPTIONAL, "the number that decided"),
+    FIELD_TEXT(Decision, unit, 0, PRESENCE_OPTIONAL, 0, "of that number"),
+    FIELD_REAL(Decision, saving, NULL, ANY, OPTIONAL, "of what is left out: the part of the foretold cost that this saves"),
+    FIELD_END
+};
+// clang-format on
+
+// The formatted text, owned by the caller; NULL without memory.
+static char *report_text(const char *format, va_list arguments) {
+    if (strchr(format, '%') == NULL)
+        return strdup(format);
+    char text[1024], cut[512];
+    vsnprintf(text, sizeof text, format, arguments);
+    text_fit(cut, sizeof cut, text);
+    return strdup(cut);
+}
+
+Status warnings_add(Warnings *warnings, const char *pointer, const char *format, ...) {
+    if (warnings == NULL || warnings->count >= REPORT_LINES_MAX)
+        return STATUS_OK;
+    Warning *at = realloc(warnings->at, (warnings->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    warnings->at = at;
+    va_list arguments;
+    va_start(arguments, format);
+    const Warning warning = {.pointer = strdup(pointer), .detail = report_text(format, arguments)};
+    va_end(arguments);
+    at[warnings->count] = warning;
+    if (warning.pointer == NULL || warning.detail == NULL) {
+        fields_clear(warning_fields, &at[warnings->count]);
+        return STATUS_NO_MEMORY;
+    }
+    warnings->count++;
+    return STATUS_OK;
+}
+
+void warnings_clear(Warnings *warnings) {
+    for (size_t i = 0; i < warnings->count; i++)
+        fields_clear(warning_fields, &warnings->at[i]);
+    free(warnings->at);
+    *warnings = (Warnings){NULL, 0};
+}
+
+static Status decisions_append(Decisions *decisions, const Decision *given, const char *format,
+                               va_list arguments) {
+    if (decisions == NULL || decisions->count >= REPORT_LINES_MAX)
+        return STATUS_OK;
+    Decision *at = realloc(decisions->at, (decisions->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    decisions->at = at;
+    const Decision decision = {
+        .about = strdup(given->about),
+        .chose = strdup(given->chose),
+        .why = report_text(format, arguments),
+        .value = given->value,
+        .unit = given->unit != NULL ? strdup(given->unit) : NULL,
+        .saving = given->saving,
+    };
+    at[decisions->count] = decision;
+    if (decision.about == NULL || decision.chose == NULL || decision.why == NULL ||
+        (given->unit != NULL && decision.unit == NULL)) {
+        fields_clear(decision_fields, &at[decisions->count]);
+        return STATUS_NO_MEMORY;
+    }
+    decisions->count++;
+    return STATUS_OK;
+}
+
+Status decisions_add(Decisions *decisions, const char *about, const char *chose, double value,
+                     const char *unit, const char *format, ...) {
+    const Decision given = {(char *)about, (char *)chose, NULL, value, (char *)unit, (double)NAN};
+    va_list arguments;
+    va_start(arguments, format);
+    const Status status = decisions_append(decisions, &given, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+Status decisions_omit(Decisions *decisions, const char *about, double value, const char *unit,
+                      double saving, const char *format, ...) {
+    const Decision given = {(char *)about, (char *)"left_out", NULL, value, (char *)unit, saving};
+    va_list arguments;
+    va_start(arguments, format);
+    const Status status = decisions_append(decisions, &given, format, arguments);
+    va_end(arguments);
+    return status;
+}
