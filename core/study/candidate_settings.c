@@ -24,22 +24,23 @@ static const double rate_divisors[RATES] = {2, 4, 8}; // powers of 2, so that sa
 static const uint64_t spectrum_divisors[SHARES] = {4, 16};
 static const double duration_divisors[SHARES] = {2, 4};
 
-const Kind *ladder_reference(void) {
+const Kind *candidate_settings_reference(void) {
     size_t i = 0;
     while (solvers[i]->run == NULL)
         i++;
     return &solvers[i]->kind;
 }
 
-static const Field *row_of(const Kind *solver, const char *name, size_t *offset) {
+static const Field *candidate_field(const Kind *solver, const char *name, size_t *offset) {
     return fields_find(solver->fields, name, offset);
 }
 
 // A point with nothing but its solver and name; NULL without memory.
-static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+static TradeoffPoint *candidate_add(TradeoffPoints *points, const Kind *solver, const char *format,
+                                    ...) __attribute__((format(printf, 3, 4)));
 
-static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char *format, ...) {
+static TradeoffPoint *candidate_add(TradeoffPoints *points, const Kind *solver, const char *format,
+                                    ...) {
     TradeoffPoint *at = realloc(points->at, (points->count + 1) * sizeof *at);
     if (at == NULL)
         return NULL;
@@ -59,7 +60,7 @@ static TradeoffPoint *add(TradeoffPoints *points, const Kind *solver, const char
 static const double pi = 3.14159265358979324;
 
 // The shortest contact that a buffer's numbers tell, about, for a free mass [s]; NAN: none.
-static double contact_time(const Buffer *buffer, double mass) {
+static double candidate_contact_time(const Buffer *buffer, double mass) {
     double shortest = buffer->contact_time;
     if (isnan(shortest) && buffer->stiffness > 0)
         shortest = pi * sqrt(mass / buffer->stiffness);
@@ -69,7 +70,7 @@ static double contact_time(const Buffer *buffer, double mass) {
 }
 
 // What the finest step is to resolve [s].
-static Status finest_step(const Simulation *simulation, double *finest) {
+static Status candidate_finest_step(const Simulation *simulation, double *finest) {
     StructureRates rates;
     TRY(structure_rates(scene_structure(&simulation->scene), &rates));
     *finest = rates.fastest > 0 ? radian_part / rates.fastest : (double)INFINITY;
@@ -77,17 +78,17 @@ static Status finest_step(const Simulation *simulation, double *finest) {
         const Damper *damper = &simulation->scene.dampers.at[i];
         for (int side = SIDE_LEFT; side <= SIDE_RIGHT; side++) {
             const Buffer *buffer = damper_buffer(damper, (Side)side);
-            *finest = fmin(*finest, contact_part * contact_time(buffer, damper->mass));
+            *finest = fmin(*finest, contact_part * candidate_contact_time(buffer, damper->mass));
         }
     }
     return STATUS_OK;
 }
 
-static bool add_steps(TradeoffPoints *points, const Kind *solver, const Simulation *simulation,
-                      double finest) {
+static bool candidate_add_steps(TradeoffPoints *points, const Kind *solver,
+                                const Simulation *simulation, double finest) {
     double step = 1 / simulation->scene.sample_rate;
     for (int i = 0; i < DECADES; i++, step /= 10) {
-        TradeoffPoint *point = add(points, solver, "%s, step %.4g s", solver->name, step);
+        TradeoffPoint *point = candidate_add(points, solver, "%s, step %.4g s", solver->name, step);
         if (point == NULL)
             return false;
         point->step = step;
@@ -97,11 +98,13 @@ static bool add_steps(TradeoffPoints *points, const Kind *solver, const Simulati
     return true;
 }
 
-static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Range *range) {
+static bool candidate_add_tolerances(TradeoffPoints *points, const Kind *solver,
+                                     const Range *range) {
     for (double tolerance = fmin(tolerance_max, range->most);
          tolerance >= fmax(range->least, tolerance_min) * (1 - 1e-9);
          tolerance *= tolerance_factor) {
-        TradeoffPoint *point = add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
+        TradeoffPoint *point =
+            candidate_add(points, solver, "%s, tolerance %.3g", solver->name, tolerance);
         if (point == NULL)
             return false;
         point->tolerance = tolerance;
@@ -110,7 +113,8 @@ static bool add_tolerances(TradeoffPoints *points, const Kind *solver, const Ran
 }
 
 // What may be given up without giving up exactness.
-static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
+static bool candidate_add_outputs(TradeoffPoints *points, const Kind *solver,
+                                  const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const SpectrumRequest *psd = &simulation->output.psd;
     TradeoffPoint *point;
@@ -118,7 +122,8 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
         const double rate = scene->sample_rate / rate_divisors[i];
         if (rate * scene->duration < SEGMENT_MIN)
             break;
-        if ((point = add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate)) == NULL)
+        if ((point = candidate_add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate)) ==
+            NULL)
             return false;
         point->sample_rate = rate;
     }
@@ -126,8 +131,8 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
         const uint64_t segment = psd->segment / spectrum_divisors[i];
         if (segment < SEGMENT_MIN)
             break;
-        if ((point = add(points, solver, "%s, segments of %llu", solver->name,
-                         (unsigned long long)segment)) == NULL)
+        if ((point = candidate_add(points, solver, "%s, segments of %llu", solver->name,
+                                   (unsigned long long)segment)) == NULL)
             return false;
         point->segment = segment;
     }
@@ -135,7 +140,8 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
         const double duration = scene->duration / duration_divisors[i];
         if (duration * scene->sample_rate < (double)psd->segment)
             break;
-        if ((point = add(points, solver, "%s, %.6g s long", solver->name, duration)) == NULL)
+        if ((point = candidate_add(points, solver, "%s, %.6g s long", solver->name, duration)) ==
+            NULL)
             return false;
         point->duration = duration;
     }
@@ -143,11 +149,12 @@ static bool add_output(TradeoffPoints *points, const Kind *solver, const Simulat
 }
 
 // Half the modes, and half of these, down to one.
-static bool add_modes(TradeoffPoints *points, const Kind *solver, const Simulation *simulation) {
+static bool candidate_add_modes(TradeoffPoints *points, const Kind *solver,
+                                const Simulation *simulation) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     for (size_t modes = storeys / 2; storeys >= STOREYS_MIN && modes > 0; modes /= 2) {
-        TradeoffPoint *point =
-            add(points, solver, "%s, %zu mode%s", solver->name, modes, modes == 1 ? "" : "s");
+        TradeoffPoint *point = candidate_add(points, solver, "%s, %zu mode%s", solver->name, modes,
+                                             modes == 1 ? "" : "s");
         if (point == NULL)
             return false;
         point->modes = modes;
@@ -155,13 +162,13 @@ static bool add_modes(TradeoffPoints *points, const Kind *solver, const Simulati
     return true;
 }
 
-static bool has_power_law(const Simulation *simulation) {
+static bool candidate_has_power_law(const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     return scene->dampers.count > 0 && law->form == CONTACT_POWER;
 }
 
-static bool is_asked(const TradeoffStudy *study, const char *name) {
+static bool candidate_is_requested(const TradeoffStudy *study, const char *name) {
     bool is_named = study->solvers.count == 0;
     for (size_t i = 0; i < study->solvers.count; i++)
         is_named = is_named || strcmp(study->solvers.at[i], name) == 0;
@@ -169,81 +176,82 @@ static bool is_asked(const TradeoffStudy *study, const char *name) {
 }
 
 // Whether the solver's settings change anything of this scene.
-static bool is_of_use(const Kind *kind, const Simulation *simulation) {
+static bool candidate_is_useful(const Kind *kind, const Simulation *simulation) {
     const Solver *solver = (const Solver *)(const void *)kind;
-    return solver->forget_unused == NULL || has_power_law(simulation);
+    return solver->forget_unused == NULL || candidate_has_power_law(simulation);
 }
 
-static bool add_solver(TradeoffPoints *points, const Kind *solver, const Simulation *simulation,
-                       double finest) {
+static bool candidate_add_solver(TradeoffPoints *points, const Kind *solver,
+                                 const Simulation *simulation, double finest) {
     const Field *tolerance =
-        is_of_use(solver, simulation) ? row_of(solver, "tolerance", NULL) : NULL;
-    if (row_of(solver, "step", NULL) != NULL)
-        return add_steps(points, solver, simulation, finest);
-    if (tolerance != NULL && !add_tolerances(points, solver, &tolerance->range))
+        candidate_is_useful(solver, simulation) ? candidate_field(solver, "tolerance", NULL) : NULL;
+    if (candidate_field(solver, "step", NULL) != NULL)
+        return candidate_add_steps(points, solver, simulation, finest);
+    if (tolerance != NULL && !candidate_add_tolerances(points, solver, &tolerance->range))
         return false;
     // A tolerance that may be left out is none then.
     if (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL)
         return true;
-    return add(points, solver, "%s", solver->name) != NULL;
+    return candidate_add(points, solver, "%s", solver->name) != NULL;
 }
 
-static bool add_reference(TradeoffPoints *points, const Kind *solver,
-                          const Simulation *simulation) {
+static bool candidate_add_reference(TradeoffPoints *points, const Kind *solver,
+                                    const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
     if (scene->dampers.count > 0 && law->form == CONTACT_LINEAR) {
         const char *model = contact_impulse.kind.name;
-        TradeoffPoint *point = add(points, solver, "%s, contact %s", solver->name, model);
+        TradeoffPoint *point = candidate_add(points, solver, "%s, contact %s", solver->name, model);
         if (point == NULL || (point->contact_model = strdup(model)) == NULL)
             return false;
     }
-    return add_modes(points, solver, simulation) && add_output(points, solver, simulation);
+    return candidate_add_modes(points, solver, simulation) &&
+           candidate_add_outputs(points, solver, simulation);
 }
 
-Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
-                   Problem *problem) {
+Status candidate_settings_list(const TradeoffStudy *study, const Simulation *simulation,
+                               TradeoffPoints *points, Problem *problem) {
     double finest;
     *points = (TradeoffPoints){NULL, 0};
-    bool is_whole = finest_step(simulation, &finest) == STATUS_OK;
+    bool is_whole = candidate_finest_step(simulation, &finest) == STATUS_OK;
     for (size_t i = 0; solvers[i] != NULL && is_whole; i++)
-        if (solvers[i]->run != NULL && is_asked(study, solvers[i]->kind.name))
-            is_whole = add_solver(points, &solvers[i]->kind, simulation, finest);
-    if (is_whole && is_asked(study, ladder_reference()->name))
-        is_whole = add_reference(points, ladder_reference(), simulation);
+        if (solvers[i]->run != NULL && candidate_is_requested(study, solvers[i]->kind.name))
+            is_whole = candidate_add_solver(points, &solvers[i]->kind, simulation, finest);
+    if (is_whole && candidate_is_requested(study, candidate_settings_reference()->name))
+        is_whole = candidate_add_reference(points, candidate_settings_reference(), simulation);
     return is_whole ? STATUS_OK
                     : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
 }
 
-static void set_real(Variant *variant, const char *name, double value) {
+static void candidate_set_real(Variant *variant, const char *name, double value) {
     size_t offset = 0;
-    const Field *row = row_of(variant->kind, name, &offset);
+    const Field *row = candidate_field(variant->kind, name, &offset);
     if (row != NULL && !isnan(value))
         *(double *)(void *)((char *)variant + offset + row->offset) = value;
 }
 
-static void set_count(Variant *variant, const char *name, uint64_t value) {
+static void candidate_set_count(Variant *variant, const char *name, uint64_t value) {
     size_t offset = 0;
-    const Field *row = row_of(variant->kind, name, &offset);
+    const Field *row = candidate_field(variant->kind, name, &offset);
     if (row != NULL && value != COUNT_ABSENT)
         *(uint64_t *)(void *)((char *)variant + offset + row->offset) = value;
 }
 
-static Status apply_solver(const TradeoffPoint *point, Simulation *target) {
+static Status candidate_apply_solver(const TradeoffPoint *point, Simulation *target) {
     const Kind *kind = kind_find(&solver_kinds, point->solver);
     Variant *accuracy = variant_new(kind);
     if (accuracy == NULL)
         return STATUS_NO_MEMORY;
     variant_free(target->accuracy);
     target->accuracy = accuracy;
-    set_real(accuracy, "step", point->step);
-    set_real(accuracy, "tolerance", point->tolerance);
-    set_count(accuracy, "modes", point->modes);
+    candidate_set_real(accuracy, "step", point->step);
+    candidate_set_real(accuracy, "tolerance", point->tolerance);
+    candidate_set_count(accuracy, "modes", point->modes);
     return STATUS_OK;
 }
 
 // A coarser spectrum keeps its share of overlap.
-static void apply_output(const TradeoffPoint *point, Simulation *target) {
+static void candidate_apply_output(const TradeoffPoint *point, Simulation *target) {
     SpectrumRequest *psd = &target->output.psd;
     double share = 1;
     if (!isnan(point->sample_rate)) {
@@ -266,32 +274,27 @@ static void apply_output(const TradeoffPoint *point, Simulation *target) {
     target->output.statistics_from = fmin(target->output.statistics_from, last);
 }
 
-Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
-                    const SimulationLimits *limits, Simulation *target, Problem *problem) {
+Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoint *point,
+                                const SimulationLimits *limits, Simulation *target,
+                                Problem *problem) {
     Status status = fields_copy(simulation_fields, simulation, target);
     if (status == STATUS_OK)
-        status = apply_solver(point, target);
+        status = candidate_apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
         status = impulses_take(target, problem);
     if (status == STATUS_NO_MEMORY)
         return problem_set(problem, status, "no memory for a point of the study");
     TRY(status);
-    apply_output(point, target);
+    candidate_apply_output(point, target);
     return simulation_complete(target, limits, NULL, problem);
 }
 
-bool ladder_has_force(const Simulation *simulation) {
-    const Scene *scene = &simulation->scene;
-    return scene->dampers.count > 0 &&
-           dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
-}
-
-double ladder_cost(const Simulation *simulation, const TradeoffPoint *point) {
+double candidate_settings_cost(const Simulation *simulation, const TradeoffPoint *point) {
     Simulation view = *simulation; // borrows all but what the point changes
     view.accuracy = NULL;
-    if (apply_solver(point, &view) != STATUS_OK)
+    if (candidate_apply_solver(point, &view) != STATUS_OK)
         return 0; // a guess without memory: the run will tell
-    apply_output(point, &view);
+    candidate_apply_output(point, &view);
     const double steps = simulation_cost(&view).steps;
     variant_free(view.accuracy);
     return steps;

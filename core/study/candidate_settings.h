@@ -6,22 +6,20 @@
 #include "core/study/tradeoff.h"
 
 // The solver that the others are compared with: the first of the table that runs.
-const Kind *ladder_reference(void);
+const Kind *candidate_settings_reference(void);
 
 // The points of a completed study of a completed simulation, without numbers. Cleared by
 // fields_clear; STATUS_NO_MEMORY leaves what there is.
-Status ladder_make(const TradeoffStudy *study, const Simulation *simulation, TradeoffPoints *points,
-                   Problem *problem);
+Status candidate_settings_list(const TradeoffStudy *study, const Simulation *simulation,
+                               TradeoffPoints *points, Problem *problem);
 
 // The simulation as a point runs it, completed under `limits`. A point that cannot be is refused
 // with its faults. Cleared by simulation_clear in any case.
-Status ladder_apply(const Simulation *simulation, const TradeoffPoint *point,
-                    const SimulationLimits *limits, Simulation *target, Problem *problem);
-
-// Whether contacts of the simulation have a force.
-bool ladder_has_force(const Simulation *simulation);
+Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoint *point,
+                                const SimulationLimits *limits, Simulation *target,
+                                Problem *problem);
 
 // What a point is foretold to take, in solver steps.
-double ladder_cost(const Simulation *simulation, const TradeoffPoint *point);
+double candidate_settings_cost(const Simulation *simulation, const TradeoffPoint *point);
 
 #endif

@@ -5,8 +5,8 @@
 #ifndef CORE_STUDY_MODEL_COMPARISON_H
 #define CORE_STUDY_MODEL_COMPARISON_H
 
-#include "core/result/spectrum_distance.h"
 #include "core/result/signal_comparison.h"
+#include "core/result/spectrum_distance.h"
 #include "core/study/study.h"
 
 // What is asked.

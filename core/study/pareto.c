@@ -10,19 +10,19 @@
 
 static const double alike = 1.25; // times as long is no longer than the cheapest, measured again
 
-static bool has_both(const TradeoffPoint *point, int metric) {
+static bool pareto_is_measured(const TradeoffPoint *point, int metric) {
     return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum) &&
            !isnan(errors_by(&point->errors, metric));
 }
 
-void choice_mark(TradeoffPoints *points, int metric) {
+void pareto_mark(TradeoffPoints *points, int metric) {
     for (size_t i = 0; i < points->count; i++) {
         TradeoffPoint *point = &points->at[i];
         const double cpu = point->cpu_minimum, error = errors_by(&point->errors, metric);
-        point->is_best = has_both(point, metric);
+        point->is_best = pareto_is_measured(point, metric);
         for (size_t j = 0; j < points->count && point->is_best; j++) {
             const TradeoffPoint *other = &points->at[j];
-            if (!has_both(other, metric))
+            if (!pareto_is_measured(other, metric))
                 continue;
             const double own = errors_by(&other->errors, metric);
             if (other->cpu_minimum <= cpu && own <= error &&
@@ -32,10 +32,10 @@ void choice_mark(TradeoffPoints *points, int metric) {
     }
 }
 
-static Status say(TradeoffChoice *choice, const char *format, ...)
+static Status pareto_explain(TradeoffRecommendation *choice, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
-static Status say(TradeoffChoice *choice, const char *format, ...) {
+static Status pareto_explain(TradeoffRecommendation *choice, const char *format, ...) {
     char text[512];
     va_list arguments;
     va_start(arguments, format);
@@ -47,12 +47,12 @@ static Status say(TradeoffChoice *choice, const char *format, ...) {
 }
 
 // The cheapest that keeps the error, other than `without`; NULL: none.
-static const TradeoffPoint *cheapest(const TradeoffPoints *points, int metric, double error,
-                                     const TradeoffPoint *without) {
+static const TradeoffPoint *pareto_cheapest(const TradeoffPoints *points, int metric, double error,
+                                            const TradeoffPoint *without) {
     const TradeoffPoint *found = NULL;
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
-        if (point != without && has_both(point, metric) &&
+        if (point != without && pareto_is_measured(point, metric) &&
             errors_by(&point->errors, metric) <= error &&
             (found == NULL || point->cpu_minimum < found->cpu_minimum))
             found = point;
@@ -61,57 +61,62 @@ static const TradeoffPoint *cheapest(const TradeoffPoints *points, int metric, d
 }
 
 // The closest of those that take hardly longer than `cpu`.
-static const TradeoffPoint *closest_of_alike(const TradeoffPoints *points, int metric, double cpu,
-                                             const TradeoffPoint *found) {
+static const TradeoffPoint *pareto_closest_of_similar(const TradeoffPoints *points, int metric,
+                                                      double cpu, const TradeoffPoint *found) {
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
-        if (has_both(point, metric) && point->cpu_minimum <= alike * cpu &&
+        if (pareto_is_measured(point, metric) && point->cpu_minimum <= alike * cpu &&
             errors_by(&point->errors, metric) < errors_by(&found->errors, metric))
             found = point;
     }
     return found;
 }
 
-static const TradeoffPoint *closest(const TradeoffPoints *points, int metric) {
+static const TradeoffPoint *pareto_closest(const TradeoffPoints *points, int metric) {
     const TradeoffPoint *found = NULL;
     for (size_t i = 0; i < points->count; i++) {
         const TradeoffPoint *point = &points->at[i];
-        if (has_both(point, metric) && (found == NULL || errors_by(&point->errors, metric) <
-                                                             errors_by(&found->errors, metric)))
+        if (pareto_is_measured(point, metric) &&
+            (found == NULL ||
+             errors_by(&point->errors, metric) < errors_by(&found->errors, metric)))
             found = point;
     }
     return found;
 }
 
-Status choice_make(const TradeoffPoints *points, int metric, double error, TradeoffChoice *choice) {
+Status pareto_recommend(const TradeoffPoints *points, int metric, double error,
+                        TradeoffRecommendation *choice) {
     const char *name = metric_names[metric], *unit = metric_units[metric];
-    const TradeoffPoint *taken = cheapest(points, metric, error, NULL);
+    const TradeoffPoint *taken = pareto_cheapest(points, metric, error, NULL);
     choice->point = COUNT_ABSENT;
     if (taken == NULL) {
-        const TradeoffPoint *near = closest(points, metric);
+        const TradeoffPoint *near = pareto_closest(points, metric);
         if (near == NULL)
-            return say(choice, "no point has an error of %s", name);
-        return say(choice, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name,
-                   error, unit, near->name, errors_by(&near->errors, metric), unit);
+            return pareto_explain(choice, "no point has an error of %s", name);
+        return pareto_explain(
+            choice, "no point keeps %s within %.3g%s; the closest, %s, is at %.2g%s", name, error,
+            unit, near->name, errors_by(&near->errors, metric), unit);
     }
     const TradeoffPoint *first = taken;
-    taken = closest_of_alike(points, metric, first->cpu_minimum, first);
+    taken = pareto_closest_of_similar(points, metric, first->cpu_minimum, first);
     choice->point = (uint64_t)(taken - points->at) + 1;
     const double reached = errors_by(&taken->errors, metric);
     const double cpu = taken->cpu_minimum;
     if (taken != first)
-        return say(choice,
-                   "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than the "
-                   "cheapest, %s, %.2g%s in %.3g s",
-                   taken->name, name, error, unit, reached, unit, cpu, first->name,
-                   errors_by(&first->errors, metric), unit, first->cpu_minimum);
-    const TradeoffPoint *next = cheapest(points, metric, error, taken);
+        return pareto_explain(
+            choice,
+            "%s keeps %s within %.3g%s, %.2g%s in %.3g s, and takes hardly longer than the "
+            "cheapest, %s, %.2g%s in %.3g s",
+            taken->name, name, error, unit, reached, unit, cpu, first->name,
+            errors_by(&first->errors, metric), unit, first->cpu_minimum);
+    const TradeoffPoint *next = pareto_cheapest(points, metric, error, taken);
     if (next == NULL)
-        return say(choice, "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
-                   taken->name, name, error, unit, reached, unit, cpu);
-    return say(choice,
-               "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the next, %s, "
-               "takes %.3g times as long",
-               taken->name, name, error, unit, reached, unit, cpu, next->name,
-               next->cpu_minimum / cpu);
+        return pareto_explain(choice,
+                              "%s is the only point that keeps %s within %.3g%s: %.2g%s in %.3g s",
+                              taken->name, name, error, unit, reached, unit, cpu);
+    return pareto_explain(
+        choice,
+        "%s is the cheapest that keeps %s within %.3g%s: %.2g%s in %.3g s; the next, %s, "
+        "takes %.3g times as long",
+        taken->name, name, error, unit, reached, unit, cpu, next->name, next->cpu_minimum / cpu);
 }

@@ -6,10 +6,11 @@
 #include "core/study/tradeoff.h"
 
 // Marks the points that are best: no other is both as cheap and as close, and better in one.
-void choice_mark(TradeoffPoints *points, int metric);
+void pareto_mark(TradeoffPoints *points, int metric);
 
 // The cheapest point that keeps `error`, or a closer one that takes hardly longer, with the reason.
 // STATUS_NO_MEMORY.
-Status choice_make(const TradeoffPoints *points, int metric, double error, TradeoffChoice *choice);
+Status pareto_recommend(const TradeoffPoints *points, int metric, double error,
+                        TradeoffRecommendation *choice);
 
 #endif

@@ -13,30 +13,30 @@
 #include "core/math/student_t.h"
 #include "core/study/statistics.h"
 
-static Status no_memory(Problem *problem) {
+static Status spectrum_accumulator_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's spectra");
 }
 
-static Status fold_begin(SpectraFold *fold, const Spectrum *spectrum, bool keeps_first,
-                         Problem *problem) {
+static Status spectrum_accumulator_begin(SpectrumAccumulator *fold, const Spectrum *spectrum,
+                                         bool keeps_first, Problem *problem) {
     const size_t values = spectrum->densities.count * spectrum->densities.rows;
     fold->channels = spectrum->densities.count;
     fold->rows = spectrum->densities.rows;
     fold->mean = calloc(values, sizeof *fold->mean);
     fold->squares = calloc(values, sizeof *fold->squares);
     if (keeps_first)
-        fold->first = calloc(SPECTRA_KEPT * values, sizeof *fold->first);
+        fold->first = calloc(SPECTRUM_ACCUMULATOR_KEPT * values, sizeof *fold->first);
     return fold->mean == NULL || fold->squares == NULL || (keeps_first && fold->first == NULL)
-               ? no_memory(problem)
+               ? spectrum_accumulator_no_memory(problem)
                : STATUS_OK;
 }
 
-Status spectra_add(SpectraFold *fold, const Spectrum *spectrum, bool keeps_first,
-                   Problem *problem) {
+Status spectrum_accumulator_add(SpectrumAccumulator *fold, const Spectrum *spectrum,
+                                bool keeps_first, Problem *problem) {
     if (spectrum->densities.count == 0)
         return STATUS_OK;
     if (fold->mean == NULL)
-        TRY(fold_begin(fold, spectrum, keeps_first, problem));
+        TRY(spectrum_accumulator_begin(fold, spectrum, keeps_first, problem));
     const double n = (double)(fold->count + 1);
     for (size_t c = 0; c < fold->channels; c++) {
         const double *values = spectrum->densities.at[c].values;
@@ -46,7 +46,7 @@ Status spectra_add(SpectraFold *fold, const Spectrum *spectrum, bool keeps_first
             mean[k] += off / n;
             squares[k] += off * (values[k] - mean[k]);
         }
-        if (fold->first != NULL && fold->count < SPECTRA_KEPT)
+        if (fold->first != NULL && fold->count < SPECTRUM_ACCUMULATOR_KEPT)
             memcpy(fold->first + (fold->count * fold->channels + c) * fold->rows, values,
                    fold->rows * sizeof *values);
     }
@@ -56,13 +56,15 @@ Status spectra_add(SpectraFold *fold, const Spectrum *spectrum, bool keeps_first
 
 // (sum of the eigenvalues)^2 / (sum of their squares) of the covariance that the kept runs show. It
 // cannot be more than their number less one, and is told too small rather than too large.
-static double freedom(const SpectraFold *fold, size_t channel) {
-    const size_t kept = fold->count < SPECTRA_KEPT ? fold->count : SPECTRA_KEPT;
+static double spectrum_accumulator_freedom(const SpectrumAccumulator *fold, size_t channel) {
+    const size_t kept =
+        fold->count < SPECTRUM_ACCUMULATOR_KEPT ? fold->count : SPECTRUM_ACCUMULATOR_KEPT;
     const size_t stride = fold->channels * fold->rows;
     const double *at = fold->first + channel * fold->rows;
-    double gram[SPECTRA_KEPT][SPECTRA_KEPT] = {{0}}, trace = 0, squares = 0;
+    double gram[SPECTRUM_ACCUMULATOR_KEPT][SPECTRUM_ACCUMULATOR_KEPT] = {{0}}, trace = 0,
+           squares = 0;
     for (size_t k = 0; k < fold->rows; k++) {
-        double off[SPECTRA_KEPT], mean = 0;
+        double off[SPECTRUM_ACCUMULATOR_KEPT], mean = 0;
         for (size_t i = 0; i < kept; i++)
             mean += at[i * stride + k] / (double)kept;
         for (size_t i = 0; i < kept; i++)
@@ -79,14 +81,14 @@ static double freedom(const SpectraFold *fold, size_t channel) {
     return squares > 0 ? fmax(trace * trace / squares, 1) : 1;
 }
 
-static double norm(const double *values, size_t count) {
+static double spectrum_accumulator_norm(const double *values, size_t count) {
     double sum = 0;
     for (size_t k = 0; k < count; k++)
         sum += values[k] * values[k];
     return sqrt(sum);
 }
 
-Spread spectra_spread(const SpectraFold *fold, size_t all) {
+Spread spectrum_accumulator_spread(const SpectrumAccumulator *fold, size_t all) {
     Spread worst = {.count = fold->count, .relative = INFINITY, .freedom = 1};
     double largest = -1;
     for (size_t c = 0; c < fold->channels && fold->count > 1; c++) {
@@ -94,11 +96,11 @@ Spread spectra_spread(const SpectraFold *fold, size_t all) {
         for (size_t k = 0; k < fold->rows; k++)
             squares += fold->squares[c * fold->rows + k];
         const double relative = sqrt(squares / (double)(fold->count - 1)) /
-                                norm(fold->mean + c * fold->rows, fold->rows);
+                                spectrum_accumulator_norm(fold->mean + c * fold->rows, fold->rows);
         const Spread spread = {.count = fold->count,
                                .relative = relative > 0 ? relative : (double)INFINITY,
-                               .freedom = freedom(fold, c)};
-        const double error = rule_error(&spread, fold->count, all);
+                               .freedom = spectrum_accumulator_freedom(fold, c)};
+        const double error = stopping_rule_error(&spread, fold->count, all);
         if (error > largest) {
             largest = error;
             worst = spread;
@@ -107,21 +109,22 @@ Spread spectra_spread(const SpectraFold *fold, size_t all) {
     return worst;
 }
 
-static Status tell_channel(const SpectraFold *fold, size_t channel, const Column *like,
-                           EnsembleSpectrum *told, Problem *problem) {
+static Status spectrum_accumulator_report_channel(const SpectrumAccumulator *fold, size_t channel,
+                                                  const Column *like, EnsembleSpectrum *told,
+                                                  Problem *problem) {
     const double *mean = fold->mean + channel * fold->rows;
     const double *squares = fold->squares + channel * fold->rows;
     const double n = (double)fold->count;
     told->channel = strdup(like->name);
     told->unit = strdup(like->unit);
     if (told->channel == NULL || told->unit == NULL || !reals_make(&told->mean, fold->rows))
-        return no_memory(problem);
+        return spectrum_accumulator_no_memory(problem);
     memcpy(told->mean.at, mean, fold->rows * sizeof *mean);
     if (fold->count < 2)
         return STATUS_OK;
     if (!reals_make(&told->standard_deviation, fold->rows) || !reals_make(&told->low, fold->rows) ||
         !reals_make(&told->high, fold->rows))
-        return no_memory(problem);
+        return spectrum_accumulator_no_memory(problem);
     const double t = student_quantile(ENSEMBLE_INTERVAL, fold->count - 1);
     for (size_t k = 0; k < fold->rows; k++) {
         const double deviation = sqrt(squares[k] / (n - 1));
@@ -137,24 +140,25 @@ static Status tell_channel(const SpectraFold *fold, size_t channel, const Column
     return STATUS_OK;
 }
 
-Status spectra_tell(const SpectraFold *fold, const Spectrum *like, Ensemble *answer,
-                    Problem *problem) {
+Status spectrum_accumulator_report(const SpectrumAccumulator *fold, const Spectrum *like,
+                                   Ensemble *answer, Problem *problem) {
     if (fold->count == 0)
         return STATUS_OK;
     EnsembleSpectra *spectra = &answer->spectra;
     spectra->at = calloc(fold->channels, sizeof *spectra->at);
     if (spectra->at == NULL || !reals_make(&answer->frequency, fold->rows))
-        return no_memory(problem);
+        return spectrum_accumulator_no_memory(problem);
     memcpy(answer->frequency.at, like->frequency, fold->rows * sizeof *like->frequency);
     spectra->count = fold->channels;
     for (size_t c = 0; c < fold->channels; c++)
-        TRY(tell_channel(fold, c, &like->densities.at[c], &spectra->at[c], problem));
+        TRY(spectrum_accumulator_report_channel(fold, c, &like->densities.at[c], &spectra->at[c],
+                                                problem));
     return STATUS_OK;
 }
 
-void spectra_clear(SpectraFold *fold) {
+void spectrum_accumulator_clear(SpectrumAccumulator *fold) {
     free(fold->mean);
     free(fold->squares);
     free(fold->first);
-    *fold = (SpectraFold){0};
+    *fold = (SpectrumAccumulator){0};
 }

@@ -7,29 +7,30 @@
 #include "core/study/ensemble.h"
 #include "core/study/stopping_rule.h"
 
-enum { SPECTRA_KEPT = 16, SPECTRA_VALUES = 1 << 18 };
+enum { SPECTRUM_ACCUMULATOR_KEPT = 16, STUDY_DENSITIES_MAX = 1 << 18 };
 
 // All zero is empty.
-typedef struct SpectraFold {
+typedef struct SpectrumAccumulator {
     size_t channels, rows;
     size_t count;    // runs
     double *mean;    // channel by channel
     double *squares; // sums of squared deviations
-    double *first;   // of SPECTRA_KEPT runs, run by run; NULL: not wanted
-} SpectraFold;
+    double *first;   // of SPECTRUM_ACCUMULATOR_KEPT runs, run by run; NULL: not wanted
+} SpectrumAccumulator;
 
 // Adds a run's spectra, all of one shape; the first ones make room. `keeps_first`: for
-// spectra_spread.
-Status spectra_add(SpectraFold *fold, const Spectrum *spectrum, bool keeps_first, Problem *problem);
+// spectrum_accumulator_spread.
+Status spectrum_accumulator_add(SpectrumAccumulator *fold, const Spectrum *spectrum,
+                                bool keeps_first, Problem *problem);
 
 // How the runs differ: the norm of the difference over the norm of the mean density, of the channel
 // whose error is the largest among `all` runs.
-Spread spectra_spread(const SpectraFold *fold, size_t all);
+Spread spectrum_accumulator_spread(const SpectrumAccumulator *fold, size_t all);
 
 // Fills frequencies and spectra of the answer; `like` is any of the runs'.
-Status spectra_tell(const SpectraFold *fold, const Spectrum *like, Ensemble *answer,
-                    Problem *problem);
+Status spectrum_accumulator_report(const SpectrumAccumulator *fold, const Spectrum *like,
+                                   Ensemble *answer, Problem *problem);
 
-void spectra_clear(SpectraFold *fold);
+void spectrum_accumulator_clear(SpectrumAccumulator *fold);
 
 #endif

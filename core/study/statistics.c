@@ -31,7 +31,7 @@ double statistics_value(const Summary *summary, int metric) {
     return all[metric];
 }
 
-static bool is_known(const EnsembleRun *run, int metric) {
+static bool statistics_is_known(const EnsembleRun *run, int metric) {
     return run->why == NULL && !isnan(statistics_value(&run->summary, metric));
 }
 
@@ -44,7 +44,7 @@ typedef struct Values {
 } Values;
 
 // In units of a power of two near the largest, so that no square or cube leaves what doubles hold.
-static void values_measure(Values *values) {
+static void statistics_measure(Values *values) {
     const double n = (double)values->count;
     double largest = 0, sum = 0, rest = 0, squares = 0, cubes = 0;
     int exponent;
@@ -69,27 +69,28 @@ static void values_measure(Values *values) {
     values->skewness = usual > 0 ? cubes / n / (usual * usual * usual) : 0;
 }
 
-static Status values_take(const EnsembleRuns *table, int metric, Values *values, Problem *problem) {
+static Status statistics_collect(const EnsembleRuns *table, int metric, Values *values,
+                                 Problem *problem) {
     *values = (Values){.at = calloc(table->count + 1, sizeof *values->at),
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
     if (values->at == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's statistics");
     for (size_t i = 0; i < table->count; i++)
-        if (is_known(&table->at[i], metric))
+        if (statistics_is_known(&table->at[i], metric))
             values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
     if (values->count > 0)
-        values_measure(values);
+        statistics_measure(values);
     return STATUS_OK;
 }
 
-static int by_size(const void *a, const void *b) {
+static int statistics_compare(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
 void statistics_sort(double *values, size_t count) {
-    qsort(values, count, sizeof *values, by_size);
+    qsort(values, count, sizeof *values, statistics_compare);
 }
 
 double statistics_quantile(const double *sorted, size_t count, double share) {
@@ -100,16 +101,16 @@ double statistics_quantile(const double *sorted, size_t count, double share) {
 }
 
 // The first run that has this number.
-static uint64_t seed_of(const EnsembleRuns *table, int metric, double value) {
+static uint64_t statistics_seed(const EnsembleRuns *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)
-        if (is_known(&table->at[i], metric) &&
+        if (statistics_is_known(&table->at[i], metric) &&
             statistics_value(&table->at[i].summary, metric) == value)
             return table->at[i].seed;
     return COUNT_ABSENT;
 }
 
-static void statistic_fill(const EnsembleRuns *table, int metric, Values *values,
-                           EnsembleStatistic *statistic) {
+static void statistics_fill(const EnsembleRuns *table, int metric, Values *values,
+                            EnsembleStatistic *statistic) {
     statistic->count = values->count;
     if (values->count == 0)
         return;
@@ -130,15 +131,15 @@ static void statistic_fill(const EnsembleRuns *table, int metric, Values *values
     statistic->q75 = statistics_quantile(values->at, values->count, 0.75);
     statistic->q95 = statistics_quantile(values->at, values->count, 0.95);
     statistic->maximum = values->at[values->count - 1];
-    statistic->minimum_seed = seed_of(table, metric, statistic->minimum);
-    statistic->maximum_seed = seed_of(table, metric, statistic->maximum);
+    statistic->minimum_seed = statistics_seed(table, metric, statistic->minimum);
+    statistic->maximum_seed = statistics_seed(table, metric, statistic->maximum);
 }
 
 Status statistics_fold(const EnsembleRuns *table, int metric, EnsembleStatistic *statistic,
                        Problem *problem) {
     Values values;
-    TRY(values_take(table, metric, &values, problem));
-    statistic_fill(table, metric, &values, statistic);
+    TRY(statistics_collect(table, metric, &values, problem));
+    statistics_fill(table, metric, &values, statistic);
     free(values.at);
     free(statistic->unit);
     statistic->unit = strdup(units[metric]);
@@ -149,7 +150,7 @@ Status statistics_fold(const EnsembleRuns *table, int metric, EnsembleStatistic 
 
 Status statistics_spread(const EnsembleRuns *table, int metric, Spread *spread, Problem *problem) {
     Values values;
-    TRY(values_take(table, metric, &values, problem));
+    TRY(statistics_collect(table, metric, &values, problem));
     // Where all are alike there may be rare ones that are not: nothing is known of them.
     const double relative = values.deviation / fabs(values.mean);
     *spread = (Spread){.count = values.count,

@@ -19,30 +19,30 @@
 #include "core/math/student_t.h"
 
 // sqrt(quantile / d) of a chi-square, beside that of d = 1.
-static double narrowing(double d) {
+static double stopping_rule_narrowing(double d) {
     const double z = student_quantile(2 * ENSEMBLE_CONFIDENCE - 1, 0);
     const double of_one = pow(1 - 2 / 9.0 + z * sqrt(2 / 9.0), 1.5);
     const double part = 2 / (9 * fmax(d, 1));
     return pow(1 - part + z * sqrt(part), 1.5) / of_one;
 }
 
-double rule_error(const Spread *spread, size_t count, size_t all) {
+double stopping_rule_error(const Spread *spread, size_t count, size_t all) {
     if (count >= all)
         return 0;
     if (count < 2)
         return INFINITY;
     const double n = (double)count;
     const double t = student_quantile(ENSEMBLE_CONFIDENCE, count - 1);
-    const double q =
-        t * narrowing(spread->freedom) + fabs(spread->skewness) * (2 * t * t + 1) / (6 * sqrt(n));
+    const double q = t * stopping_rule_narrowing(spread->freedom) +
+                     fabs(spread->skewness) * (2 * t * t + 1) / (6 * sqrt(n));
     return q * spread->relative * sqrt(1 / n - 1 / (double)all);
 }
 
-size_t rule_predict(const Spread *spread, size_t all, double target) {
+size_t stopping_rule_predict(const Spread *spread, size_t all, double target) {
     size_t least = spread->count, most = all;
     while (least < most) {
         const size_t middle = least + (most - least) / 2;
-        if (rule_error(spread, middle, all) <= target)
+        if (stopping_rule_error(spread, middle, all) <= target)
             most = middle;
         else
             least = middle + 1;
@@ -50,6 +50,6 @@ size_t rule_predict(const Spread *spread, size_t all, double target) {
     return least;
 }
 
-size_t rule_next_look(size_t count) {
+size_t stopping_rule_next_check(size_t count) {
     return count < ENSEMBLE_PILOT ? ENSEMBLE_PILOT : count + (count + 3) / 4;
 }

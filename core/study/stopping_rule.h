@@ -20,12 +20,12 @@ enum { ENSEMBLE_PILOT = 8 };
 
 // The error of the mean of `count` of `all` runs against the mean of all, relative to it, that is
 // not passed with ENSEMBLE_CONFIDENCE; 0 where none is left.
-double rule_error(const Spread *spread, size_t count, size_t all);
+double stopping_rule_error(const Spread *spread, size_t count, size_t all);
 
 // The fewest runs, from those made on, by which the error is foretold to be within `target`.
-size_t rule_predict(const Spread *spread, size_t all, double target);
+size_t stopping_rule_predict(const Spread *spread, size_t all, double target);
 
 // The number of runs at which the error is looked at after it was at `count`.
-size_t rule_next_look(size_t count);
+size_t stopping_rule_next_check(size_t count);
 
 #endif

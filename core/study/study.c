@@ -32,8 +32,8 @@ void study_free(StudyWork *work) {
         work->kind->members->free(work);
 }
 
-static Status make_member(StudyWork *work, size_t member, const StudyTools *tools,
-                          const Progress *whole, Problem *problem) {
+static Status study_make_member(StudyWork *work, size_t member, const StudyTools *tools,
+                                const Progress *whole, Problem *problem) {
     const StudyMembers *members = work->kind->members;
     const double share = 1 / (double)work->expected;
     ProgressRange range = progress_range(whole, (double)member * share, share);
@@ -50,14 +50,14 @@ static Status make_member(StudyWork *work, size_t member, const StudyTools *tool
     return status;
 }
 
-static Status make_all(const Variant *study, const Simulation *simulation, const StudyTools *tools,
-                       Variant **answer, Problem *problem) {
+static Status study_make_all(const Variant *study, const Simulation *simulation,
+                             const StudyTools *tools, Variant **answer, Problem *problem) {
     StudyWork *work;
     ProgressRange range = progress_range(tools->progress, STUDY_BEGUN, 1 - STUDY_BEGUN);
     const Progress whole = progress_range_view(&range);
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
-        status = make_member(work, i, tools, &whole, problem);
+        status = study_make_member(work, i, tools, &whole, problem);
     if (status == STATUS_OK)
         status = study_end(work, tools, problem);
     study_free(work);
@@ -69,7 +69,7 @@ Status study_run(const Variant *study, const Simulation *simulation, const Study
     const StudyKind *kind = study_kind(study);
     Status status;
     if (kind->members != NULL) {
-        status = make_all(study, simulation, tools, answer, problem);
+        status = study_make_all(study, simulation, tools, answer, problem);
     } else {
         *answer = variant_new(kind->answer);
         status = *answer == NULL

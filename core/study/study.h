@@ -99,4 +99,24 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
 Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem);
 void study_free(StudyWork *work); // NULL is fine
 
+// All that a document asks: a scene, and perhaps a study of it.
+typedef struct StudyRequest {
+    Simulation simulation;
+    Variant *study; // a Study; NULL: none
+} StudyRequest;
+
+// Without a study, to the byte what simulation_fields are: in JSON and in the canonical form.
+extern const Field study_request_fields[];
+
+void study_request_clear(StudyRequest *request);
+
+// simulation_complete, and the same for the study: validates and completes it, and refuses one
+// whose estimated cost is above its limit, a multiple of limits->steps.
+Status study_request_complete(StudyRequest *request, const SimulationLimits *limits,
+                              Warnings *warnings, Problem *problem);
+
+// Estimated cost of the whole. `problem` may be NULL.
+Status study_request_cost(const StudyRequest *request, const SimulationLimits *limits, Cost *cost,
+                          Problem *problem);
+
 #endif

@@ -7,7 +7,7 @@
 #include "core/simulation/accuracy_target.h"
 #include "core/solve/solvers.h"
 
-Status member_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
+Status study_run_copy(const Simulation *simulation, Simulation *target, Problem *problem) {
     if (fields_copy(simulation_fields, simulation, target) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
     Texts *sampled = &target->output.channels;
@@ -18,7 +18,7 @@ Status member_copy(const Simulation *simulation, Simulation *target, Problem *pr
     return STATUS_OK;
 }
 
-Status member_settle(Simulation *target, Problem *problem) {
+Status study_run_fix_solver(Simulation *target, Problem *problem) {
     if (!aim_is_asked(target))
         return STATUS_OK;
     Variant *accuracy = variant_new(solver_kinds.at(0));
@@ -30,7 +30,13 @@ Status member_settle(Simulation *target, Problem *problem) {
     return STATUS_OK;
 }
 
-char *member_why(const Problem *fault) {
+bool study_run_has_force(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    return scene->dampers.count > 0 &&
+           dampers_contact_law(&scene->dampers, scene_contact(scene))->form != CONTACT_IMPULSIVE;
+}
+
+char *study_run_why(const Problem *fault) {
     char text[sizeof(Fault)];
     if (fault->count > 0)
         snprintf(text, sizeof text, "%s: %s", fault->faults[0].pointer, fault->faults[0].detail);
@@ -40,7 +46,7 @@ char *member_why(const Problem *fault) {
 }
 
 // What the fold needs; the ledger and all else goes at once.
-static void keep(Outcome *outcome, MemberPart *part) {
+static void study_run_keep(Outcome *outcome, StudyPart *part) {
     part->steps = outcome->steps;
     part->summary = outcome->summary;
     part->spectrum = outcome->spectrum;
@@ -48,28 +54,28 @@ static void keep(Outcome *outcome, MemberPart *part) {
     outcome_unref(outcome);
 }
 
-Status member_run(const Simulation *member, const StudyTools *tools, MemberPart *part,
-                  Problem *problem) {
+Status study_run_make(const Simulation *member, const StudyTools *tools, StudyPart *part,
+                      Problem *problem) {
     Outcome *outcome = NULL;
-    *part = (MemberPart){.steps = (double)NAN};
+    *part = (StudyPart){.steps = (double)NAN};
     (void)fields_default(summary_fields, &part->summary); // absent: nothing to allocate
     part->status =
         simulation_run(member, tools->limits, tools->progress, tools->workspace, &outcome, problem);
     if (part->status == STATUS_OK) {
-        keep(outcome, part);
+        study_run_keep(outcome, part);
         return STATUS_OK;
     }
-    if (member_ends_all(part->status))
+    if (study_run_ends_all(part->status))
         return part->status;
-    part->why = member_why(problem);
+    part->why = study_run_why(problem);
     problem_clear(problem);
     return part->why != NULL
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a run of the study");
 }
 
-void member_clear(MemberPart *part) {
+void study_run_clear(StudyPart *part) {
     free(part->why);
     spectrum_clear(&part->spectrum);
-    *part = (MemberPart){.why = NULL};
+    *part = (StudyPart){.why = NULL};
 }

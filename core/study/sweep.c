@@ -2,12 +2,240 @@
 // points are judged all at once, of many the ends first and the rest when the sweep begins.
 #include "core/study/sweep.h"
 
+#include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
-#include "core/study/sweep_run.h"
-#include "core/study/sweep_validation.h"
+#include "core/study/sweep_grid.h"
+
+// What the study has at hand.
+typedef struct SweepWork {
+    StudyWork work;
+    SweepGrid *plan;
+    Sweep *answer;
+} SweepWork;
+
+size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point) {
+    size_t stride = 1;
+    if (sweep->mode == SWEEP_LIST)
+        return point;
+    for (size_t i = axis + 1; i < sweep->axes.count; i++)
+        stride *= sweep->axes.at[i].values.count;
+    return point / stride % sweep->axes.at[axis].values.count;
+}
+
+static char *sweep_scalar_text(const SweepStudy *study, const SweepGrid *plan, size_t axis,
+                               size_t index) {
+    const Texts *values = &study->axes.at[axis].values;
+    if (values->count > 0)
+        return strdup(values->at[index]);
+    const Scalar *value = &plan->axes[axis].at[index];
+    char digits[32];
+    text_real(digits, value->number);
+    return strdup(digits);
+}
+
+static Status sweep_fill_axis(const SweepStudy *study, const SweepGrid *plan, size_t axis,
+                              SweepAxisValues *told) {
+    const SweepValues *values = &plan->axes[axis];
+    const char *unit = values->is_tag ? NULL : values->field->unit;
+    told->pointer = strdup(values->pointer);
+    told->unit = unit == NULL ? NULL : strdup(unit);
+    told->values.at = calloc(values->count, sizeof *told->values.at);
+    if (told->pointer == NULL || (told->unit == NULL && unit != NULL) || told->values.at == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < values->count; i++) {
+        char *text = sweep_scalar_text(study, plan, axis, i);
+        if (text == NULL)
+            return STATUS_NO_MEMORY;
+        told->values.at[told->values.count++] = text;
+    }
+    return STATUS_OK;
+}
+
+static Status sweep_fill(const SweepStudy *study, const SweepGrid *plan, Sweep *sweep) {
+    sweep->points = plan->points;
+    sweep->mode = study->mode;
+    sweep->axes.at = calloc(plan->axis_count, sizeof *sweep->axes.at);
+    sweep->metrics.at = calloc(study->metrics.count, sizeof *sweep->metrics.at);
+    if (sweep->axes.at == NULL || sweep->metrics.at == NULL)
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i < plan->axis_count; i++) {
+        sweep->axes.count = i + 1;
+        TRY(sweep_fill_axis(study, plan, i, &sweep->axes.at[i]));
+    }
+    for (size_t i = 0; i < study->metrics.count; i++) {
+        char *name = strdup(study->metrics.at[i]);
+        if (name == NULL)
+            return STATUS_NO_MEMORY;
+        sweep->metrics.at[sweep->metrics.count++] = name;
+    }
+    return STATUS_OK;
+}
+
+Status sweep_describe(const SweepStudy *study, const Simulation *simulation, Sweep *sweep,
+                      Problem *problem) {
+    SweepGrid *plan;
+    TRY(sweep_grid_new(study, simulation, NULL, &plan, problem));
+    const Status status = sweep_fill(study, plan, sweep);
+    sweep_grid_free(plan);
+    return status == STATUS_OK ? status
+                               : problem_set(problem, status, "no memory for the sweep's axes");
+}
+
+static double sweep_metric(const char *name, const Outcome *outcome) {
+    size_t offset = 0;
+    const Field *row = fields_find(summary_fields, name, &offset);
+    if (row == NULL)
+        return outcome->steps;
+    const char *member = (const char *)&outcome->summary + offset + row->offset;
+    if (row->kind != FIELD_KIND_COUNT)
+        return *(const double *)(const void *)member;
+    const uint64_t count = *(const uint64_t *)(const void *)member;
+    return count == COUNT_ABSENT ? (double)NAN : (double)count;
+}
+
+static SweepStatus sweep_status(Status status) {
+    return status == STATUS_INVALID    ? SWEEP_INVALID
+           : status == STATUS_UNSTABLE ? SWEEP_UNSTABLE
+           : status == STATUS_LIMIT    ? SWEEP_LIMIT
+                                       : SWEEP_FAILED;
+}
+
+static Status sweep_run_point(const SweepGrid *plan, size_t point, const SimulationLimits *limits,
+                              const Progress *progress, Workspace *workspace, double *values,
+                              SweepStatus *status, Problem *fault) {
+    const Texts *metrics = &plan->study->metrics;
+    Simulation scene;
+    Outcome *outcome = NULL;
+    problem_clear(fault);
+    Status made = sweep_grid_scene(plan, point, true, limits, &scene, fault);
+    if (made == STATUS_OK)
+        made = simulation_run(&scene, limits, progress, workspace, &outcome, fault);
+    simulation_clear(&scene);
+    for (size_t i = 0; i < metrics->count; i++)
+        values[i] = made == STATUS_OK ? sweep_metric(metrics->at[i], outcome) : (double)NAN;
+    outcome_unref(outcome);
+    *status = made == STATUS_OK ? SWEEP_MADE : sweep_status(made);
+    return made == STATUS_CANCELLED || made == STATUS_NO_MEMORY ? made : STATUS_OK;
+}
+
+Status sweep_add_failure(SweepFailures *failures, SweepStatus status, uint64_t point,
+                         const char *detail) {
+    for (size_t i = 0; i < failures->count; i++)
+        if (failures->at[i].status == (int)status) {
+            failures->at[i].count++;
+            return STATUS_OK;
+        }
+    SweepFailure *at = realloc(failures->at, (failures->count + 1) * sizeof *at);
+    char *text = strdup(detail);
+    if (at != NULL)
+        failures->at = at;
+    if (at == NULL || text == NULL) {
+        free(text);
+        return STATUS_NO_MEMORY;
+    }
+    at[failures->count++] = (SweepFailure){(int)status, 1, point, text};
+    return STATUS_OK;
+}
+
+static Status sweep_make(const StudyWork *of, size_t point, const StudyTools *tools, void **made,
+                         Problem *problem) {
+    const SweepGrid *plan = ((const SweepWork *)(const void *)of)->plan;
+    SweepPart *part = calloc(1, sizeof *part + plan->study->metrics.count * sizeof(double));
+    *made = part;
+    if (part == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a point");
+    TRY(sweep_run_point(plan, point, tools->limits, tools->progress, tools->workspace, part->values,
+                        &part->status, problem));
+    if (part->status == SWEEP_MADE)
+        return STATUS_OK;
+    part->why = strdup(problem->detail);
+    problem_clear(problem);
+    return part->why != NULL ? STATUS_OK
+                             : problem_set(problem, STATUS_NO_MEMORY, "no memory for a point");
+}
+
+static void sweep_drop(void *made) {
+    SweepPart *part = made;
+    if (part != NULL)
+        free(part->why);
+    free(part);
+}
+
+// Only where rows are kept here and nowhere else is there room for them.
+static Status sweep_make_table(SweepTable *table, size_t points, size_t metrics, Problem *problem) {
+    table->points.at = calloc(points, sizeof(double));
+    table->statuses.at = calloc(points, sizeof(double));
+    table->values.at = calloc(points * metrics, sizeof(double));
+    table->failed = 0;
+    return table->points.at != NULL && table->statuses.at != NULL && table->values.at != NULL
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu points", points);
+}
+
+static Status sweep_fold(StudyWork *of, size_t point, void *made, Problem *problem) {
+    SweepTable *table = &((SweepWork *)(void *)of)->answer->table;
+    const size_t metrics = ((const SweepWork *)(const void *)of)->plan->study->metrics.count;
+    const SweepPart *part = made;
+    if (point == 0)
+        TRY(sweep_make_table(table, of->members, metrics, problem));
+    table->points.at[table->points.count++] = (double)point;
+    table->statuses.at[table->statuses.count++] = part->status;
+    memcpy(&table->values.at[table->values.count], part->values, metrics * sizeof *part->values);
+    table->values.count += metrics;
+    if (part->status == SWEEP_MADE)
+        return STATUS_OK;
+    table->failed++;
+    const Status added = sweep_add_failure(&table->failures, part->status, point, part->why);
+    return added == STATUS_OK ? added : problem_set(problem, added, "no memory for a point");
+}
+
+static void sweep_free(StudyWork *of) {
+    SweepWork *work = (SweepWork *)(void *)of;
+    sweep_grid_free(work->plan);
+    free(work);
+}
+
+static Status sweep_begin(const Study *asked, const Simulation *simulation, const StudyTools *tools,
+                          Variant *told, StudyWork **made, Problem *problem) {
+    const SweepStudy *study = (const SweepStudy *)(const void *)asked;
+    SweepWork *work = calloc(1, sizeof *work);
+    if (work == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep");
+    work->answer = (Sweep *)(void *)told;
+    Status status = sweep_grid_new(study, simulation, tools->limits, &work->plan, problem);
+    if (status == STATUS_OK)
+        status =
+            sweep_grid_check_points(work->plan, SIZE_MAX, tools->limits, tools->progress, problem);
+    if (status == STATUS_OK) {
+        status = sweep_fill(study, work->plan, work->answer);
+        if (status != STATUS_OK)
+            (void)problem_set(problem, status, "no memory for the sweep's axes");
+    }
+    if (status != STATUS_OK) {
+        sweep_free(&work->work);
+        return status;
+    }
+    work->work =
+        (StudyWork){.kind = &study_sweep,
+                    .members = work->plan->points,
+                    .wanted = work->plan->points,
+                    .expected = work->plan->points,
+                    .part_bytes = sizeof(SweepPart) + study->metrics.count * sizeof(double)};
+    *made = &work->work;
+    return STATUS_OK;
+}
+
+const StudyMembers sweep_members = {
+    .begin = sweep_begin,
+    .make = sweep_make,
+    .fold = sweep_fold,
+    .drop = sweep_drop,
+    .free = sweep_free,
+};
 
 // Small scenes' points that are judged while whoever submits them waits: some 20 ms.
 enum { CHECKED_AT_ONCE = 5000 };
@@ -73,10 +301,10 @@ static const Field study_fields[] = {
     FIELD_END
 };
 
-static const Field told_fields[] = {
-    FIELD_TEXT(SweepTold, pointer, 0, PRESENCE_OPTIONAL, 0, "what varies"),
-    FIELD_TEXT(SweepTold, unit, 0, PRESENCE_OPTIONAL, 0, "of its numbers"),
-    FIELD_TEXTS(SweepTold, values, NULL, NULL, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "all that it takes"),
+static const Field axis_values_fields[] = {
+    FIELD_TEXT(SweepAxisValues, pointer, 0, PRESENCE_OPTIONAL, 0, "what varies"),
+    FIELD_TEXT(SweepAxisValues, unit, 0, PRESENCE_OPTIONAL, 0, "of its numbers"),
+    FIELD_TEXTS(SweepAxisValues, values, NULL, NULL, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "all that it takes"),
     FIELD_END
 };
 
@@ -100,14 +328,14 @@ static const Field table_fields[] = {
 static const Field answer_fields[] = {
     FIELD_COUNT(Sweep, points, NULL, AT_MIN(1), OPTIONAL, "points asked for"),
     FIELD_CHOICE(Sweep, mode, sweep_mode_names, OPTIONAL, "how the axes go together"),
-    FIELD_LIST(Sweep, axes, told_fields, 0, PRESENCE_DEFAULT, "what varies, in the order of the changes"),
+    FIELD_LIST(Sweep, axes, axis_values_fields, 0, PRESENCE_DEFAULT, "what varies, in the order of the changes"),
     FIELD_TEXTS(Sweep, metrics, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "what is kept of each point"),
     FIELD_ITEM_OR_NULL(Sweep, table, table_fields, PRESENCE_OPTIONAL, "the rows, where they are not kept beside the result"),
     FIELD_END
 };
 // clang-format on
 
-static Status check_metrics(const SweepStudy *study, Problem *problem) {
+static Status sweep_check_metrics(const SweepStudy *study, Problem *problem) {
     for (size_t i = 0; i < study->metrics.count; i++)
         for (size_t k = 0; k < i; k++)
             if (strcmp(study->metrics.at[i], study->metrics.at[k]) == 0) {
@@ -121,28 +349,28 @@ static Status check_metrics(const SweepStudy *study, Problem *problem) {
     return STATUS_OK;
 }
 
-static void fill_spacing(SweepAxes *axes) {
+static void sweep_fill_spacing(SweepAxes *axes) {
     for (size_t i = 0; i < axes->count; i++)
         if (axes->at[i].values.count == 0 && axes->at[i].spacing == CHOICE_ABSENT)
             axes->at[i].spacing = SWEEP_LINEAR;
 }
 
-static Status study_complete(Study *asked, const Simulation *simulation,
+static Status sweep_complete(Study *asked, const Simulation *simulation,
                              const SimulationLimits *limits, Problem *problem) {
     SweepStudy *study = (SweepStudy *)(void *)asked;
-    fill_spacing(&study->axes);
-    const Status metrics = check_metrics(study, problem);
-    const Status status = sweep_judge(study, simulation, CHECKED_AT_ONCE, limits, problem);
+    sweep_fill_spacing(&study->axes);
+    const Status metrics = sweep_check_metrics(study, problem);
+    const Status status = sweep_grid_validate(study, simulation, CHECKED_AT_ONCE, limits, problem);
     return status == STATUS_OK ? metrics : status;
 }
 
-static Status study_cost(const Study *asked, const Simulation *simulation,
+static Status sweep_cost(const Study *asked, const Simulation *simulation,
                          const SimulationLimits *limits, double *steps, Problem *problem) {
-    SweepPlan *plan;
-    TRY(sweep_plan_new((const SweepStudy *)(const void *)asked, simulation, limits, &plan,
+    SweepGrid *plan;
+    TRY(sweep_grid_new((const SweepStudy *)(const void *)asked, simulation, limits, &plan,
                        problem));
-    *steps = sweep_steps(plan, limits);
-    sweep_plan_free(plan);
+    *steps = sweep_grid_steps(plan, limits);
+    sweep_grid_free(plan);
     return STATUS_OK;
 }
 
@@ -154,7 +382,7 @@ const StudyKind study_sweep = {
     .answer = &sweep_answer,
     .lessen = "ask for fewer points, or a cheaper scene",
     .most_runs = most_runs,
-    .complete = study_complete,
-    .cost = study_cost,
+    .complete = sweep_complete,
+    .cost = sweep_cost,
     .members = &sweep_members,
 };

@@ -75,15 +75,15 @@ typedef enum SweepStatus {
 extern const char *const sweep_status_names[];
 
 // An axis as it is told: all its values.
-typedef struct SweepTold {
+typedef struct SweepAxisValues {
     char *pointer, *unit;
     Texts values;
-} SweepTold;
+} SweepAxisValues;
 
-typedef struct SweepTolds {
-    SweepTold *at;
+typedef struct SweepAxesValues {
+    SweepAxisValues *at;
     size_t count;
-} SweepTolds;
+} SweepAxesValues;
 
 // Points that failed in one way.
 typedef struct SweepFailure {
@@ -111,7 +111,7 @@ typedef struct Sweep {
     Variant variant;
     uint64_t points; // asked for
     int mode;        // SweepMode
-    SweepTolds axes;
+    SweepAxesValues axes;
     Texts metrics;
     SweepTable table; // all absent in a result: its rows are kept beside it
 } Sweep;
@@ -123,7 +123,20 @@ size_t sweep_value_index(const Sweep *sweep, size_t axis, size_t point);
 size_t sweep_points(const SweepStudy *study);
 
 // Fills all but the table.
-Status sweep_tell(const SweepStudy *study, const Simulation *simulation, Sweep *sweep,
-                  Problem *problem);
+Status sweep_describe(const SweepStudy *study, const Simulation *simulation, Sweep *sweep,
+                      Problem *problem);
+
+// Adds a point that failed to those that failed in the same way. STATUS_NO_MEMORY.
+Status sweep_add_failure(SweepFailures *failures, SweepStatus status, uint64_t point,
+                         const char *detail);
+
+// Result of a point, a part of the study's members: freed with it.
+typedef struct SweepPart {
+    SweepStatus status;
+    char *why; // NULL where it was made
+    double values[];
+} SweepPart;
+
+extern const StudyMembers sweep_members;
 
 #endif

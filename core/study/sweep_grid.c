@@ -4,6 +4,8 @@
 //
 // and in a list it is each axis's own index. Its scene is a copy of the sweep's with those values
 // set, completed like any other.
+// A point is judged by making its scene. Its faults are told where their cause stands: at a value
+// of an axis, not in a scene that nobody wrote.
 #include "core/study/sweep_grid.h"
 
 #include <stdint.h>
@@ -19,20 +21,21 @@ enum {
     COST_SCENES = 2000, // what they may cost
     AFFORDED_MIN = 16,
     SWEEP_VALUES = 1 << 21,
+    RANGE_SAMPLES = 512,
 };
 
-static bool is_range(const SweepAxis *axis) {
+static bool sweep_grid_is_range(const SweepAxis *axis) {
     return axis->values.count == 0;
 }
 
-static size_t axis_length(const SweepAxis *axis) {
-    return is_range(axis) ? (size_t)axis->count : axis->values.count;
+static size_t sweep_grid_axis_length(const SweepAxis *axis) {
+    return sweep_grid_is_range(axis) ? (size_t)axis->count : axis->values.count;
 }
 
 size_t sweep_points(const SweepStudy *study) {
     size_t points = study->axes.count > 0;
     for (size_t i = 0; i < study->axes.count; i++) {
-        const size_t length = axis_length(&study->axes.at[i]);
+        const size_t length = sweep_grid_axis_length(&study->axes.at[i]);
         if (study->mode == SWEEP_LIST && i > 0)
             continue; // all are as long as the first
         if (length > 0 && points > SIZE_MAX / length)
@@ -43,7 +46,7 @@ size_t sweep_points(const SweepStudy *study) {
 }
 
 // Equal differences as they are: whole numbers stay whole.
-static double range_value(const SweepAxis *axis, size_t index) {
+static double sweep_grid_range_value(const SweepAxis *axis, size_t index) {
     const double last = (double)(axis->count - 1);
     if (index == 0)
         return axis->from;
@@ -54,22 +57,22 @@ static double range_value(const SweepAxis *axis, size_t index) {
                : axis->from + (axis->to - axis->from) / last * (double)index;
 }
 
-static Status no_memory(Problem *problem) {
+static Status sweep_grid_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep's points");
 }
 
-static Status read_values(const SweepAxis *axis, SweepValues *values, Problem *problem) {
+static Status sweep_grid_read_values(const SweepAxis *axis, SweepValues *values, Problem *problem) {
     size_t room = 1;
     for (size_t i = 0; i < axis->values.count; i++)
         room += strlen(axis->values.at[i]) + 1;
     values->at = calloc(values->count, sizeof *values->at);
     values->texts = malloc(room);
     if (values->at == NULL || values->texts == NULL)
-        return no_memory(problem);
+        return sweep_grid_no_memory(problem);
     char *text = values->texts;
     for (size_t i = 0; i < values->count; i++) {
-        if (is_range(axis)) {
-            values->at[i] = scalar_number(range_value(axis, i));
+        if (sweep_grid_is_range(axis)) {
+            values->at[i] = scalar_number(sweep_grid_range_value(axis, i));
             continue;
         }
         if (!scalar_read(axis->values.at[i], &values->at[i], text))
@@ -79,7 +82,7 @@ static Status read_values(const SweepAxis *axis, SweepValues *values, Problem *p
     return STATUS_OK;
 }
 
-void sweep_plan_free(SweepPlan *plan) {
+void sweep_grid_free(SweepGrid *plan) {
     if (plan == NULL)
         return;
     for (size_t i = 0; plan->axes != NULL && i < plan->axis_count; i++) {
@@ -90,13 +93,13 @@ void sweep_plan_free(SweepPlan *plan) {
     free(plan);
 }
 
-size_t sweep_plan_index(const SweepPlan *plan, size_t axis, size_t point) {
+size_t sweep_grid_index(const SweepGrid *plan, size_t axis, size_t point) {
     const SweepValues *values = &plan->axes[axis];
     return point / values->stride % values->count;
 }
 
 // A side of its own, where the scene has one buffer for both.
-static Status part_buffers(const char *pointer, Simulation *target) {
+static Status sweep_grid_split_buffer(const char *pointer, Simulation *target) {
     static const char before[] = "/dampers/";
     if (strncmp(pointer, before, sizeof before - 1) != 0)
         return STATUS_OK;
@@ -118,7 +121,7 @@ static Status part_buffers(const char *pointer, Simulation *target) {
 
 // What a name stands for: who changes a number takes the name away. But a completed scene has left
 // out what its contact model does not use, which a point's may.
-static Status fill_material(const Buffer *pinned, Buffer *buffer) {
+static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
     if (isnan(buffer->restitution))
         buffer->restitution = pinned->restitution;
     if (isnan(buffer->contact_time))
@@ -137,20 +140,20 @@ static Status fill_material(const Buffer *pinned, Buffer *buffer) {
 }
 
 // Materials' numbers come from where the study pins them.
-static Status fill_materials(const Buffers *materials, Simulation *target) {
+static Status sweep_grid_fill_materials(const Buffers *materials, Simulation *target) {
     for (size_t i = 0; i < 3 * target->scene.dampers.count; i++) {
         Damper *damper = &target->scene.dampers.at[i / 3];
         Buffer *const sides[] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
         Buffer *buffer = sides[i % 3];
         for (size_t k = 0; buffer->material != NULL && k < materials->count; k++)
             if (strcmp(materials->at[k].material, buffer->material) == 0)
-                TRY(fill_material(&materials->at[k], buffer));
+                TRY(sweep_grid_fill_material(&materials->at[k], buffer));
     }
     return STATUS_OK;
 }
 
 // Likewise the ground motion that the scene names now.
-static Status fill_record(const PinnedRecords *records, Simulation *target) {
+static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *target) {
     ExcitationRecord *record = (ExcitationRecord *)(void *)target->scene.excitation;
     if (excitation_kind(&record->excitation) != &excitation_record || record->name == NULL)
         return STATUS_OK;
@@ -163,55 +166,55 @@ static Status fill_record(const PinnedRecords *records, Simulation *target) {
     return STATUS_OK;
 }
 
-static void clear_texts(Texts *texts) {
+static void sweep_grid_clear_texts(Texts *texts) {
     for (size_t i = 0; i < texts->count; i++)
         free(texts->at[i]);
     free(texts->at);
     *texts = (Texts){NULL, 0};
 }
 
-static void strip(Simulation *target) {
-    clear_texts(&target->output.channels);
-    clear_texts(&target->output.psd.channels);
+static void sweep_grid_clear_output(Simulation *target) {
+    sweep_grid_clear_texts(&target->output.channels);
+    sweep_grid_clear_texts(&target->output.psd.channels);
     target->output.impacts = false;
 }
 
 // Without judging it. `*axis` is the one whose value cannot be there.
-static Status apply(const SweepPlan *plan, size_t point, Simulation *target, size_t *axis,
-                    char why[POINTER_SENTENCE]) {
+static Status sweep_grid_apply(const SweepGrid *plan, size_t point, Simulation *target,
+                               size_t *axis, char why[POINTER_SENTENCE]) {
     TRY(fields_copy(simulation_fields, plan->simulation, target));
     for (size_t i = 0; i < plan->axis_count; i++) {
         const SweepValues *values = &plan->axes[i];
         if (values->field == NULL)
             continue; // its pointer leads nowhere, which was told
         *axis = i;
-        TRY(part_buffers(values->pointer, target));
+        TRY(sweep_grid_split_buffer(values->pointer, target));
         TRY(pointer_set(simulation_fields, target, values->pointer,
-                        &values->at[sweep_plan_index(plan, i, point)], why));
+                        &values->at[sweep_grid_index(plan, i, point)], why));
     }
-    TRY(fill_materials(&plan->study->materials, target));
+    TRY(sweep_grid_fill_materials(&plan->study->materials, target));
     for (size_t i = 0; i < target->scene.dampers.count; i++)
         damper_ask_rig(&plan->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
-    return fill_record(&plan->study->records, target);
+    return sweep_grid_fill_record(&plan->study->records, target);
 }
 
-Status sweep_scene(const SweepPlan *plan, size_t point, bool is_bare,
-                   const SimulationLimits *limits, Simulation *target, Problem *problem) {
+Status sweep_grid_scene(const SweepGrid *plan, size_t point, bool is_bare,
+                        const SimulationLimits *limits, Simulation *target, Problem *problem) {
     size_t axis = 0;
     char why[POINTER_SENTENCE] = "";
-    const Status status = apply(plan, point, target, &axis, why);
+    const Status status = sweep_grid_apply(plan, point, target, &axis, why);
     if (status == STATUS_INVALID)
         return problem_add(problem, status, plan->axes[axis].pointer, "%s", why);
     if (status != STATUS_OK)
-        return no_memory(problem);
+        return sweep_grid_no_memory(problem);
     if (is_bare)
-        strip(target);
+        sweep_grid_clear_output(target);
     return simulation_complete(target, limits, NULL, problem);
 }
 
 // Measured: 3 us with one storey, 0.1 ms with 40 and 0.7 ms with 100; a record's own
 // samples are copied, those of a named one are not.
-size_t sweep_affordable(const SweepPlan *plan, size_t scenes) {
+size_t sweep_grid_affordable(const SweepGrid *plan, size_t scenes) {
     const Scene *scene = &plan->simulation->scene;
     const Excitation *excitation = scene_excitation(scene);
     const double n = (double)structure_storeys(scene_structure(scene));
@@ -224,8 +227,8 @@ size_t sweep_affordable(const SweepPlan *plan, size_t scenes) {
     return most > AFFORDED_MIN ? most : AFFORDED_MIN;
 }
 
-double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {
-    const size_t afforded = sweep_affordable(plan, COST_SCENES);
+double sweep_grid_steps(const SweepGrid *plan, const SimulationLimits *limits) {
+    const size_t afforded = sweep_grid_affordable(plan, COST_SCENES);
     const size_t most = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
     const size_t samples = plan->points < most ? plan->points : most;
     double steps = 0;
@@ -233,7 +236,7 @@ double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {
         // Odd multiples of half a part: an axis's period does not hide the other axes.
         const size_t point = (size_t)((double)plan->points * ((double)i + 0.5) / (double)samples);
         Simulation target;
-        if (sweep_scene(plan, point, true, limits, &target, NULL) == STATUS_OK)
+        if (sweep_grid_scene(plan, point, true, limits, &target, NULL) == STATUS_OK)
             steps += simulation_cost(&target).steps;
         simulation_clear(&target);
     }
@@ -241,7 +244,7 @@ double sweep_steps(const SweepPlan *plan, const SimulationLimits *limits) {
 }
 
 // What an axis asks for beside what rows can see.
-static Status check_axis(const SweepAxis *axis, size_t number, Problem *problem) {
+static Status sweep_grid_check_axis(const SweepAxis *axis, size_t number, Problem *problem) {
     char place[PLACE];
     snprintf(place, sizeof place, "/study/axes/%zu", number);
     const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
@@ -260,12 +263,12 @@ static Status check_axis(const SweepAxis *axis, size_t number, Problem *problem)
     return STATUS_OK;
 }
 
-static Status check_axes(const SweepPlan *plan, Problem *problem) {
+static Status sweep_grid_check_axes(const SweepGrid *plan, Problem *problem) {
     const SweepAxes *axes = &plan->study->axes;
     Status status = STATUS_OK;
     for (size_t i = 0; i < axes->count; i++) {
         char place[PLACE];
-        if (check_axis(&axes->at[i], i, problem) != STATUS_OK)
+        if (sweep_grid_check_axis(&axes->at[i], i, problem) != STATUS_OK)
             status = STATUS_INVALID;
         for (size_t k = 0; k < i; k++)
             if (strcmp(axes->at[i].pointer, axes->at[k].pointer) == 0) {
@@ -275,25 +278,26 @@ static Status check_axes(const SweepPlan *plan, Problem *problem) {
             }
         snprintf(place, sizeof place, "/study/axes/%zu", i);
         if (status == STATUS_OK && plan->study->mode == SWEEP_LIST &&
-            axis_length(&axes->at[i]) != axis_length(&axes->at[0]))
+            sweep_grid_axis_length(&axes->at[i]) != sweep_grid_axis_length(&axes->at[0]))
             status = problem_add(problem, STATUS_INVALID, place,
                                  "has %zu values, the first axis has %zu: in a list all are as "
                                  "long",
-                                 axis_length(&axes->at[i]), axis_length(&axes->at[0]));
+                                 sweep_grid_axis_length(&axes->at[i]),
+                                 sweep_grid_axis_length(&axes->at[0]));
     }
     return status;
 }
 
 // Every pointer leads somewhere, by values of the axes before it.
-static Status check_pointers(SweepPlan *plan, Problem *problem) {
+static Status sweep_grid_check_pointers(SweepGrid *plan, Problem *problem) {
     Simulation scene;
     Status status = fields_copy(simulation_fields, plan->simulation, &scene);
     if (status != STATUS_OK)
-        return no_memory(problem);
+        return sweep_grid_no_memory(problem);
     for (size_t i = 0; i < plan->axis_count && status != STATUS_NO_MEMORY; i++) {
         SweepValues *values = &plan->axes[i];
         char why[POINTER_SENTENCE];
-        if (part_buffers(values->pointer, &scene) != STATUS_OK) {
+        if (sweep_grid_split_buffer(values->pointer, &scene) != STATUS_OK) {
             status = STATUS_NO_MEMORY;
             break;
         }
@@ -315,17 +319,17 @@ static Status check_pointers(SweepPlan *plan, Problem *problem) {
             status = set;
     }
     simulation_clear(&scene);
-    return status == STATUS_NO_MEMORY ? no_memory(problem) : status;
+    return status == STATUS_NO_MEMORY ? sweep_grid_no_memory(problem) : status;
 }
 
 // All axes are held in memory, value by value.
-static Status check_size(const SweepStudy *study, const SimulationLimits *limits,
-                         Problem *problem) {
+static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLimits *limits,
+                                    Problem *problem) {
     const size_t points = sweep_points(study);
     const size_t most = limits != NULL && limits->points > 0 ? limits->points : SWEEP_POINTS;
     size_t values = 0;
     for (size_t i = 0; i < study->axes.count; i++)
-        values += axis_length(&study->axes.at[i]);
+        values += sweep_grid_axis_length(&study->axes.at[i]);
     if (limits != NULL && points > most)
         return problem_add(
             problem, STATUS_INVALID, "/study/axes",
@@ -339,22 +343,22 @@ static Status check_size(const SweepStudy *study, const SimulationLimits *limits
     return STATUS_OK;
 }
 
-Status sweep_plan_make(const SweepStudy *study, const Simulation *simulation,
-                       const SimulationLimits *limits, SweepPlan **made, Problem *problem) {
-    SweepPlan *plan = calloc(1, sizeof *plan);
+Status sweep_grid_make(const SweepStudy *study, const Simulation *simulation,
+                       const SimulationLimits *limits, SweepGrid **made, Problem *problem) {
+    SweepGrid *plan = calloc(1, sizeof *plan);
     *made = NULL;
     if (plan == NULL)
-        return no_memory(problem);
+        return sweep_grid_no_memory(problem);
     plan->study = study;
     plan->simulation = simulation;
-    Status status = check_axes(plan, problem);
+    Status status = sweep_grid_check_axes(plan, problem);
     if (status == STATUS_OK)
-        status = check_size(study, limits, problem);
+        status = sweep_grid_check_size(study, limits, problem);
     if (status == STATUS_OK) {
         plan->points = sweep_points(study);
         plan->axes = calloc(study->axes.count, sizeof *plan->axes);
         if (plan->axes == NULL)
-            status = no_memory(problem);
+            status = sweep_grid_no_memory(problem);
         else
             plan->axis_count = study->axes.count;
     }
@@ -362,25 +366,152 @@ Status sweep_plan_make(const SweepStudy *study, const Simulation *simulation,
     for (size_t i = plan->axis_count; i-- > 0 && status == STATUS_OK;) {
         SweepValues *values = &plan->axes[i];
         values->pointer = study->axes.at[i].pointer;
-        values->count = axis_length(&study->axes.at[i]);
+        values->count = sweep_grid_axis_length(&study->axes.at[i]);
         values->stride = study->mode == SWEEP_LIST ? 1 : stride;
         stride *= values->count;
-        status = read_values(&study->axes.at[i], values, problem);
+        status = sweep_grid_read_values(&study->axes.at[i], values, problem);
     }
     if (status != STATUS_OK) {
-        sweep_plan_free(plan);
+        sweep_grid_free(plan);
         return status;
     }
     *made = plan;
-    return check_pointers(plan, problem);
+    return sweep_grid_check_pointers(plan, problem);
 }
 
-Status sweep_plan_new(const SweepStudy *study, const Simulation *simulation,
-                      const SimulationLimits *limits, SweepPlan **made, Problem *problem) {
-    const Status status = sweep_plan_make(study, simulation, limits, made, problem);
+Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
+                      const SimulationLimits *limits, SweepGrid **made, Problem *problem) {
+    const Status status = sweep_grid_make(study, simulation, limits, made, problem);
     if (status != STATUS_OK) {
-        sweep_plan_free(*made);
+        sweep_grid_free(*made);
         *made = NULL;
     }
+    return status;
+}
+
+// Where the value stands that the point has on an axis.
+static void sweep_grid_value_pointer(const SweepGrid *plan, size_t axis, size_t index,
+                                     char place[PLACE]) {
+    if (sweep_grid_is_range(&plan->study->axes.at[axis]))
+        snprintf(place, PLACE, "/study/axes/%zu", axis);
+    else
+        snprintf(place, PLACE, "/study/axes/%zu/values/%zu", axis, index);
+}
+
+// Whether `pointer` is `above` or lies below it.
+static bool sweep_grid_is_below(const char *pointer, const char *above) {
+    const size_t length = strlen(above);
+    return strncmp(pointer, above, length) == 0 &&
+           (pointer[length] == '\0' || pointer[length] == '/');
+}
+
+// A fault of a point's scene, told where its cause is: the last axis that leads there, else the
+// only one, else all of them.
+static void sweep_grid_report_fault(const SweepGrid *plan, size_t point, const Fault *fault,
+                                    Problem *problem) {
+    Fault told = *fault;
+    size_t cause = plan->axis_count > 1 ? plan->axis_count : 0;
+    for (size_t i = 0; i < plan->axis_count; i++)
+        if (sweep_grid_is_below(fault->pointer, plan->axes[i].pointer) ||
+            sweep_grid_is_below(plan->axes[i].pointer, fault->pointer))
+            cause = i;
+    if (cause < plan->axis_count)
+        sweep_grid_value_pointer(plan, cause, sweep_grid_index(plan, cause, point), told.pointer);
+    else
+        snprintf(told.pointer, sizeof told.pointer, "/study/axes");
+    char detail[sizeof told.detail + PLACE + 64];
+    snprintf(detail, sizeof detail, "point %zu, %s: %s", point, fault->pointer, fault->detail);
+    text_fit(told.detail, sizeof told.detail, detail);
+    problem_put(problem, STATUS_INVALID, &told);
+}
+
+static Status sweep_grid_check_point(const SweepGrid *plan, size_t point,
+                                     const SimulationLimits *limits, Problem *fault,
+                                     Problem *problem) {
+    Simulation target;
+    problem_clear(fault);
+    const Status status = sweep_grid_scene(plan, point, true, limits, &target, fault);
+    simulation_clear(&target);
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    if (status != STATUS_INVALID)
+        return problem_set(problem, status, "%s", fault->detail);
+    for (size_t i = 0; i < fault->count && i < PROBLEM_FAULTS; i++)
+        sweep_grid_report_fault(plan, point, &fault->faults[i], problem);
+    return status;
+}
+
+typedef struct Check {
+    const SweepGrid *plan;
+    const SimulationLimits *limits;
+    const Progress *progress;
+    Problem *fault, *problem;
+    bool is_faulty;
+} Check;
+
+static Status sweep_grid_check_next(Check *check, size_t point) {
+    if (!progress_advance(check->progress, (double)point / (double)check->plan->points))
+        return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
+    const Status status =
+        sweep_grid_check_point(check->plan, point, check->limits, check->fault, check->problem);
+    check->is_faulty = check->is_faulty || status == STATUS_INVALID;
+    return status == STATUS_INVALID ? STATUS_OK : status;
+}
+
+// Number k of `samples` among `count`, both ends among them.
+static size_t sweep_grid_sample(size_t k, size_t samples, size_t count) {
+    return samples == count ? k : k * (count - 1) / (samples - 1);
+}
+
+static Status sweep_grid_check_sample(Check *check, size_t most) {
+    const SweepGrid *plan = check->plan;
+    const bool is_list = plan->study->mode == SWEEP_LIST;
+    const size_t axes = is_list ? 1 : plan->axis_count;
+    const size_t share = most / axes > 2 ? most / axes : 2; // of each axis
+    TRY(sweep_grid_check_next(check, plan->points - 1));
+    for (size_t i = 0; i < axes; i++) {
+        const size_t count = plan->axes[i].count;
+        const bool is_short = is_list || sweep_grid_is_range(&plan->study->axes.at[i]);
+        const size_t wanted = is_short && share > RANGE_SAMPLES ? RANGE_SAMPLES : share;
+        const size_t samples = count < wanted ? count : wanted;
+        for (size_t k = i > 0; k < samples; k++)
+            TRY(sweep_grid_check_next(check,
+                                      sweep_grid_sample(k, samples, count) * plan->axes[i].stride));
+    }
+    return STATUS_OK;
+}
+
+static Status sweep_grid_check_all(Check *check) {
+    for (size_t i = 0; i < check->plan->points; i++)
+        TRY(sweep_grid_check_next(check, i));
+    return STATUS_OK;
+}
+
+Status sweep_grid_check_points(const SweepGrid *plan, size_t scenes, const SimulationLimits *limits,
+                               const Progress *progress, Problem *problem) {
+    Check check = {.plan = plan,
+                   .limits = limits,
+                   .progress = progress,
+                   .fault = malloc(sizeof(Problem)),
+                   .problem = problem};
+    if (check.fault == NULL)
+        return sweep_grid_no_memory(problem);
+    const size_t most = sweep_grid_affordable(plan, scenes);
+    const Status status =
+        plan->points > most ? sweep_grid_check_sample(&check, most) : sweep_grid_check_all(&check);
+    free(check.fault);
+    return status == STATUS_OK && check.is_faulty ? STATUS_INVALID : status;
+}
+
+Status sweep_grid_validate(const SweepStudy *study, const Simulation *simulation, size_t scenes,
+                           const SimulationLimits *limits, Problem *problem) {
+    SweepGrid *plan;
+    Status status = sweep_grid_make(study, simulation, limits, &plan, problem);
+    // Without limits it was judged before.
+    if (plan != NULL && limits != NULL) {
+        const Status points = sweep_grid_check_points(plan, scenes, limits, NULL, problem);
+        status = status == STATUS_OK ? points : status;
+    }
+    sweep_grid_free(plan);
     return status;
 }

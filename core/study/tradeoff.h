@@ -57,10 +57,10 @@ typedef struct TradeoffReference {
     Yardstick yardstick;
 } TradeoffReference;
 
-typedef struct TradeoffChoice {
+typedef struct TradeoffRecommendation {
     uint64_t point; // its number, from 1; COUNT_ABSENT: none keeps the error
     char *why;
-} TradeoffChoice;
+} TradeoffRecommendation;
 
 // The answer.
 typedef struct Tradeoff {
@@ -70,7 +70,7 @@ typedef struct Tradeoff {
     uint64_t repeats, trial;
     TradeoffReference reference;
     TradeoffPoints points;
-    TradeoffChoice recommendation;
+    TradeoffRecommendation recommendation;
 } Tradeoff;
 
 extern const Field tradeoff_point_fields[];

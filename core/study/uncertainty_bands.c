@@ -9,19 +9,20 @@
 
 enum { LOOK = 64 }; // frequencies between looks at the progress
 
-static Status no_memory(Problem *problem) {
+static Status uncertainty_bands_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
 }
 
-Status band_keep(BandDensities *kept, const Spectrum *spectrum, size_t most, Problem *problem) {
+Status uncertainty_bands_add(UncertaintyDensities *kept, const Spectrum *spectrum, size_t most,
+                             Problem *problem) {
     const size_t columns = spectrum->densities.count, rows = spectrum->densities.rows;
     if (columns == 0)
         return STATUS_OK;
     if (kept->at == NULL) {
-        *kept = (BandDensities){columns, rows, 0, most,
-                                calloc(most * columns * rows, sizeof *kept->at)};
+        *kept = (UncertaintyDensities){columns, rows, 0, most,
+                                       calloc(most * columns * rows, sizeof *kept->at)};
         if (kept->at == NULL)
-            return no_memory(problem);
+            return uncertainty_bands_no_memory(problem);
     }
     double *target = kept->at + kept->runs++ * columns * rows;
     for (size_t c = 0; c < columns; c++)
@@ -29,16 +30,17 @@ Status band_keep(BandDensities *kept, const Spectrum *spectrum, size_t most, Pro
     return STATUS_OK;
 }
 
-void band_clear(BandDensities *kept) {
+void uncertainty_bands_clear(UncertaintyDensities *kept) {
     free(kept->at);
-    *kept = (BandDensities){0};
+    *kept = (UncertaintyDensities){0};
 }
 
-static Status tell_statistics(const EnsembleRuns *table, const Summary *own, bool has_force,
-                              Sensitivity *answer, Problem *problem) {
+static Status uncertainty_bands_fill_statistics(const EnsembleRuns *table, const Summary *own,
+                                                bool has_force, Sensitivity *answer,
+                                                Problem *problem) {
     answer->statistics.at = calloc(ENSEMBLE_STATISTICS, sizeof *answer->statistics.at);
     if (answer->statistics.at == NULL)
-        return no_memory(problem);
+        return uncertainty_bands_no_memory(problem);
     for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++) {
         EnsembleStatistic of = {.mean = (double)NAN,
                                 .standard_deviation = (double)NAN,
@@ -62,16 +64,17 @@ static Status tell_statistics(const EnsembleRuns *table, const Summary *own, boo
 }
 
 // `values` has room for all runs.
-static Status tell_spectrum(const BandDensities *kept, size_t channel, const Column *own,
-                            const Progress *progress, double *values, SensitivitySpectrum *told,
-                            Problem *problem) {
+static Status uncertainty_bands_fill_spectrum(const UncertaintyDensities *kept, size_t channel,
+                                              const Column *own, const Progress *progress,
+                                              double *values, SensitivitySpectrum *told,
+                                              Problem *problem) {
     const size_t rows = kept->rows, runs = kept->runs;
     told->channel = strdup(own->name);
     told->unit = strdup(own->unit);
     if (told->channel == NULL || told->unit == NULL || !reals_make(&told->value, rows) ||
         !reals_make(&told->mean, rows) || !reals_make(&told->q05, rows) ||
         !reals_make(&told->median, rows) || !reals_make(&told->q95, rows))
-        return no_memory(problem);
+        return uncertainty_bands_no_memory(problem);
     memcpy(told->value.at, own->values, rows * sizeof *values);
     for (size_t k = 0; k < rows; k++) {
         double sum = 0;
@@ -90,29 +93,32 @@ static Status tell_spectrum(const BandDensities *kept, size_t channel, const Col
     return STATUS_OK;
 }
 
-static Status tell_spectra(const BandDensities *kept, const Spectrum *own, const Progress *progress,
-                           Sensitivity *answer, Problem *problem) {
+static Status uncertainty_bands_fill_spectra(const UncertaintyDensities *kept, const Spectrum *own,
+                                             const Progress *progress, Sensitivity *answer,
+                                             Problem *problem) {
     if (kept->runs == 0)
         return STATUS_OK;
     double *values = calloc(kept->runs, sizeof *values);
     answer->spectra.at = calloc(kept->channels, sizeof *answer->spectra.at);
     Status status =
         values == NULL || answer->spectra.at == NULL || !reals_make(&answer->frequency, kept->rows)
-            ? no_memory(problem)
+            ? uncertainty_bands_no_memory(problem)
             : STATUS_OK;
     if (status == STATUS_OK)
         memcpy(answer->frequency.at, own->frequency, kept->rows * sizeof *own->frequency);
     for (size_t c = 0; c < kept->channels && status == STATUS_OK; c++)
-        status = tell_spectrum(kept, c, &own->densities.at[c], progress, values,
-                               &answer->spectra.at[answer->spectra.count++], problem);
+        status =
+            uncertainty_bands_fill_spectrum(kept, c, &own->densities.at[c], progress, values,
+                                            &answer->spectra.at[answer->spectra.count++], problem);
     free(values);
     return status;
 }
 
-Status band_tell(const EnsembleRuns *table, const Status *statuses, const BandDensities *kept,
-                 const Outcome *own, bool has_force, const Progress *progress, Sensitivity *answer,
-                 Problem *problem) {
-    TRY(tell_statistics(table, &own->summary, has_force, answer, problem));
+Status uncertainty_bands_report(const EnsembleRuns *table, const Status *statuses,
+                                const UncertaintyDensities *kept, const Outcome *own,
+                                bool has_force, const Progress *progress, Sensitivity *answer,
+                                Problem *problem) {
+    TRY(uncertainty_bands_fill_statistics(table, &own->summary, has_force, answer, problem));
     TRY(statistics_failures(table, statuses, &answer->failures, problem));
-    return tell_spectra(kept, &own->spectrum, progress, answer, problem);
+    return uncertainty_bands_fill_spectra(kept, &own->spectrum, progress, answer, problem);
 }

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/api/assets.h"
 #include "server/base/clock.h"

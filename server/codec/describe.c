@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 #include "core/scene/material.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/codec/material_bodies.h"
 
 // clang-format off

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/base/clock.h"
 #include "server/command/bar.h"
 #include "server/command/command.h"

@@ -22,7 +22,7 @@ static const char rules[] = ".small { font-size: 10.5px; } .name { font-weight: 
 
 // Over the points' axis: to scale where all its values are numbers, else evenly.
 typedef struct Across {
-    const SweepTold *axis;
+    const SweepAxisValues *axis;
     size_t count, group; // points, and as many of them as stand in one column
     SweepScale scale;
     bool is_numeric;

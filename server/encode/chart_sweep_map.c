@@ -23,7 +23,7 @@ static void colour_of(double share, char colour[8]) {
 
 // The last two axes, thinned out to what can be seen.
 typedef struct Map {
-    const SweepTold *x, *y;
+    const SweepAxisValues *x, *y;
     size_t columns, rows;
 } Map;
 

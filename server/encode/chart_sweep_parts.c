@@ -25,7 +25,7 @@ void sweep_label(const char *json, char label[SWEEP_LABEL]) {
     text_fit(label, 18, text);
 }
 
-void sweep_axis_name(const SweepTold *axis, char name[SWEEP_NAME]) {
+void sweep_axis_name(const SweepAxisValues *axis, char name[SWEEP_NAME]) {
     char pointer[120];
     text_fit(pointer, sizeof pointer, axis->pointer);
     snprintf(name, SWEEP_NAME, "%s%s%s%s", pointer, axis->unit != NULL ? " [" : "",

@@ -17,7 +17,7 @@ typedef struct SweepChart {
 size_t sweep_pictures(const Sweep *sweep);
 // A scalar's text as it is shown: without quotes, short.
 void sweep_label(const char *json, char label[SWEEP_LABEL]);
-void sweep_axis_name(const SweepTold *axis, char name[SWEEP_NAME]);
+void sweep_axis_name(const SweepAxisValues *axis, char name[SWEEP_NAME]);
 void sweep_metric_name(const Sweep *sweep, size_t metric, char name[SWEEP_NAME]);
 void sweep_put_label(Bytes *bytes, double x, double y, const char *anchor, const char *class_,
                      const char *text);

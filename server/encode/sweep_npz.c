@@ -121,7 +121,7 @@ static size_t longest(const Texts *values) {
 }
 
 static void measure(SweepArchive *archive) {
-    const SweepTolds *axes = &archive->sweep->axes;
+    const SweepAxesValues *axes = &archive->sweep->axes;
     for (size_t i = 0; i < axes->count && i < SWEEP_AXES; i++)
         archive->axis_widths[i] =
             is_numeric(&axes->at[i].values) ? 0 : longest(&axes->at[i].values);

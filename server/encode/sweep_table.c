@@ -43,7 +43,7 @@ static void put_frame(const SweepText *text, Bytes *bytes) {
 
 // All rows of it, or a piece: true at its end.
 static bool put_axis(SweepText *text, size_t axis, Bytes *bytes) {
-    const SweepTold *told = &text->sweep->axes.at[axis];
+    const SweepAxisValues *told = &text->sweep->axes.at[axis];
     const size_t count = piece_of(text, told->values.count);
     if (text->row == 0) {
         bytes_text(bytes, axis > 0 ? ", {\"pointer\": " : "{\"pointer\": ");

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/command/command.h"
 #include "server/install/pages.h"

@@ -5,7 +5,7 @@
 #define SERVER_JOBS_DOCUMENTS_H
 
 #include "core/base/progress.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/base/bytes.h"
 
 void document_plan(Bytes *bytes, const PlanReport *plan);

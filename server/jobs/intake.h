@@ -4,7 +4,7 @@
 #ifndef SERVER_JOBS_INTAKE_H
 #define SERVER_JOBS_INTAKE_H
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/jobs/job.h"
 #include "server/store/store.h"
 

@@ -4,7 +4,7 @@
 #ifndef SERVER_JOBS_PREPARE_RECORD_H
 #define SERVER_JOBS_PREPARE_RECORD_H
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/base/bytes.h"
 #include "server/store/store.h"
 

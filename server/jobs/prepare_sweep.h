@@ -3,7 +3,7 @@
 #ifndef SERVER_JOBS_PREPARE_SWEEP_H
 #define SERVER_JOBS_PREPARE_SWEEP_H
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/store/store.h"
 
 // Behind prepare_materials, in place of study_request_complete, of an inquiry whose study is a

@@ -47,7 +47,7 @@ static Status tell(SweepShow *show, Problem *problem) {
     show->sweep = (Sweep *)(void *)variant_new(study_sweep.answer);
     if (show->sweep == NULL)
         return no_memory(problem);
-    return sweep_tell(study_of(show), &show->inquiry.simulation, show->sweep, problem);
+    return sweep_describe(study_of(show), &show->inquiry.simulation, show->sweep, problem);
 }
 
 // What became of the points that failed in one way.
@@ -190,7 +190,7 @@ bool sweep_show_read(void *of, size_t cell, size_t first, size_t count, double *
 
 Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,
                         Problem *problem) {
-    SweepPlan *plan;
+    SweepGrid *plan;
     SweepChunkRow chunk = {0};
     const SweepRow *row = &show->row;
     *target = (SweepPointShow){.status = SWEEP_PENDING};
@@ -208,9 +208,9 @@ Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, Swe
     sweep_row_values(row, &chunk, place, target->values);
     sweep_row_reason(&chunk, place, target->why, sizeof target->why);
     sweep_chunk_row_clear(&chunk);
-    TRY(sweep_plan_new(study_of(show), &show->inquiry.simulation, NULL, &plan, problem));
+    TRY(sweep_grid_new(study_of(show), &show->inquiry.simulation, NULL, &plan, problem));
     const Status made =
-        sweep_scene(plan, (size_t)point, false, NULL, &target->scene.simulation, problem);
-    sweep_plan_free(plan);
+        sweep_grid_scene(plan, (size_t)point, false, NULL, &target->scene.simulation, problem);
+    sweep_grid_free(plan);
     return made;
 }

@@ -3,7 +3,7 @@
 #ifndef SERVER_JOBS_SWEEP_ROWS_H
 #define SERVER_JOBS_SWEEP_ROWS_H
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "core/study/sweep.h"
 #include "server/store/store.h"
 

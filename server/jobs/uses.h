@@ -3,7 +3,7 @@
 #ifndef SERVER_JOBS_USES_H
 #define SERVER_JOBS_USES_H
 
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/base/bytes.h"
 
 // Adds a line for each revision of a material, "sponge@1\n", and each record,

@@ -11,7 +11,7 @@
 #include <time.h>
 
 #include "core/math/fft.h"
-#include "core/study/sweep_validation.h"
+#include "core/study/sweep_grid.h"
 #include "server/base/clock.h"
 #include "server/jobs/intake.h"
 #include "server/jobs/sweep.h"
@@ -106,7 +106,7 @@ static int bench_judging(Store *store, Problem *problem) {
     char text[1024];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    SweepPlan *plan;
+    SweepGrid *plan;
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
     scene_text(text, 100000, 1.35);
     int64_t began_ns = clock_monotonic_ns();
@@ -116,13 +116,13 @@ static int bench_judging(Store *store, Problem *problem) {
     printf("POST of 100000 points, its axes judged: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
     const SweepStudy *study = (const SweepStudy *)(const void *)inquiry.study;
-    if (sweep_plan_new(study, &inquiry.simulation, &limits, &plan, problem) != STATUS_OK)
+    if (sweep_grid_new(study, &inquiry.simulation, &limits, &plan, problem) != STATUS_OK)
         return fail("planning", problem);
     began_ns = clock_monotonic_ns();
-    (void)sweep_check(plan, SIZE_MAX, &limits, NULL, problem);
+    (void)sweep_grid_check_points(plan, SIZE_MAX, &limits, NULL, problem);
     printf("all 100000 points judged before the first run: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     return 0;
@@ -175,16 +175,16 @@ int main(int argc, char **argv) {
         return fail("opening", &problem);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
-    SweepPlan *plan;
+    SweepGrid *plan;
     scene_text(text, points, 1.35);
     if (intake_prepare(store, text, strlen(text), NULL, &inquiry, &warnings, &problem) !=
             STATUS_OK ||
-        sweep_plan_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
+        sweep_grid_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
                        &plan, &problem) != STATUS_OK)
         return fail("planning", &problem);
     Simulation *scenes = calloc(points, sizeof *scenes);
     for (size_t i = 0; scenes != NULL && i < points; i++)
-        (void)sweep_scene(plan, i, true, NULL, &scenes[i], NULL);
+        (void)sweep_grid_scene(plan, i, true, NULL, &scenes[i], NULL);
     if (scenes == NULL)
         return 1;
 
@@ -214,7 +214,7 @@ int main(int argc, char **argv) {
     for (size_t i = 0; i < points; i++)
         simulation_clear(&scenes[i]);
     free(scenes);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
     warnings_clear(&warnings);
     intake_close(intake);

@@ -23,7 +23,7 @@
 #include "core/math/student_t.h"
 #include "core/study/ensemble.h"
 #include "core/study/stopping_rule.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "server/codec/read.h"
 #include "tests/truth/drawn.h"
 

@@ -15,6 +15,7 @@
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/solver.h"
 #include "core/study/candidate_settings.h"
+#include "core/study/study_run.h"
 #include "tests/support/document.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
@@ -36,7 +37,7 @@ static void complete(Simulation *simulation) {
 static TradeoffPoints make(const Simulation *simulation) {
     const TradeoffStudy study = {.repeats = 1};
     TradeoffPoints points;
-    assert_int_equal(ladder_make(&study, simulation, &points, &problem), STATUS_OK);
+    assert_int_equal(candidate_settings_list(&study, simulation, &points, &problem), STATUS_OK);
     return points;
 }
 
@@ -140,11 +141,13 @@ static void a_frame_may_keep_half_its_modes_and_half_of_these(void **state) {
             if (point->modes == COUNT_ABSENT)
                 continue;
             Simulation target;
-            assert_int_equal(ladder_apply(&simulation, point, NULL, &target, &problem), STATUS_OK);
+            assert_int_equal(candidate_settings_apply(&simulation, point, NULL, &target, &problem),
+                             STATUS_OK);
             const Accuracy *accuracy = (const Accuracy *)(const void *)target.accuracy;
             assert_int_equal(accuracy->modes, point->modes);
             assert_string_equal(accuracy->variant.kind->name, "exact");
-            assert_true(ladder_cost(&simulation, point) < simulation_cost(&simulation).steps);
+            assert_true(candidate_settings_cost(&simulation, point) <
+                        simulation_cost(&simulation).steps);
             simulation_clear(&target);
         }
         forget(&points);
@@ -161,7 +164,7 @@ static TradeoffPoint exact(void) {
 
 static Simulation apply(const Simulation *simulation, const TradeoffPoint *point) {
     Simulation target;
-    if (ladder_apply(simulation, point, NULL, &target, &problem) != STATUS_OK)
+    if (candidate_settings_apply(simulation, point, NULL, &target, &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
     return target;
 }
@@ -188,10 +191,12 @@ static void tolerances_of_the_exact_solver_are_for_power_laws(void **state) {
             last = point->tolerance;
             // It is the tolerance that the point's own simulation keeps, for less.
             Simulation target = {0};
-            assert_int_equal(ladder_apply(&simulation, point, NULL, &target, &problem), STATUS_OK);
+            assert_int_equal(candidate_settings_apply(&simulation, point, NULL, &target, &problem),
+                             STATUS_OK);
             assert_true(exact_tolerance((const Accuracy *)(const void *)target.accuracy) ==
                         point->tolerance);
-            assert_true(ladder_cost(&simulation, point) < simulation_cost(&simulation).steps);
+            assert_true(candidate_settings_cost(&simulation, point) <
+                        simulation_cost(&simulation).steps);
             simulation_clear(&target);
         }
         assert_int_equal(whole, 1);
@@ -265,8 +270,8 @@ static void a_buffer_of_stiffness_and_damping_has_its_restitution_under_impulse(
     Simulation target = apply(&simulation, &point);
     const Buffer *made = &target.scene.dampers.at[0].buffer;
     assert_true(fabs(made->restitution - 0.61) < 1e-9 && isnan(made->stiffness));
-    assert_false(ladder_has_force(&target));
-    assert_true(ladder_has_force(&simulation));
+    assert_false(study_run_has_force(&target));
+    assert_true(study_run_has_force(&simulation));
     simulation_clear(&target);
     simulation_clear(&simulation);
 }
@@ -276,13 +281,13 @@ static void a_step_ten_times_finer_costs_about_ten_times_as_much(void **state) {
     Simulation simulation = scene_make(0.025, 10);
     complete(&simulation);
     TradeoffPoint point = exact();
-    const double exact_cost = ladder_cost(&simulation, &point);
+    const double exact_cost = candidate_settings_cost(&simulation, &point);
     assert_true(exact_cost == simulation_cost(&simulation).steps);
     point.solver = "rk4";
     point.step = 1e-4;
-    const double coarse = ladder_cost(&simulation, &point);
+    const double coarse = candidate_settings_cost(&simulation, &point);
     point.step = 1e-5;
-    const double fine = ladder_cost(&simulation, &point);
+    const double fine = candidate_settings_cost(&simulation, &point);
     assert_true(coarse > exact_cost && fine > 8 * coarse && fine < 12 * coarse);
     simulation_clear(&simulation);
 }

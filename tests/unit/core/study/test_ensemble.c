@@ -13,7 +13,7 @@
 #include "core/excitation/random.h"
 #include "core/math/fft.h"
 #include "core/study/ensemble.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -10,9 +10,8 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/compare_variants.h"
 #include "core/study/model_comparison.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 

@@ -10,10 +10,9 @@
 #include <string.h>
 
 #include "core/math/fft.h"
-#include "core/study/input_uncertainty.h"
 #include "core/study/parameter_perturbation.h"
 #include "core/study/sensitivity.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 
@@ -157,7 +156,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     enum { DRAWN = 20000 };
     for (uint64_t run = 1; run <= DRAWN; run++) {
         double factors[2];
-        change_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
+        perturbation_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
         const Buffer *buffer = &member.scene.dampers.at[0].buffer;
         assert_true(buffer->restitution == 0.9 * factors[0] && buffer->restitution <= 1);
         assert_true(buffer->contact_time == 0.025 * factors[1]);
@@ -173,7 +172,7 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     study->restitution_deviation = 0.5; // most of the upper half is beyond 1
     for (uint64_t run = 1; run <= 200; run++) {
         double factors[2];
-        change_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
+        perturbation_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
         assert_true(member.scene.dampers.at[0].buffer.restitution <= 1);
     }
     simulation_clear(&member);
@@ -231,8 +230,8 @@ static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
     assert_int_equal(study->spread.count, 0);
     for (int place = SENSITIVITY_LEFT; place <= SENSITIVITY_RIGHT; place++) {
         const SensitivityBuffer buffer = (SensitivityBuffer)place;
-        assert_true(spread_of(study, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
-        assert_true(spread_of(study, 0, buffer, SENSITIVITY_CONTACT_TIME) == 0.01);
+        assert_true(deviation_find(study, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
+        assert_true(deviation_find(study, 0, buffer, SENSITIVITY_CONTACT_TIME) == 0.01);
     }
     study_request_clear(&inquiry);
 }
@@ -309,8 +308,8 @@ static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(1, 0.025, 1);
     complete(&inquiry);
-    assert_true(change_max(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
-    assert_true(change_max(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
+    assert_true(perturbation_max_step(&inquiry.simulation, SENSITIVITY_RESTITUTION, 0.01) == 0);
+    assert_true(perturbation_max_step(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
     Sensitivity *answer = make(&inquiry);
     assert_true(
         !isnan(slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_RMS_DISPLACEMENT)->derivative));
@@ -325,15 +324,15 @@ static void changes_begin_at_the_scenes_own_numbers(void **state) {
     Simulation member;
     assert_int_equal(fields_copy(simulation_fields, &inquiry.simulation, &member), STATUS_OK);
     for (int parameter = 0; parameter < SENSITIVITY_PARAMETERS; parameter++) {
-        if (change_refuse(&inquiry.simulation, parameter) != NULL)
+        if (perturbation_refuse(&inquiry.simulation, parameter) != NULL)
             continue;
-        change_apply(&inquiry.simulation, parameter, 1.5, &member);
-        change_apply(&inquiry.simulation, parameter, 1, &member);
+        perturbation_apply(&inquiry.simulation, parameter, 1.5, &member);
+        perturbation_apply(&inquiry.simulation, parameter, 1, &member);
     }
     const Damper *a = &inquiry.simulation.scene.dampers.at[0], *b = &member.scene.dampers.at[0];
     assert_true(a->mass == b->mass && a->clearance == b->clearance);
     assert_true(buffer_equals(&a->buffer, &b->buffer));
-    assert_non_null(change_refuse(&inquiry.simulation, SENSITIVITY_STIFFNESS));
+    assert_non_null(perturbation_refuse(&inquiry.simulation, SENSITIVITY_STIFFNESS));
     simulation_clear(&member);
     study_request_clear(&inquiry);
 }

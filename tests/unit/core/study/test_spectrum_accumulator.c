@@ -34,23 +34,23 @@ static void spectrum_of(size_t run, Spectrum *spectrum) {
     }
 }
 
-static SpectraFold fold_of(size_t runs) {
-    SpectraFold fold = {0};
+static SpectrumAccumulator fold_of(size_t runs) {
+    SpectrumAccumulator fold = {0};
     for (size_t run = 0; run < runs; run++) {
         Spectrum spectrum;
         spectrum_of(run, &spectrum);
-        assert_int_equal(spectra_add(&fold, &spectrum, true, &problem), STATUS_OK);
+        assert_int_equal(spectrum_accumulator_add(&fold, &spectrum, true, &problem), STATUS_OK);
         columns_clear(&spectrum.densities);
     }
     return fold;
 }
 
-static Ensemble *tell(const SpectraFold *fold) {
+static Ensemble *tell(const SpectrumAccumulator *fold) {
     Spectrum like;
     spectrum_of(0, &like);
     Ensemble *answer = (Ensemble *)(void *)variant_new(study_ensemble.answer);
     assert_non_null(answer);
-    assert_int_equal(spectra_tell(fold, &like, answer, &problem), STATUS_OK);
+    assert_int_equal(spectrum_accumulator_report(fold, &like, answer, &problem), STATUS_OK);
     columns_clear(&like.densities);
     return answer;
 }
@@ -61,7 +61,7 @@ static void means_and_bands_are_numpys(void **state) {
                         deviation[] = {0.8539125638299665, 1.4142135623730951, 1.5, 0},
                         low[] = {0.9084038387497005, 1.4169440865902474, 0.7788901798292007, 0},
                         high[] = {3.8701124434247216, 6.3516973500752, 6.499632594045714, 0};
-    SpectraFold fold = fold_of(RUNS);
+    SpectrumAccumulator fold = fold_of(RUNS);
     Ensemble *answer = tell(&fold);
     assert_int_equal(answer->spectra.count, 2);
     const EnsembleSpectrum *spectrum = &answer->spectra.at[0];
@@ -76,17 +76,17 @@ static void means_and_bands_are_numpys(void **state) {
         assert_true(answer->spectra.at[1].mean.at[k] == 7 && answer->spectra.at[1].low.at[k] == 7);
     }
     variant_free(&answer->variant);
-    spectra_clear(&fold);
+    spectrum_accumulator_clear(&fold);
 }
 
 static void one_run_has_a_mean_and_no_band_and_none_has_nothing(void **state) {
     (void)state;
-    SpectraFold fold = fold_of(1);
+    SpectrumAccumulator fold = fold_of(1);
     Ensemble *answer = tell(&fold);
     assert_int_equal(answer->spectra.at[0].mean.count, ROWS);
     assert_int_equal(answer->spectra.at[0].low.count, 0);
     variant_free(&answer->variant);
-    spectra_clear(&fold);
+    spectrum_accumulator_clear(&fold);
     answer = tell(&fold);
     assert_int_equal(answer->spectra.count, 0);
     assert_int_equal(answer->frequency.count, 0);
@@ -95,24 +95,24 @@ static void one_run_has_a_mean_and_no_band_and_none_has_nothing(void **state) {
 
 static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
     (void)state;
-    SpectraFold fold = fold_of(RUNS);
+    SpectrumAccumulator fold = fold_of(RUNS);
     // The second channel does not differ at all: of it nothing is known, which is the farthest.
-    assert_true(isinf(spectra_spread(&fold, 100).relative));
-    SpectraFold alone = {0};
+    assert_true(isinf(spectrum_accumulator_spread(&fold, 100).relative));
+    SpectrumAccumulator alone = {0};
     for (size_t run = 0; run < RUNS; run++) {
         Spectrum spectrum;
         spectrum_of(run, &spectrum);
         spectrum.densities.count = 1;
-        assert_int_equal(spectra_add(&alone, &spectrum, true, &problem), STATUS_OK);
+        assert_int_equal(spectrum_accumulator_add(&alone, &spectrum, true, &problem), STATUS_OK);
         spectrum.densities.count = 2;
         columns_clear(&spectrum.densities);
     }
-    const Spread spread = spectra_spread(&alone, 100);
+    const Spread spread = spectrum_accumulator_spread(&alone, 100);
     assert_int_equal(spread.count, RUNS);
     assert_near(spread.relative, 0.5322210623972516);
     assert_near(spread.freedom, 2.1325742019787195);
-    spectra_clear(&alone);
-    spectra_clear(&fold);
+    spectrum_accumulator_clear(&alone);
+    spectrum_accumulator_clear(&fold);
 }
 
 int main(void) {

@@ -8,9 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/study/study_request.h"
-#include "core/study/sweep_run.h"
-#include "core/study/sweep_validation.h"
+#include "core/study/study.h"
+#include "core/study/sweep_grid.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
@@ -57,17 +56,17 @@ static void values_add(StudyRequest *inquiry, const char *pointer, size_t count,
     axis_add(inquiry, pointer)->values = texts_of(count, values);
 }
 
-static SweepPlan *plan_of(StudyRequest *inquiry) {
-    SweepPlan *plan = NULL;
+static SweepGrid *plan_of(StudyRequest *inquiry) {
+    SweepGrid *plan = NULL;
     if (study_request_complete(inquiry, NULL, NULL, &problem) != STATUS_OK ||
-        sweep_plan_new(study_of(inquiry), &inquiry->simulation, NULL, &plan, &problem) != STATUS_OK)
+        sweep_grid_new(study_of(inquiry), &inquiry->simulation, NULL, &plan, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
     return plan;
 }
 
-static Simulation scene_of(const SweepPlan *plan, size_t point) {
+static Simulation scene_of(const SweepGrid *plan, size_t point) {
     Simulation scene;
-    if (sweep_scene(plan, point, false, NULL, &scene, &problem) != STATUS_OK)
+    if (sweep_grid_scene(plan, point, false, NULL, &scene, &problem) != STATUS_OK)
         fail_msg("%s %s", problem.faults[0].pointer, problem.detail);
     return scene;
 }
@@ -94,11 +93,11 @@ static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
     }
     range_add(&inquiry, "/duration", 1, 2, count);
     study_of(&inquiry)->mode = mode;
-    SweepPlan *plan = plan_of(&inquiry);
+    SweepGrid *plan = plan_of(&inquiry);
     size_t looks = 0;
     const Progress progress = {&looks, count_look};
-    assert_int_equal(sweep_check(plan, scenes, NULL, &progress, &problem), STATUS_OK);
-    sweep_plan_free(plan);
+    assert_int_equal(sweep_grid_check_points(plan, scenes, NULL, &progress, &problem), STATUS_OK);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
     return looks;
 }
@@ -126,7 +125,7 @@ static void a_points_scene_follows_from_its_number(void **state) {
     static const char *const masses[] = {"0.1", "0.2", "0.3"};
     values_add(&inquiry, "/dampers/0/mass", 3, masses);
     range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.02, 5);
-    SweepPlan *plan = plan_of(&inquiry);
+    SweepGrid *plan = plan_of(&inquiry);
     assert_int_equal(plan->points, 15);
     for (size_t point = 0; point < 15; point++) {
         Simulation scene = scene_of(plan, point);
@@ -136,7 +135,7 @@ static void a_points_scene_follows_from_its_number(void **state) {
                     (point % 5 == 4 ? 0.02 : 0.01 + 0.0025 * (double)(point % 5)));
         simulation_clear(&scene);
     }
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_of(&inquiry)->mode = SWEEP_LIST;
     assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/study/axes/1"), "has 5 values"));
@@ -147,10 +146,10 @@ static void whole_numbers_of_a_range_stay_whole(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/output/psd/segment", 1, 3000, 3000);
-    SweepPlan *plan = plan_of(&inquiry);
+    SweepGrid *plan = plan_of(&inquiry);
     for (size_t i = 0; i < 3000; i++)
         assert_int_equal(plan->axes[0].at[i].whole, i + 1);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
 }
 
@@ -158,7 +157,7 @@ static void a_row_is_its_scenes_own_run(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 4);
-    SweepPlan *plan = plan_of(&inquiry);
+    SweepGrid *plan = plan_of(&inquiry);
     const StudyTools tools = {0};
     Variant *answer;
     assert_int_equal(study_run(inquiry.study, &inquiry.simulation, &tools, &answer, &problem),
@@ -169,7 +168,7 @@ static void a_row_is_its_scenes_own_run(void **state) {
     for (size_t point = 0; point < 4; point++) {
         Simulation scene;
         Outcome *outcome;
-        assert_int_equal(sweep_scene(plan, point, true, NULL, &scene, &problem), STATUS_OK);
+        assert_int_equal(sweep_grid_scene(plan, point, true, NULL, &scene, &problem), STATUS_OK);
         assert_int_equal(simulation_run(&scene, NULL, NULL, NULL, &outcome, &problem), STATUS_OK);
         const double *row = &sweep->table.values.at[point * sweep->metrics.count];
         assert_true(row[0] == outcome->summary.peak_displacement);
@@ -179,7 +178,7 @@ static void a_row_is_its_scenes_own_run(void **state) {
         simulation_clear(&scene);
     }
     variant_free(answer);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
 }
 
@@ -246,14 +245,14 @@ static void sides_and_materials_are_filled_from_what_is_pinned(void **state) {
         study->materials.at[i].contact_time = 0.01;
     }
     values_add(&inquiry, "/dampers/0/left_buffer", 2, names);
-    SweepPlan *plan = plan_of(&inquiry);
+    SweepGrid *plan = plan_of(&inquiry);
     Simulation scene = scene_of(plan, 1);
     const Damper *damper = &scene.scene.dampers.at[0];
     assert_true(damper->left_buffer.restitution == 0.6);
     assert_true(damper->left_buffer.contact_time == 0.01);
     assert_true(damper->right_buffer.restitution == 0.61);
     simulation_clear(&scene);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     study_request_clear(&inquiry);
 }
 
@@ -266,7 +265,7 @@ static void a_sweep_stops_when_it_is_told_to(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make();
     range_add(&inquiry, "/dampers/0/clearance", 0.005, 0.02, 50);
-    sweep_plan_free(plan_of(&inquiry));
+    sweep_grid_free(plan_of(&inquiry));
     const Progress progress = {NULL, stops};
     const StudyTools tools = {.progress = &progress};
     Variant *answer;

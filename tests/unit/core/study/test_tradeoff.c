@@ -10,7 +10,7 @@
 
 #include "core/base/canonical.h"
 #include "core/math/fft.h"
-#include "core/study/study_request.h"
+#include "core/study/study.h"
 #include "core/study/tradeoff.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"

@@ -450,11 +450,11 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
                  ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
                  "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
     const SweepStudy *sweep = (const SweepStudy *)(const void *)inquiry.study;
-    SweepPlan *plan;
-    assert_int_equal(sweep_plan_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
+    SweepGrid *plan;
+    assert_int_equal(sweep_grid_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
     Simulation points[2];
     for (size_t i = 0; i < 2; i++)
-        assert_int_equal(sweep_scene(plan, i, true, NULL, &points[i], &problem), STATUS_OK);
+        assert_int_equal(sweep_grid_scene(plan, i, true, NULL, &points[i], &problem), STATUS_OK);
     assert_true(points[0].scene.dampers.at[0].buffer.contact_time == 0.01);
     assert_true(points[0].scene.dampers.at[0].rig.impactor_mass == 0.4);
     assert_int_equal(points[1].scene.dampers.at[0].buffer.table.count, 2);
@@ -462,7 +462,7 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
     assert_true(points[1].scene.dampers.at[0].rig.impactor_mass == 0.3);
     for (size_t i = 0; i < 2; i++)
         simulation_clear(&points[i]);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
     Bytes uses = {0};
     uses_write(&uses, &inquiry);
     assert_string_equal(uses.at, "rubber@1\nfoam@1\n");
@@ -474,11 +474,11 @@ static void points_of_a_sweep_have_the_tables_and_rigs_of_their_materials(void *
                  ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
                  "\"/dampers/0/buffer\", \"values\": [\"rubber\", \"foam\"]}]}");
     sweep = (const SweepStudy *)(const void *)inquiry.study;
-    assert_int_equal(sweep_plan_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
-    assert_int_equal(sweep_scene(plan, 1, true, NULL, &points[1], &problem), STATUS_OK);
+    assert_int_equal(sweep_grid_new(sweep, &inquiry.simulation, NULL, &plan, &problem), STATUS_OK);
+    assert_int_equal(sweep_grid_scene(plan, 1, true, NULL, &points[1], &problem), STATUS_OK);
     assert_true(points[1].scene.dampers.at[0].rig.impactor_mass == 7);
     simulation_clear(&points[1]);
-    sweep_plan_free(plan);
+    sweep_grid_free(plan);
 }
 
 static void uses_are_lines_each_once(void **state) {
