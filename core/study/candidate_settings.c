@@ -1,7 +1,8 @@
-// Solvers tell by their own rows what they trade: a row "step" or "tolerance" makes points of them,
-// whatever the solver is called.
+// The rows of a solver's settings say what it can trade: a row "step" or "tolerance" makes
+// candidates, whatever the solver is called.
 #include "core/study/candidate_settings.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,30 +10,52 @@
 
 #include "core/simulation/impulse_variant.h"
 #include "core/solve/solvers.h"
+#include "core/study/study_run.h"
 
 enum {
-    DECADES = 8,      // of steps at most, from the sample interval down
+    DECADES_MAX = 8,  // of steps, from the sample interval down
     SEGMENT_MIN = 16, // samples of a segment
     RATES = 3,
     SHARES = 2,
-    STOREYS_MIN = 4, // of a structure whose modes are worth leaving out
+    STOREYS_MIN = 4, // of a structure with modes to leave out
 };
-// The finest step wanted: this part of the shortest contact, or of a radian of the fastest mode.
+// The finest step: this part of the shortest contact, or of a radian of the fastest mode.
 static const double contact_part = 3e-3, radian_part = 1e-3;
 static const double tolerance_max = 1e-3, tolerance_min = 1e-14, tolerance_factor = 1e-2;
 static const double rate_divisors[RATES] = {2, 4, 8}; // powers of 2, so that samples coincide
 static const uint64_t spectrum_divisors[SHARES] = {4, 16};
 static const double duration_divisors[SHARES] = {2, 4};
 
+const char *const tradeoff_status_names[] = {"measured", "refused", "failed", NULL};
+
+// clang-format off
+const Field tradeoff_point_fields[] = {
+    FIELD_TEXT(TradeoffPoint, name, 0, PRESENCE_OPTIONAL, 0, "for people"),
+    FIELD_TEXT(TradeoffPoint, solver, 0, PRESENCE_OPTIONAL, 0, "solver"),
+    FIELD_REAL(TradeoffPoint, step, "s", ANY, OPTIONAL, "its step"),
+    FIELD_REAL(TradeoffPoint, tolerance, NULL, ANY, OPTIONAL, "its tolerance"),
+    FIELD_TEXT(TradeoffPoint, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model in place of the scene's"),
+    FIELD_REAL(TradeoffPoint, sample_rate, "Hz", ANY, OPTIONAL, "sample rate in place of the scene's; the base keeps its own"),
+    FIELD_REAL(TradeoffPoint, duration, "s", ANY, OPTIONAL, "duration in place of the scene's"),
+    FIELD_COUNT(TradeoffPoint, segment, "samples", AT_MIN(1), OPTIONAL, "segment of the spectra in place of the scene's"),
+    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_MIN(1), OPTIONAL, "modes that it keeps; all if absent"),
+    FIELD_CHOICE(TradeoffPoint, status, tradeoff_status_names, TRADEOFF_MEASURED, "whether it was run"),
+    FIELD_TEXT(TradeoffPoint, why, 0, PRESENCE_OPTIONAL, 0, "why it was not measured"),
+    FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, another time will differ"),
+    FIELD_REAL(TradeoffPoint, cpu_median, "s", ANY, OPTIONAL, "median of the timings; a measurement"),
+    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_MIN(0), 0, "runs that were timed: short ones are timed many at once"),
+    FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
+    FIELD_ITEM(TradeoffPoint, errors, error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
+    FIELD_FLAG(TradeoffPoint, is_best, false, "no other point is both cheaper and closer by the metric; follows from measured times"),
+    FIELD_END
+};
+// clang-format on
+
 const Kind *candidate_settings_reference(void) {
     size_t i = 0;
     while (solvers[i]->run == NULL)
         i++;
     return &solvers[i]->kind;
-}
-
-static const Field *candidate_field(const Kind *solver, const char *name, size_t *offset) {
-    return fields_find(solver->fields, name, offset);
 }
 
 // A point with nothing but its solver and name; NULL without memory.
@@ -57,10 +80,9 @@ static TradeoffPoint *candidate_add(TradeoffPoints *points, const Kind *solver, 
     return point->name == NULL || point->solver == NULL ? NULL : point;
 }
 
-static const double pi = 3.14159265358979324;
-
-// The shortest contact that a buffer's numbers tell, about, for a free mass [s]; NAN: none.
+// Duration of the shortest contact of a buffer, about, for a free mass [s]; NAN: none.
 static double candidate_contact_time(const Buffer *buffer, double mass) {
+    static const double pi = 3.14159265358979324;
     double shortest = buffer->contact_time;
     if (isnan(shortest) && buffer->stiffness > 0)
         shortest = pi * sqrt(mass / buffer->stiffness);
@@ -69,7 +91,6 @@ static double candidate_contact_time(const Buffer *buffer, double mass) {
     return shortest;
 }
 
-// What the finest step is to resolve [s].
 static Status candidate_finest_step(const Simulation *simulation, double *finest) {
     StructureRates rates;
     TRY(structure_rates(scene_structure(&simulation->scene), &rates));
@@ -87,7 +108,7 @@ static Status candidate_finest_step(const Simulation *simulation, double *finest
 static bool candidate_add_steps(TradeoffPoints *points, const Kind *solver,
                                 const Simulation *simulation, double finest) {
     double step = 1 / simulation->scene.sample_rate;
-    for (int i = 0; i < DECADES; i++, step /= 10) {
+    for (int i = 0; i < DECADES_MAX; i++, step /= 10) {
         TradeoffPoint *point = candidate_add(points, solver, "%s, step %.4g s", solver->name, step);
         if (point == NULL)
             return false;
@@ -112,43 +133,45 @@ static bool candidate_add_tolerances(TradeoffPoints *points, const Kind *solver,
     return true;
 }
 
-// What may be given up without giving up exactness.
+// Less output at full accuracy.
 static bool candidate_add_outputs(TradeoffPoints *points, const Kind *solver,
                                   const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const SpectrumRequest *psd = &simulation->output.psd;
+    const size_t shares = psd->channels.count > 0 ? SHARES : 0;
     TradeoffPoint *point;
     for (size_t i = 0; i < RATES; i++) {
         const double rate = scene->sample_rate / rate_divisors[i];
         if (rate * scene->duration < SEGMENT_MIN)
             break;
-        if ((point = candidate_add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate)) ==
-            NULL)
+        point = candidate_add(points, solver, "%s, sampled at %.6g Hz", solver->name, rate);
+        if (point == NULL)
             return false;
         point->sample_rate = rate;
     }
-    for (size_t i = 0; i < SHARES && psd->channels.count > 0; i++) {
+    for (size_t i = 0; i < shares; i++) {
         const uint64_t segment = psd->segment / spectrum_divisors[i];
         if (segment < SEGMENT_MIN)
             break;
-        if ((point = candidate_add(points, solver, "%s, segments of %llu", solver->name,
-                                   (unsigned long long)segment)) == NULL)
+        point = candidate_add(points, solver, "%s, segments of %llu", solver->name,
+                              (unsigned long long)segment);
+        if (point == NULL)
             return false;
         point->segment = segment;
     }
-    for (size_t i = 0; i < SHARES && psd->channels.count > 0; i++) {
+    for (size_t i = 0; i < shares; i++) {
         const double duration = scene->duration / duration_divisors[i];
         if (duration * scene->sample_rate < (double)psd->segment)
             break;
-        if ((point = candidate_add(points, solver, "%s, %.6g s long", solver->name, duration)) ==
-            NULL)
+        point = candidate_add(points, solver, "%s, %.6g s long", solver->name, duration);
+        if (point == NULL)
             return false;
         point->duration = duration;
     }
     return true;
 }
 
-// Half the modes, and half of these, down to one.
+// Half the modes, a quarter, and so on down to one.
 static bool candidate_add_modes(TradeoffPoints *points, const Kind *solver,
                                 const Simulation *simulation) {
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
@@ -162,44 +185,38 @@ static bool candidate_add_modes(TradeoffPoints *points, const Kind *solver,
     return true;
 }
 
-static bool candidate_has_power_law(const Simulation *simulation) {
+static bool candidate_has_form(const Simulation *simulation, ContactForm form) {
     const Scene *scene = &simulation->scene;
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    return scene->dampers.count > 0 && law->form == CONTACT_POWER;
+    return scene->dampers.count > 0 &&
+           dampers_contact_law(&scene->dampers, scene_contact(scene))->form == form;
 }
 
-static bool candidate_is_requested(const TradeoffStudy *study, const char *name) {
-    bool is_named = study->solvers.count == 0;
-    for (size_t i = 0; i < study->solvers.count; i++)
-        is_named = is_named || strcmp(study->solvers.at[i], name) == 0;
+static bool candidate_is_requested(const Texts *names, const char *name) {
+    bool is_named = names->count == 0;
+    for (size_t i = 0; i < names->count; i++)
+        is_named = is_named || strcmp(names->at[i], name) == 0;
     return is_named;
 }
 
-// Whether the solver's settings change anything of this scene.
-static bool candidate_is_useful(const Kind *kind, const Simulation *simulation) {
-    const Solver *solver = (const Solver *)(const void *)kind;
-    return solver->forget_unused == NULL || candidate_has_power_law(simulation);
-}
-
-static bool candidate_add_solver(TradeoffPoints *points, const Kind *solver,
+static bool candidate_add_solver(TradeoffPoints *points, const Solver *solver,
                                  const Simulation *simulation, double finest) {
-    const Field *tolerance =
-        candidate_is_useful(solver, simulation) ? candidate_field(solver, "tolerance", NULL) : NULL;
-    if (candidate_field(solver, "step", NULL) != NULL)
-        return candidate_add_steps(points, solver, simulation, finest);
-    if (tolerance != NULL && !candidate_add_tolerances(points, solver, &tolerance->range))
+    const Kind *kind = &solver->kind;
+    // Some solvers use their settings under power laws alone.
+    const bool is_used =
+        solver->forget_unused == NULL || candidate_has_form(simulation, CONTACT_POWER);
+    const Field *tolerance = is_used ? fields_find(kind->fields, "tolerance", NULL) : NULL;
+    if (fields_find(kind->fields, "step", NULL) != NULL)
+        return candidate_add_steps(points, kind, simulation, finest);
+    if (tolerance != NULL && !candidate_add_tolerances(points, kind, &tolerance->range))
         return false;
-    // A tolerance that may be left out is none then.
-    if (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL)
-        return true;
-    return candidate_add(points, solver, "%s", solver->name) != NULL;
+    // Without its tolerance, if that may be left out.
+    return (tolerance != NULL && tolerance->presence != PRESENCE_OPTIONAL) ||
+           candidate_add(points, kind, "%s", kind->name) != NULL;
 }
 
 static bool candidate_add_reference(TradeoffPoints *points, const Kind *solver,
                                     const Simulation *simulation) {
-    const Scene *scene = &simulation->scene;
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
-    if (scene->dampers.count > 0 && law->form == CONTACT_LINEAR) {
+    if (candidate_has_form(simulation, CONTACT_LINEAR)) {
         const char *model = contact_impulse.kind.name;
         TradeoffPoint *point = candidate_add(points, solver, "%s, contact %s", solver->name, model);
         if (point == NULL || (point->contact_model = strdup(model)) == NULL)
@@ -209,44 +226,42 @@ static bool candidate_add_reference(TradeoffPoints *points, const Kind *solver,
            candidate_add_outputs(points, solver, simulation);
 }
 
-Status candidate_settings_list(const TradeoffStudy *study, const Simulation *simulation,
+Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points, Problem *problem) {
+    const Kind *reference = candidate_settings_reference();
     double finest;
     *points = (TradeoffPoints){NULL, 0};
     bool is_whole = candidate_finest_step(simulation, &finest) == STATUS_OK;
     for (size_t i = 0; solvers[i] != NULL && is_whole; i++)
-        if (solvers[i]->run != NULL && candidate_is_requested(study, solvers[i]->kind.name))
-            is_whole = candidate_add_solver(points, &solvers[i]->kind, simulation, finest);
-    if (is_whole && candidate_is_requested(study, candidate_settings_reference()->name))
-        is_whole = candidate_add_reference(points, candidate_settings_reference(), simulation);
-    return is_whole ? STATUS_OK
-                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's points");
+        if (solvers[i]->run != NULL && candidate_is_requested(names, solvers[i]->kind.name))
+            is_whole = candidate_add_solver(points, solvers[i], simulation, finest);
+    if (is_whole && candidate_is_requested(names, reference->name))
+        is_whole = candidate_add_reference(points, reference, simulation);
+    return is_whole ? STATUS_OK : study_no_memory(problem);
 }
 
-static void candidate_set_real(Variant *variant, const char *name, double value) {
+// Sets a member of a solver's settings, if it has one of this name.
+static void candidate_set(Variant *accuracy, const char *name, double real, uint64_t count) {
     size_t offset = 0;
-    const Field *row = candidate_field(variant->kind, name, &offset);
-    if (row != NULL && !isnan(value))
-        *(double *)(void *)((char *)variant + offset + row->offset) = value;
-}
-
-static void candidate_set_count(Variant *variant, const char *name, uint64_t value) {
-    size_t offset = 0;
-    const Field *row = candidate_field(variant->kind, name, &offset);
-    if (row != NULL && value != COUNT_ABSENT)
-        *(uint64_t *)(void *)((char *)variant + offset + row->offset) = value;
+    const Field *row = fields_find(accuracy->kind->fields, name, &offset);
+    if (row == NULL)
+        return;
+    void *member = (char *)accuracy + offset + row->offset;
+    if (row->kind == FIELD_KIND_COUNT && count != COUNT_ABSENT)
+        *(uint64_t *)member = count;
+    else if (row->kind == FIELD_KIND_REAL && !isnan(real))
+        *(double *)member = real;
 }
 
 static Status candidate_apply_solver(const TradeoffPoint *point, Simulation *target) {
-    const Kind *kind = kind_find(&solver_kinds, point->solver);
-    Variant *accuracy = variant_new(kind);
+    Variant *accuracy = variant_new(kind_find(&solver_kinds, point->solver));
     if (accuracy == NULL)
         return STATUS_NO_MEMORY;
     variant_free(target->accuracy);
     target->accuracy = accuracy;
-    candidate_set_real(accuracy, "step", point->step);
-    candidate_set_real(accuracy, "tolerance", point->tolerance);
-    candidate_set_count(accuracy, "modes", point->modes);
+    candidate_set(accuracy, "step", point->step, COUNT_ABSENT);
+    candidate_set(accuracy, "tolerance", point->tolerance, COUNT_ABSENT);
+    candidate_set(accuracy, "modes", (double)NAN, point->modes);
     return STATUS_OK;
 }
 
@@ -268,7 +283,7 @@ static void candidate_apply_output(const TradeoffPoint *point, Simulation *targe
         if (psd->overlap >= psd->segment)
             psd->overlap = psd->segment - 1;
     }
-    target->output.impacts = true; // errors are counted from ledgers
+    target->output.impacts = true; // errors are counted from them
     const double last = floor(target->scene.duration * target->scene.sample_rate * (1 + 1e-12)) /
                         target->scene.sample_rate;
     target->output.statistics_from = fmin(target->output.statistics_from, last);
@@ -283,7 +298,7 @@ Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoin
     if (status == STATUS_OK && point->contact_model != NULL)
         status = impulses_take(target, problem);
     if (status == STATUS_NO_MEMORY)
-        return problem_set(problem, status, "no memory for a point of the study");
+        return study_no_memory(problem);
     TRY(status);
     candidate_apply_output(point, target);
     return simulation_complete(target, limits, NULL, problem);
@@ -293,7 +308,7 @@ double candidate_settings_cost(const Simulation *simulation, const TradeoffPoint
     Simulation view = *simulation; // borrows all but what the point changes
     view.accuracy = NULL;
     if (candidate_apply_solver(point, &view) != STATUS_OK)
-        return 0; // a guess without memory: the run will tell
+        return 0; // the run will fail
     candidate_apply_output(point, &view);
     const double steps = simulation_cost(&view).steps;
     variant_free(view.accuracy);

@@ -1,25 +1,58 @@
-// The ways that a tradeoff study tries: every solver of the table by its own step or tolerance, and
-// what else may be traded for speed. Not the runs. Used by tradeoff.c.
+// The candidates of a tradeoff study: every solver with its steps or tolerances, and what else may
+// be traded for speed.
 #ifndef CORE_STUDY_CANDIDATE_SETTINGS_H
 #define CORE_STUDY_CANDIDATE_SETTINGS_H
 
-#include "core/study/tradeoff.h"
+#include "core/simulation/error_metrics.h"
 
-// The solver that the others are compared with: the first of the table that runs.
+typedef enum TradeoffStatus {
+    TRADEOFF_MEASURED,
+    TRADEOFF_REFUSED, // too expensive or invalid: not run
+    TRADEOFF_FAILED,  // its run failed
+} TradeoffStatus;
+extern const char *const tradeoff_status_names[];
+
+// One candidate. The first part is its difference from the scene: what is absent is as there.
+typedef struct TradeoffPoint {
+    char *name;   // "rk4, step 1e-05 s"
+    char *solver; // of the solvers' table
+    double step, tolerance;
+    char *contact_model;
+    double sample_rate, duration;
+    uint64_t segment;
+    uint64_t modes;
+
+    int status;                     // TradeoffStatus
+    char *why;                      // it was not measured
+    double cpu_minimum, cpu_median; // of one run [s]
+    uint64_t runs;                  // timed
+    double steps;                   // solver steps
+    Errors errors;
+    bool is_best; // nothing is both cheaper and closer by the metric
+} TradeoffPoint;
+
+typedef struct TradeoffPoints {
+    TradeoffPoint *at;
+    size_t count;
+} TradeoffPoints;
+
+extern const Field tradeoff_point_fields[];
+
+// The reference solver: the first of the table that can run.
 const Kind *candidate_settings_reference(void);
 
-// The points of a completed study of a completed simulation, without numbers. Cleared by
-// fields_clear; STATUS_NO_MEMORY leaves what there is.
-Status candidate_settings_list(const TradeoffStudy *study, const Simulation *simulation,
+// The candidates of a completed simulation without results, of the named solvers (none: all).
+// Cleared by fields_clear; after STATUS_NO_MEMORY those made so far.
+Status candidate_settings_list(const Texts *names, const Simulation *simulation,
                                TradeoffPoints *points, Problem *problem);
 
-// The simulation as a point runs it, completed under `limits`. A point that cannot be is refused
-// with its faults. Cleared by simulation_clear in any case.
+// The simulation with the settings of a point, completed under `limits`. Cleared by
+// simulation_clear in any case.
 Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoint *point,
                                 const SimulationLimits *limits, Simulation *target,
                                 Problem *problem);
 
-// What a point is foretold to take, in solver steps.
+// Estimated solver steps of a point.
 double candidate_settings_cost(const Simulation *simulation, const TradeoffPoint *point);
 
 #endif

@@ -1,7 +1,5 @@
-// The study "compare": one scene under several contact models and separation rules. What is asked,
-// and what each came to beside the scene's own. Not how: compare_run.c makes the runs,
-// compare_variants.h lists them, result/distance.h and result/likeness.h measure. Not the metrics
-// of accuracy: those are simulation/compare.h. Used by whoever shows a table or a chart.
+// The study "compare": one scene under several contact models and separation rules, each compared
+// with the scene's own.
 #ifndef CORE_STUDY_MODEL_COMPARISON_H
 #define CORE_STUDY_MODEL_COMPARISON_H
 
@@ -9,9 +7,9 @@
 #include "core/result/spectrum_distance.h"
 #include "core/study/study.h"
 
-// What is asked.
+// The request.
 typedef struct CompareStudy {
-    Study study;
+    Variant variant;
     Texts models;      // none: the scene's own where separations are named, else all
     Texts separations; // likewise
     double part;       // of the reference's largest displacement, by which motions have parted

@@ -1,23 +1,22 @@
-// Every change begins at the scene's own numbers, so that no change leaves a trace in the next.
-// Each of the two deviations is given once for all buffers or told buffer by buffer, never both. A
-// completed study says which: an absent number means the list.
+// Every change starts from the numbers of the original scene, so that changes are independent.
 #include "core/study/parameter_perturbation.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/base/philox.h"
+#include "core/study/study_run.h"
 
-enum { DRAWS = 64, STREAM = 0x53454e53 };
+enum { BUFFERS = 3, NUMBERS = 4, DRAWS_MAX = 64, STREAM = 0x53454e53 };
 
 const char *const sensitivity_parameter_names[] = {
     "restitution", "contact_time", "stiffness", "damping", "mass", "clearance", NULL};
 
-enum { BUFFERS = 3, NUMBERS = 4 };
-static const size_t buffers[BUFFERS] = {offsetof(Damper, buffer), offsetof(Damper, left_buffer),
-                                        offsetof(Damper, right_buffer)};
-static const size_t numbers[NUMBERS] = {
+static const size_t perturbation_offsets[BUFFERS] = {
+    offsetof(Damper, buffer), offsetof(Damper, left_buffer), offsetof(Damper, right_buffer)};
+static const size_t perturbation_numbers[NUMBERS] = {
     [SENSITIVITY_RESTITUTION] = offsetof(Buffer, restitution),
     [SENSITIVITY_CONTACT_TIME] = offsetof(Buffer, contact_time),
     [SENSITIVITY_STIFFNESS] = offsetof(Buffer, stiffness),
@@ -25,101 +24,97 @@ static const size_t numbers[NUMBERS] = {
 };
 
 static const Buffer *perturbation_buffer(const Damper *damper, size_t index) {
-    return (const Buffer *)(const void *)((const char *)damper + buffers[index]);
-}
-
-static Buffer *perturbation_own_buffer(Damper *damper, size_t index) {
-    return (Buffer *)(void *)((char *)damper + buffers[index]);
-}
-
-static double perturbation_number(const Buffer *buffer, int parameter) {
-    return *(const double *)(const void *)((const char *)buffer + numbers[parameter]);
-}
-
-static double perturbation_row_number(const ContactRow *row, int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION    ? row->restitution
-           : parameter == SENSITIVITY_CONTACT_TIME ? row->contact_time
-                                                   : (double)NAN;
-}
-
-// The largest of what a buffer has of a parameter; NAN: nothing.
-static double perturbation_largest_of(const Buffer *buffer, int parameter) {
-    double largest = perturbation_number(buffer, parameter);
-    for (size_t i = 0; i < buffer->table.count; i++)
-        largest = fmax(largest, perturbation_row_number(&buffer->table.at[i], parameter));
-    return largest;
+    return (const Buffer *)(const void *)((const char *)damper + perturbation_offsets[index]);
 }
 
 static bool perturbation_is_of_buffer(int parameter) {
     return parameter < SENSITIVITY_MASS;
 }
 
-// The largest of what the scene has of a parameter; NAN: nothing.
-static double perturbation_largest(const Simulation *simulation, int parameter) {
+static double perturbation_number(const Buffer *buffer, int parameter) {
+    return *(const double *)(const void *)((const char *)buffer + perturbation_numbers[parameter]);
+}
+
+// Largest value of a parameter in a buffer and its table; NAN: none.
+static double perturbation_buffer_max(const Buffer *buffer, int parameter) {
+    double max = perturbation_number(buffer, parameter);
+    for (size_t i = 0; i < buffer->table.count; i++) {
+        const ContactRow *row = &buffer->table.at[i];
+        if (parameter == SENSITIVITY_RESTITUTION)
+            max = fmax(max, row->restitution);
+        else if (parameter == SENSITIVITY_CONTACT_TIME)
+            max = fmax(max, row->contact_time);
+    }
+    return max;
+}
+
+// The same of the scene.
+static double perturbation_max(const Simulation *simulation, int parameter) {
     const Dampers *dampers = &simulation->scene.dampers;
-    double most = (double)NAN;
+    double max = (double)NAN;
     for (size_t i = 0; i < dampers->count; i++) {
         if (parameter == SENSITIVITY_MASS)
-            most = fmax(most, dampers->at[i].mass);
+            max = fmax(max, dampers->at[i].mass);
         else if (parameter == SENSITIVITY_CLEARANCE)
-            most = fmax(most, dampers->at[i].clearance);
+            max = fmax(max, dampers->at[i].clearance);
         for (size_t k = 0; k < BUFFERS && perturbation_is_of_buffer(parameter); k++)
-            most = fmax(
-                most, perturbation_largest_of(perturbation_buffer(&dampers->at[i], k), parameter));
+            max = fmax(max,
+                       perturbation_buffer_max(perturbation_buffer(&dampers->at[i], k), parameter));
     }
-    return most;
+    return max;
 }
 
 const char *perturbation_refuse(const Simulation *simulation, int parameter) {
-    const Contact *contact = scene_contact(&simulation->scene);
-    const ContactLaw *law = dampers_contact_law(&simulation->scene.dampers, contact);
-    const double most = perturbation_largest(simulation, parameter);
-    if (isnan(most))
+    const Dampers *dampers = &simulation->scene.dampers;
+    const ContactLaw *law = dampers_contact_law(dampers, scene_contact(&simulation->scene));
+    const double max = perturbation_max(simulation, parameter);
+    if (isnan(max))
         return "no buffer of the scene has it, or the contact model does not use it";
-    if (!(most > 0))
+    if (!(max > 0))
         return "it is 0: a relative change is none";
-    // A law that gives all energy back has e = 1 and no other.
+    // A law without loss has the restitution 1 and no other.
     if (parameter == SENSITIVITY_RESTITUTION && law->form == CONTACT_POWER && law->factor == NULL)
         return "the contact model gives all energy back";
-    if (parameter == SENSITIVITY_CLEARANCE)
-        for (size_t i = 0; i < simulation->scene.dampers.count; i++)
-            if (fabs(simulation->scene.dampers.at[i].position) * 2 * (1 + 1e-9) >=
-                simulation->scene.dampers.at[i].clearance)
-                return "a free mass starts at a stop, which a smaller one would move past it";
+    for (size_t i = 0; i < dampers->count && parameter == SENSITIVITY_CLEARANCE; i++)
+        if (fabs(dampers->at[i].position) * 2 * (1 + 1e-9) >= dampers->at[i].clearance)
+            return "a free mass starts at a stop, which a smaller one would move past it";
     return NULL;
 }
 
 double perturbation_max_step(const Simulation *simulation, int parameter, double step) {
     return parameter == SENSITIVITY_RESTITUTION
-               ? fmax(0, fmin(step, 1 / perturbation_largest(simulation, parameter) - 1))
+               ? fmax(0, fmin(step, 1 / perturbation_max(simulation, parameter) - 1))
                : step;
 }
 
-static void perturbation_scale(const Buffer *from, int parameter, double factor, Buffer *to) {
-    const double number = perturbation_number(from, parameter) * factor;
+static void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
+                               Damper *to) {
+    const Buffer *original = perturbation_buffer(from, buffer);
+    Buffer *target = (Buffer *)(void *)((char *)to + perturbation_offsets[buffer]);
+    const double number = perturbation_number(original, parameter) * factor;
     const bool is_beyond = parameter == SENSITIVITY_RESTITUTION && number > 1;
-    *(double *)(void *)((char *)to + numbers[parameter]) = is_beyond ? 1 : number;
-    for (size_t i = 0; i < from->table.count; i++) {
+    *(double *)(void *)((char *)target + perturbation_numbers[parameter]) = is_beyond ? 1 : number;
+    for (size_t i = 0; i < original->table.count; i++) {
+        const ContactRow *row = &original->table.at[i];
         if (parameter == SENSITIVITY_RESTITUTION)
-            to->table.at[i].restitution = fmin(1, from->table.at[i].restitution * factor);
+            target->table.at[i].restitution = fmin(1, row->restitution * factor);
         else if (parameter == SENSITIVITY_CONTACT_TIME)
-            to->table.at[i].contact_time = from->table.at[i].contact_time * factor;
+            target->table.at[i].contact_time = row->contact_time * factor;
     }
 }
 
 void perturbation_apply(const Simulation *simulation, int parameter, double factor,
-                        Simulation *member) {
+                        Simulation *target) {
     const Dampers *dampers = &simulation->scene.dampers;
     for (size_t i = 0; i < dampers->count; i++) {
         const Damper *from = &dampers->at[i];
-        Damper *to = &member->scene.dampers.at[i];
+        Damper *to = &target->scene.dampers.at[i];
         if (parameter == SENSITIVITY_MASS)
             to->mass = from->mass * factor;
         else if (parameter == SENSITIVITY_CLEARANCE)
             to->clearance = from->clearance * factor;
         for (size_t k = 0; k < BUFFERS && perturbation_is_of_buffer(parameter); k++)
-            perturbation_scale(perturbation_buffer(from, k), parameter, factor,
-                               perturbation_own_buffer(to, k));
+            perturbation_scale(from, k, parameter, factor, to);
     }
 }
 
@@ -131,253 +126,238 @@ size_t perturbation_buffers(const Simulation *simulation) {
     return count;
 }
 
-// Of mean 1 and relative deviation s.
+// Log-normal, of mean 1 and relative deviation s.
 static double perturbation_factor(double normal, double s) {
     const double variance = log1p(s * s);
     return exp(sqrt(variance) * normal - variance / 2);
 }
 
-// Relative standard deviations of one buffer: of e and T_c.
-typedef struct BufferDeviation {
-    double restitution, contact_time;
-} BufferDeviation;
-
-static void perturbation_draw_buffer(uint64_t seed, const BufferDeviation *spread,
-                                     const Buffer *from, uint64_t run, size_t buffer,
-                                     double *restitution, double *contact_time) {
-    const double most = perturbation_largest_of(from, SENSITIVITY_RESTITUTION);
-    for (uint64_t again = 0; again < DRAWS; again++) {
+// Draws the factors of one buffer, whose largest restitution is `max`.
+static void perturbation_draw_factors(uint64_t seed, uint64_t run, size_t buffer, double max,
+                                      const double deviation[2], double *restitution,
+                                      double *contact_time) {
+    for (uint64_t again = 0; again < DRAWS_MAX; again++) {
         double normal[2];
-        noise_normal_pair(seed, STREAM + buffer, DRAWS * run + again, normal);
-        *restitution = perturbation_factor(normal[0], spread->restitution);
+        noise_normal_pair(seed, STREAM + buffer, DRAWS_MAX * run + again, normal);
+        *restitution = perturbation_factor(normal[0], deviation[0]);
         if (again == 0)
-            *contact_time = perturbation_factor(normal[1], spread->contact_time);
-        if (!(most * *restitution > 1))
+            *contact_time = perturbation_factor(normal[1], deviation[1]);
+        if (!(max * *restitution > 1))
             return;
     }
-    *restitution = 1 / most; // hardly ever: e is 1 then
+    *restitution = 1 / max; // very rare: the restitution becomes 1
 }
 
-void perturbation_draw(const SensitivityStudy *study, const Simulation *simulation, uint64_t run,
-                       Simulation *member, double *restitution, double *contact_time) {
+void perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
+                       const Simulation *simulation, uint64_t run, Simulation *target,
+                       double *restitution, double *contact_time) {
     const Dampers *dampers = &simulation->scene.dampers;
     for (size_t i = 0, buffer = 0; i < dampers->count; i++)
         for (size_t k = 0; k < BUFFERS; k++) {
-            const Buffer *from = perturbation_buffer(&dampers->at[i], k);
-            Buffer *to = perturbation_own_buffer(&member->scene.dampers.at[i], k);
-            if (!buffer_is_given(from))
+            const Damper *from = &dampers->at[i];
+            Damper *to = &target->scene.dampers.at[i];
+            if (!buffer_is_given(perturbation_buffer(from, k)))
                 continue;
-            const BufferDeviation spread = {
-                deviation_find(study, i, (SensitivityBuffer)k, SENSITIVITY_RESTITUTION),
-                deviation_find(study, i, (SensitivityBuffer)k, SENSITIVITY_CONTACT_TIME)};
-            perturbation_draw_buffer(study->seed, &spread, from, run, buffer, &restitution[buffer],
-                                     &contact_time[buffer]);
-            if (spread.restitution > 0)
-                perturbation_scale(from, SENSITIVITY_RESTITUTION, restitution[buffer], to);
-            if (spread.contact_time > 0)
-                perturbation_scale(from, SENSITIVITY_CONTACT_TIME, contact_time[buffer], to);
+            double *const factors[] = {&restitution[buffer], &contact_time[buffer]};
+            double deviation[2];
+            for (int parameter = 0; parameter < 2; parameter++)
+                deviation[parameter] =
+                    uncertainty_find(uncertainty, i, (SensitivityBuffer)k, parameter);
+            perturbation_draw_factors(
+                seed, run, buffer,
+                perturbation_buffer_max(perturbation_buffer(from, k), SENSITIVITY_RESTITUTION),
+                deviation, factors[0], factors[1]);
+            for (int parameter = 0; parameter < 2; parameter++)
+                if (deviation[parameter] > 0)
+                    perturbation_scale(from, k, parameter, *factors[parameter], to);
             buffer++;
         }
 }
 
-static double deviation_value(const SensitivitySpread *spread, int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION ? spread->restitution : spread->contact_time;
+// Below, a parameter is SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME.
+
+static double uncertainty_value(const InputDeviation *deviation, int parameter) {
+    return parameter == SENSITIVITY_RESTITUTION ? deviation->restitution : deviation->contact_time;
 }
 
-static const char *deviation_name(int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION ? "restitution" : "contact_time";
+static double uncertainty_common(const InputUncertainty *uncertainty, int parameter) {
+    return parameter == SENSITIVITY_RESTITUTION ? uncertainty->restitution_deviation
+                                                : uncertainty->contact_time_deviation;
 }
 
-static double *deviation_common(SensitivityStudy *study, int parameter) {
-    return parameter == SENSITIVITY_RESTITUTION ? &study->restitution_deviation
-                                                : &study->contact_time_deviation;
-}
-
-double deviation_find(const SensitivityStudy *study, size_t damper, SensitivityBuffer buffer,
-                      int parameter) {
-    const double given = parameter == SENSITIVITY_RESTITUTION ? study->restitution_deviation
-                                                              : study->contact_time_deviation;
-    if (!isnan(given))
-        return given;
-    for (size_t i = 0; i < study->spread.count; i++) {
-        const SensitivitySpread *spread = &study->spread.at[i];
-        const double told = deviation_value(spread, parameter);
-        if (spread->damper == damper + 1 && spread->buffer == (int)buffer)
-            return isnan(told) ? 0 : told;
-    }
-    return 0;
-}
-
-bool deviations_exist(const SensitivityStudy *study) {
-    bool is_there = study->restitution_deviation > 0 || study->contact_time_deviation > 0;
-    for (size_t i = 0; i < study->spread.count; i++)
-        is_there =
-            is_there || study->spread.at[i].restitution > 0 || study->spread.at[i].contact_time > 0;
-    return is_there;
-}
-
-static double deviation_recorded(const Buffer *buffer, int parameter) {
+static double uncertainty_recorded(const Buffer *buffer, int parameter) {
     return parameter == SENSITIVITY_RESTITUTION ? buffer->test.restitution_deviation
                                                 : buffer->test.contact_time_deviation;
 }
 
-// What a buffer's material tells, where the study does not say it for all; NAN: nothing.
-static double deviation_find_recorded(SensitivityStudy *study, const Simulation *simulation,
-                                      const Buffer *buffer, int parameter) {
-    const double deviation = deviation_recorded(buffer, parameter);
-    const bool is_used = buffer->material != NULL && isnan(*deviation_common(study, parameter)) &&
+double uncertainty_find(const InputUncertainty *uncertainty, size_t damper,
+                        SensitivityBuffer buffer, int parameter) {
+    const double common = uncertainty_common(uncertainty, parameter);
+    if (!isnan(common))
+        return common;
+    for (size_t i = 0; i < uncertainty->spread.count; i++) {
+        const InputDeviation *deviation = &uncertainty->spread.at[i];
+        if (deviation->damper == damper + 1 && deviation->buffer == (int)buffer)
+            return isnan(uncertainty_value(deviation, parameter))
+                       ? 0
+                       : uncertainty_value(deviation, parameter);
+    }
+    return 0;
+}
+
+bool uncertainty_exists(const InputUncertainty *uncertainty) {
+    bool exists = uncertainty->restitution_deviation > 0 || uncertainty->contact_time_deviation > 0;
+    for (size_t i = 0; i < uncertainty->spread.count; i++)
+        exists = exists || uncertainty->spread.at[i].restitution > 0 ||
+                 uncertainty->spread.at[i].contact_time > 0;
+    return exists;
+}
+
+// The deviation recorded with a buffer's material, unless one is given for all; NAN: none.
+static double uncertainty_find_recorded(const InputUncertainty *uncertainty,
+                                        const Simulation *simulation, const Buffer *buffer,
+                                        int parameter) {
+    const double deviation = uncertainty_recorded(buffer, parameter);
+    const bool is_used = buffer->material != NULL &&
+                         isnan(uncertainty_common(uncertainty, parameter)) &&
                          perturbation_refuse(simulation, parameter) == NULL;
     return is_used && deviation > 0 ? deviation : (double)NAN;
 }
 
-static Status deviation_fill_recorded(SensitivityStudy *study, const Simulation *simulation,
-                                      Problem *problem) {
+static Status uncertainty_fill_recorded(InputUncertainty *uncertainty, const Simulation *simulation,
+                                        Problem *problem) {
     const Dampers *dampers = &simulation->scene.dampers;
-    SensitivitySpreads *spreads = &study->spread;
-    spreads->at = calloc(BUFFERS * dampers->count, sizeof *spreads->at);
-    if (spreads->at == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
+    InputDeviations *spread = &uncertainty->spread;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
         const Buffer *buffer = perturbation_buffer(&dampers->at[i / BUFFERS], i % BUFFERS);
         const double e =
-            deviation_find_recorded(study, simulation, buffer, SENSITIVITY_RESTITUTION);
+            uncertainty_find_recorded(uncertainty, simulation, buffer, SENSITIVITY_RESTITUTION);
         const double T =
-            deviation_find_recorded(study, simulation, buffer, SENSITIVITY_CONTACT_TIME);
+            uncertainty_find_recorded(uncertainty, simulation, buffer, SENSITIVITY_CONTACT_TIME);
         if (isnan(e) && isnan(T))
             continue;
-        SensitivitySpread *spread = &spreads->at[spreads->count++];
-        *spread = (SensitivitySpread){.damper = i / BUFFERS + 1,
-                                      .buffer = (int)(i % BUFFERS),
-                                      .source = strdup(buffer->material),
-                                      .restitution = e,
-                                      .contact_time = T};
-        if (spread->source == NULL)
-            return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
-    }
-    if (spreads->count == 0) {
-        free(spreads->at);
-        spreads->at = NULL;
+        InputDeviation *at = realloc(spread->at, (spread->count + 1) * sizeof *at);
+        if (at == NULL)
+            return study_no_memory(problem);
+        spread->at = at;
+        at[spread->count] = (InputDeviation){i / BUFFERS + 1, (int)(i % BUFFERS), NULL, e, T};
+        TRY(study_copy_text(buffer->material, &at[spread->count++].source, problem));
     }
     return STATUS_OK;
 }
 
-static Status deviation_refuse(size_t index, const char *member, const char *detail,
-                               Problem *problem) {
-    char place[sizeof((Fault){0}.pointer)];
-    snprintf(place, sizeof place, "/study/spread/%zu%s%s", index, member[0] != '\0' ? "/" : "",
-             member);
-    return problem_add(problem, STATUS_INVALID, place, "%s", detail);
+enum { PLACE = sizeof((Fault){0}.pointer) };
+
+static const char *uncertainty_place(char place[PLACE], size_t index, const char *member) {
+    snprintf(place, PLACE, "/study/spread/%zu%s%s", index, member[0] != '\0' ? "/" : "", member);
+    return place;
 }
 
-static Status deviation_check_number(const SensitivityStudy *study, const Simulation *simulation,
-                                     size_t index, int parameter, Problem *problem) {
-    const double told = deviation_value(&study->spread.at[index], parameter);
-    const double given = parameter == SENSITIVITY_RESTITUTION ? study->restitution_deviation
-                                                              : study->contact_time_deviation;
+static Status uncertainty_check_number(const InputUncertainty *uncertainty,
+                                       const Simulation *simulation, size_t index, int parameter,
+                                       Problem *problem) {
+    const InputDeviation *deviation = &uncertainty->spread.at[index];
+    const double value = uncertainty_value(deviation, parameter);
     const char *why = perturbation_refuse(simulation, parameter);
-    char detail[256];
-    if (isnan(told))
+    const char *name = sensitivity_parameter_names[parameter];
+    char place[PLACE];
+    (void)uncertainty_place(place, index, name);
+    if (isnan(value))
         return STATUS_OK;
-    if (told > 0 && why != NULL) {
-        snprintf(detail, sizeof detail, "must be left out: %s", why);
-        return deviation_refuse(index, deviation_name(parameter), detail, problem);
-    }
-    if (!isnan(given)) {
-        snprintf(detail, sizeof detail, "must be left out: %s_deviation says it for all buffers",
-                 deviation_name(parameter));
-        return deviation_refuse(index, deviation_name(parameter), detail, problem);
-    }
-    if (told <= 1)
+    if (value > 0 && why != NULL)
+        return problem_add(problem, STATUS_INVALID, place, "must be left out: %s", why);
+    if (!isnan(uncertainty_common(uncertainty, parameter)))
+        return problem_add(problem, STATUS_INVALID, place,
+                           "must be left out: %s_deviation says it for all buffers", name);
+    if (value <= 1)
         return STATUS_OK;
-    snprintf(detail, sizeof detail,
-             "is %.3g of its value, as %.64s tells, and must be at most 1 to be drawn from: give "
-             "%s_deviation",
-             told, study->spread.at[index].source, deviation_name(parameter));
-    return deviation_refuse(index, deviation_name(parameter), detail, problem);
+    return problem_add(problem, STATUS_INVALID, place,
+                       "is %.3g of its value, as %.64s tells, and must be at most 1 to be drawn "
+                       "from: give %s_deviation",
+                       value, deviation->source, name);
 }
 
-// Who names a source says what that tells.
-static Status deviation_check_source(const SensitivitySpread *spread, const Buffer *buffer,
-                                     size_t index, Problem *problem) {
-    char detail[256];
-    if (spread->source == NULL)
+// A source that is named must be the buffer's material, and the numbers must be its own.
+static Status uncertainty_check_source(const InputDeviation *deviation, const Buffer *buffer,
+                                       size_t index, Problem *problem) {
+    char place[PLACE];
+    if (deviation->source == NULL)
         return STATUS_OK;
-    if (buffer->material == NULL || strcmp(spread->source, buffer->material) != 0)
-        return deviation_refuse(
-            index, "source",
-            "is not what stands at that buffer: leave it out, or name its material and "
-            "revision",
-            problem);
-    for (int parameter = SENSITIVITY_RESTITUTION; parameter <= SENSITIVITY_CONTACT_TIME;
-         parameter++) {
-        const double told = deviation_value(spread, parameter),
-                     known = deviation_recorded(buffer, parameter);
-        if (isnan(told) || told == known)
-            continue;
-        snprintf(detail, sizeof detail, "is %.6g, but %.80s tells %.6g: leave out the source", told,
-                 spread->source, known);
-        return deviation_refuse(index, deviation_name(parameter), detail, problem);
+    if (buffer->material == NULL || strcmp(deviation->source, buffer->material) != 0)
+        return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "source"),
+                           "is not what stands at that buffer: leave it out, or name its material "
+                           "and revision");
+    for (int parameter = 0; parameter < 2; parameter++) {
+        const double value = uncertainty_value(deviation, parameter),
+                     recorded = uncertainty_recorded(buffer, parameter);
+        if (!isnan(value) && value != recorded)
+            return problem_add(
+                problem, STATUS_INVALID,
+                uncertainty_place(place, index, sensitivity_parameter_names[parameter]),
+                "is %.6g, but %.80s tells %.6g: leave out the source", value, deviation->source,
+                recorded);
     }
     return STATUS_OK;
 }
 
-static Status deviation_check(const SensitivityStudy *study, const Simulation *simulation,
-                              size_t index, Problem *problem) {
+static Status uncertainty_check(const InputUncertainty *uncertainty, const Simulation *simulation,
+                                size_t index, Problem *problem) {
     const Dampers *dampers = &simulation->scene.dampers;
-    const SensitivitySpread *spread = &study->spread.at[index];
-    if (spread->damper > dampers->count)
-        return deviation_refuse(index, "damper", "is the number of no damper", problem);
+    const InputDeviation *deviation = &uncertainty->spread.at[index];
+    char place[PLACE];
+    if (deviation->damper > dampers->count)
+        return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "damper"),
+                           "is the number of no damper");
     const Buffer *buffer =
-        perturbation_buffer(&dampers->at[spread->damper - 1], (size_t)spread->buffer);
+        perturbation_buffer(&dampers->at[deviation->damper - 1], (size_t)deviation->buffer);
     if (!buffer_is_given(buffer))
-        return deviation_refuse(
-            index, "buffer",
-            "stands at no stop: where both have the same it is \"buffer\", else "
-            "\"left_buffer\" and \"right_buffer\"",
-            problem);
+        return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "buffer"),
+                           "stands at no stop: where both have the same it is \"buffer\", else "
+                           "\"left_buffer\" and \"right_buffer\"");
     for (size_t i = 0; i < index; i++)
-        if (study->spread.at[i].damper == spread->damper &&
-            study->spread.at[i].buffer == spread->buffer)
-            return deviation_refuse(index, "", "is of the same buffer as another: one each",
-                                    problem);
-    TRY(deviation_check_source(spread, buffer, index, problem));
-    const Status first =
-        deviation_check_number(study, simulation, index, SENSITIVITY_RESTITUTION, problem);
-    const Status second =
-        deviation_check_number(study, simulation, index, SENSITIVITY_CONTACT_TIME, problem);
-    return first != STATUS_OK ? first : second;
+        if (uncertainty->spread.at[i].damper == deviation->damper &&
+            uncertainty->spread.at[i].buffer == deviation->buffer)
+            return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, ""),
+                               "is of the same buffer as another: one each");
+    TRY(uncertainty_check_source(deviation, buffer, index, problem));
+    const Status restitution =
+        uncertainty_check_number(uncertainty, simulation, index, SENSITIVITY_RESTITUTION, problem);
+    const Status contact_time =
+        uncertainty_check_number(uncertainty, simulation, index, SENSITIVITY_CONTACT_TIME, problem);
+    return restitution != STATUS_OK ? restitution : contact_time;
 }
 
-static int deviation_compare(const void *a, const void *b) {
-    const SensitivitySpread *first = a, *second = b;
+static int uncertainty_compare(const void *a, const void *b) {
+    const InputDeviation *first = a, *second = b;
     if (first->damper != second->damper)
         return first->damper < second->damper ? -1 : 1;
     return (first->buffer > second->buffer) - (first->buffer < second->buffer);
 }
 
-// A list that tells nothing of one of them leaves that sure.
-static void deviation_set_certain(SensitivityStudy *study, int parameter) {
-    double *given = deviation_common(study, parameter);
-    for (size_t i = 0; i < study->spread.count; i++)
-        if (!isnan(deviation_value(&study->spread.at[i], parameter)))
+// A number without any deviation in the list is exact.
+static void uncertainty_fill_exact(InputUncertainty *uncertainty, int parameter, double *common) {
+    for (size_t i = 0; i < uncertainty->spread.count; i++)
+        if (!isnan(uncertainty_value(&uncertainty->spread.at[i], parameter)))
             return;
-    if (isnan(*given))
-        *given = 0;
+    if (isnan(*common))
+        *common = 0;
 }
 
-Status deviations_complete(SensitivityStudy *study, const Simulation *simulation,
-                           Problem *problem) {
-    SensitivitySpreads *spreads = &study->spread;
+Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
+                            Problem *problem) {
+    InputDeviations *spread = &uncertainty->spread;
     Status status = STATUS_OK;
-    if (spreads->count == 0)
-        TRY(deviation_fill_recorded(study, simulation, problem));
-    for (size_t i = 0; i < spreads->count; i++)
-        if (deviation_check(study, simulation, i, problem) != STATUS_OK)
+    if (spread->count == 0)
+        TRY(uncertainty_fill_recorded(uncertainty, simulation, problem));
+    for (size_t i = 0; i < spread->count; i++)
+        if (uncertainty_check(uncertainty, simulation, i, problem) != STATUS_OK)
             status = STATUS_INVALID;
     TRY(status);
-    if (spreads->count > 1)
-        qsort(spreads->at, spreads->count, sizeof *spreads->at, deviation_compare);
-    deviation_set_certain(study, SENSITIVITY_RESTITUTION);
-    deviation_set_certain(study, SENSITIVITY_CONTACT_TIME);
+    if (spread->count > 1)
+        qsort(spread->at, spread->count, sizeof *spread->at, uncertainty_compare);
+    uncertainty_fill_exact(uncertainty, SENSITIVITY_RESTITUTION,
+                           &uncertainty->restitution_deviation);
+    uncertainty_fill_exact(uncertainty, SENSITIVITY_CONTACT_TIME,
+                           &uncertainty->contact_time_deviation);
     return STATUS_OK;
 }

@@ -1,42 +1,79 @@
-// A scene with one of its parameters a little different, or with e and T_c drawn anew. Not a run.
-// Used by sensitivity.c and sensitivity_run.c.
+// A scene with one parameter scaled, or with restitutions and contact times drawn at random, and
+// the uncertainty of these inputs.
 #ifndef CORE_STUDY_PARAMETER_PERTURBATION_H
 #define CORE_STUDY_PARAMETER_PERTURBATION_H
 
-#include "core/study/sensitivity.h"
+#include "core/simulation/simulation.h"
 
-// Why a completed simulation cannot be changed by a parameter; NULL: it can. A static text.
-const char *perturbation_refuse(const Simulation *simulation, int parameter);
+// A parameter stands for that of all dampers and sides.
+typedef enum SensitivityParameter {
+    SENSITIVITY_RESTITUTION,
+    SENSITIVITY_CONTACT_TIME,
+    SENSITIVITY_STIFFNESS,
+    SENSITIVITY_DAMPING,
+    SENSITIVITY_MASS,
+    SENSITIVITY_CLEARANCE,
+    SENSITIVITY_PARAMETERS
+} SensitivityParameter;
+extern const char *const sensitivity_parameter_names[]; // NULL-terminated
 
-// The largest relative step up that a parameter allows, at most `step`: e ends at 1.
-double perturbation_max_step(const Simulation *simulation, int parameter, double step);
+typedef enum SensitivityBuffer {
+    SENSITIVITY_BOTH,
+    SENSITIVITY_LEFT,
+    SENSITIVITY_RIGHT
+} SensitivityBuffer;
 
-// Sets `member`, a copy of `simulation`, to it with `factor` times the parameter.
-void perturbation_apply(const Simulation *simulation, int parameter, double factor,
-                        Simulation *member);
+// Relative standard deviations of one buffer's restitution and contact time; NAN: exact.
+typedef struct InputDeviation {
+    uint64_t damper; // from 1
+    int buffer;      // SensitivityBuffer
+    char *source;    // "sponge@1"; NULL: given by the user
+    double restitution, contact_time;
+} InputDeviation;
 
-// Buffers that are drawn, each for itself: those that are given, one where both sides share it.
-size_t perturbation_buffers(const Simulation *simulation);
+typedef struct InputDeviations {
+    InputDeviation *at;
+    size_t count;
+} InputDeviations;
 
-// Sets `member` to run `run` of the study: restitution[i] and contact_time[i] get the factors of
-// buffer i. Logarithms of factors are normal, so that the mean is 1 and the relative deviation the
-// study's; what would put e beyond 1 is drawn again.
-void perturbation_draw(const SensitivityStudy *study, const Simulation *simulation, uint64_t run,
-                       Simulation *member, double *restitution, double *contact_time);
+// Each of the two deviations is given for all buffers at once (0: exact), or, where that is NAN,
+// buffer by buffer in `spread`.
+typedef struct InputUncertainty {
+    double restitution_deviation, contact_time_deviation;
+    InputDeviations spread; // none until completed: from the revisions of the buffers' materials
+} InputUncertainty;
 
-// Relative standard deviations of each buffer's e and T_c: those of the study for all buffers, or
-// buffer by buffer as their materials were measured.
-//
-// Completes and validates them for a completed simulation: what is not given is read from the
-// materials; a number without a deviation is exact.
-Status deviations_complete(SensitivityStudy *study, const Simulation *simulation, Problem *problem);
+// Validates and completes it for a completed simulation, below "/study". A number without a
+// deviation is exact.
+Status uncertainty_complete(InputUncertainty *uncertainty, const Simulation *simulation,
+                            Problem *problem);
 
 // Whether any number has a deviation.
-bool deviations_exist(const SensitivityStudy *study);
+bool uncertainty_exists(const InputUncertainty *uncertainty);
 
 // Relative standard deviation of a buffer's SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME;
 // dampers from 0.
-double deviation_find(const SensitivityStudy *study, size_t damper, SensitivityBuffer buffer,
-                      int parameter);
+double uncertainty_find(const InputUncertainty *uncertainty, size_t damper,
+                        SensitivityBuffer buffer, int parameter);
+
+// Why a completed simulation has no relative change of a parameter; NULL: it has. A static text.
+const char *perturbation_refuse(const Simulation *simulation, int parameter);
+
+// Largest relative step up, at most `step`: a restitution ends at 1.
+double perturbation_max_step(const Simulation *simulation, int parameter, double step);
+
+// Sets the parameter of `target`, a copy of `simulation`, to `factor` times that of `simulation`.
+void perturbation_apply(const Simulation *simulation, int parameter, double factor,
+                        Simulation *target);
+
+// Number of buffers that are drawn: those that are given, one where both sides share it.
+size_t perturbation_buffers(const Simulation *simulation);
+
+// Draws run `run` into `target`, a copy of `simulation`; restitution[i] and contact_time[i] are the
+// factors of buffer i. They are log-normal with mean 1 and the given relative deviation; a factor
+// that puts a restitution beyond 1 is drawn again.
+void perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
+                       const Simulation *simulation, uint64_t run, Simulation *target,
+                       double *restitution, double *contact_time);
 
 #endif

@@ -1,23 +1,22 @@
-// All numbers of a statistic are in the table, so that means and deviations are of two passes: the
-// second one corrects the first one's rounding. Quantiles are linear between order statistics, as
-// NumPy's.
+// Means and deviations take two passes; the second corrects the rounding of the first.
 #include "core/study/statistics.h"
 
+#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/math/student_t.h"
 
-static const char *const units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
-
-EnsembleStatistic *ensemble_statistic(EnsembleStatistics *statistics, int metric) {
-    EnsembleStatistic *const all[] = {
-        &statistics->peak_displacement, &statistics->rms_displacement,
-        &statistics->peak_acceleration, &statistics->rms_acceleration,
-        &statistics->impacts,           &statistics->peak_contact_force,
-    };
-    return all[metric];
-}
+const char *const statistics_metric_names[] = {
+    "peak_displacement",
+    "rms_displacement",
+    "peak_acceleration",
+    "rms_acceleration",
+    "impacts",
+    "peak_contact_force",
+    "psd",
+    NULL,
+};
+static const char *const statistics_units[] = {"m", "m", "m/s^2", "m/s^2", "1", "N"};
 
 double statistics_value(const Summary *summary, int metric) {
     const double all[] = {
@@ -31,19 +30,19 @@ double statistics_value(const Summary *summary, int metric) {
     return all[metric];
 }
 
-static bool statistics_is_known(const EnsembleRun *run, int metric) {
+static bool statistics_is_known(const RunRecord *run, int metric) {
     return run->why == NULL && !isnan(statistics_value(&run->summary, metric));
 }
 
-// What is known of a statistic, in the order of the seeds.
+// Known values of a metric, in the order of the table.
 typedef struct Values {
     double *at;
     size_t count;
-    double mean, deviation; // NAN of too few
+    double mean, deviation; // NAN for too few values
     double skewness;
 } Values;
 
-// In units of a power of two near the largest, so that no square or cube leaves what doubles hold.
+// In units of a power of two near the largest, so that squares and cubes do not overflow.
 static void statistics_measure(Values *values) {
     const double n = (double)values->count;
     double largest = 0, sum = 0, rest = 0, squares = 0, cubes = 0;
@@ -64,18 +63,18 @@ static void statistics_measure(Values *values) {
     values->mean = ldexp(mean, exponent);
     if (values->count < 2)
         return;
-    const double usual = sqrt(squares / n);
+    const double sigma = sqrt(squares / n);
     values->deviation = ldexp(sqrt(squares / (n - 1)), exponent);
-    values->skewness = usual > 0 ? cubes / n / (usual * usual * usual) : 0;
+    values->skewness = sigma > 0 ? cubes / n / (sigma * sigma * sigma) : 0;
 }
 
-static Status statistics_collect(const EnsembleRuns *table, int metric, Values *values,
+static Status statistics_collect(const RunTable *table, int metric, Values *values,
                                  Problem *problem) {
     *values = (Values){.at = calloc(table->count + 1, sizeof *values->at),
                        .mean = (double)NAN,
                        .deviation = (double)NAN};
     if (values->at == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's statistics");
+        return study_no_memory(problem);
     for (size_t i = 0; i < table->count; i++)
         if (statistics_is_known(&table->at[i], metric))
             values->at[values->count++] = statistics_value(&table->at[i].summary, metric);
@@ -100,68 +99,63 @@ double statistics_quantile(const double *sorted, size_t count, double share) {
     return from + (place - (double)below) * (to - from);
 }
 
-// The first run that has this number.
-static uint64_t statistics_seed(const EnsembleRuns *table, int metric, double value) {
+// Number of the first run with this value.
+static uint64_t statistics_find_run(const RunTable *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)
         if (statistics_is_known(&table->at[i], metric) &&
             statistics_value(&table->at[i].summary, metric) == value)
-            return table->at[i].seed;
+            return table->at[i].number;
     return COUNT_ABSENT;
 }
 
-static void statistics_fill(const EnsembleRuns *table, int metric, Values *values,
-                            EnsembleStatistic *statistic) {
-    statistic->count = values->count;
-    if (values->count == 0)
-        return;
-    statistic->mean = values->mean;
-    if (values->count > 1) {
-        statistic->standard_deviation = values->deviation;
-        statistic->standard_error = values->deviation / sqrt((double)values->count);
-        const double half =
-            student_quantile(ENSEMBLE_INTERVAL, values->count - 1) * statistic->standard_error;
-        statistic->low = values->mean - half;
-        statistic->high = values->mean + half;
-    }
-    statistics_sort(values->at, values->count);
-    statistic->minimum = values->at[0];
-    statistic->q05 = statistics_quantile(values->at, values->count, 0.05);
-    statistic->q25 = statistics_quantile(values->at, values->count, 0.25);
-    statistic->median = statistics_quantile(values->at, values->count, 0.5);
-    statistic->q75 = statistics_quantile(values->at, values->count, 0.75);
-    statistic->q95 = statistics_quantile(values->at, values->count, 0.95);
-    statistic->maximum = values->at[values->count - 1];
-    statistic->minimum_seed = statistics_seed(table, metric, statistic->minimum);
-    statistic->maximum_seed = statistics_seed(table, metric, statistic->maximum);
-}
-
-Status statistics_fold(const EnsembleRuns *table, int metric, EnsembleStatistic *statistic,
+Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic,
                        Problem *problem) {
     Values values;
-    TRY(statistics_collect(table, metric, &values, problem));
-    statistics_fill(table, metric, &values, statistic);
-    free(values.at);
     free(statistic->unit);
-    statistic->unit = strdup(units[metric]);
-    return statistic->unit != NULL
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's statistics");
-}
-
-Status statistics_spread(const EnsembleRuns *table, int metric, Spread *spread, Problem *problem) {
-    Values values;
+    statistic->metric = metric;
+    TRY(study_copy_text(statistics_units[metric], &statistic->unit, problem));
     TRY(statistics_collect(table, metric, &values, problem));
-    // Where all are alike there may be rare ones that are not: nothing is known of them.
-    const double relative = values.deviation / fabs(values.mean);
-    *spread = (Spread){.count = values.count,
-                       .relative = relative > 0 ? relative : (double)INFINITY,
-                       .skewness = values.skewness,
-                       .freedom = 1};
+    const size_t count = values.count;
+    statistic->count = count;
+    statistic->mean = values.mean;
+    if (count > 1) {
+        statistic->standard_deviation = values.deviation;
+        statistic->standard_error = values.deviation / sqrt((double)count);
+        const double half =
+            student_quantile(STATISTICS_CONFIDENCE, count - 1) * statistic->standard_error;
+        statistic->low = values.mean - half;
+        statistic->high = values.mean + half;
+    }
+    if (count > 0) {
+        statistics_sort(values.at, count);
+        statistic->minimum = values.at[0];
+        statistic->q05 = statistics_quantile(values.at, count, 0.05);
+        statistic->q25 = statistics_quantile(values.at, count, 0.25);
+        statistic->median = statistics_quantile(values.at, count, 0.5);
+        statistic->q75 = statistics_quantile(values.at, count, 0.75);
+        statistic->q95 = statistics_quantile(values.at, count, 0.95);
+        statistic->maximum = values.at[count - 1];
+        statistic->minimum_seed = statistics_find_run(table, metric, statistic->minimum);
+        statistic->maximum_seed = statistics_find_run(table, metric, statistic->maximum);
+    }
     free(values.at);
     return STATUS_OK;
 }
 
-void statistics_trust(const EnsembleRuns *table, EnsembleTrust *trust) {
+Status statistics_spread(const RunTable *table, int metric, RunSpread *spread, Problem *problem) {
+    Values values;
+    TRY(statistics_collect(table, metric, &values, problem));
+    // Equal values say nothing about the spread: rare ones may differ.
+    const double relative = values.deviation / fabs(values.mean);
+    *spread = (RunSpread){.count = values.count,
+                          .relative = relative > 0 ? relative : (double)INFINITY,
+                          .skewness = values.skewness,
+                          .freedom = 1};
+    free(values.at);
+    return STATUS_OK;
+}
+
+void statistics_trust(const RunTable *table, RunTrust *trust) {
     for (size_t i = 0; i < table->count; i++) {
         const Summary *summary = &table->at[i].summary;
         if (table->at[i].why != NULL)
@@ -172,38 +166,11 @@ void statistics_trust(const EnsembleRuns *table, EnsembleTrust *trust) {
             trust->whole++;
         else
             trust->beyond++;
-        // fmin and fmax pass over what is unknown.
+        // fmin and fmax ignore NAN.
         trust->shortest_horizon = fmin(trust->shortest_horizon, summary->trust_horizon);
         trust->largest_error_estimate =
             fmax(trust->largest_error_estimate, summary->error_estimate);
         trust->largest_energy_residual =
             fmax(trust->largest_energy_residual, summary->energy_residual);
     }
-}
-
-Status statistics_failures(const EnsembleRuns *table, const Status *statuses,
-                           EnsembleFailures *failures, Problem *problem) {
-    failures->at = calloc(STATUS_COUNT, sizeof *failures->at);
-    if (failures->at == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's failures");
-    for (size_t i = 0; i < table->count; i++) {
-        const EnsembleRun *run = &table->at[i];
-        if (run->why == NULL)
-            continue;
-        size_t at = 0;
-        while (at < failures->count &&
-               strcmp(failures->at[at].reason, status_slug(statuses[i])) != 0)
-            at++;
-        EnsembleFailure *failure = &failures->at[at];
-        if (at == failures->count) {
-            failures->count++;
-            failure->first_seed = run->seed;
-            failure->reason = strdup(status_slug(statuses[i]));
-            failure->detail = strdup(run->why);
-            if (failure->reason == NULL || failure->detail == NULL)
-                return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's failures");
-        }
-        failure->count++;
-    }
-    return STATUS_OK;
 }

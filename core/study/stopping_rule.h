@@ -1,31 +1,29 @@
-// When an ensemble under a target has enough runs: how far the mean of those made may be from the
-// mean of all that were asked for. Not what the mean is of: that is ensemble_statistics.h and
-// ensemble_spectra.h, which tell the spread. Used by ensemble_run.c and the tests.
+// When an ensemble under a target has enough runs: how far the mean of the runs made may be from
+// the mean of all runs requested.
 #ifndef CORE_STUDY_STOPPING_RULE_H
 #define CORE_STUDY_STOPPING_RULE_H
 
 #include <stddef.h>
 
-// What the runs made so far tell of one another.
-typedef struct Spread {
+// Differences among the runs made so far.
+typedef struct RunSpread {
     size_t count;    // runs
-    double relative; // standard deviation of one run over the mean; INFINITY: not known, or no mean
+    double relative; // standard deviation of one run over the mean; INFINITY: unknown, or no mean
     double skewness;
-    // How many independent numbers share the spread: 1 for a statistic, more for spectra.
-    double freedom;
-} Spread;
+    double freedom; // independent numbers that share the spread: 1 of a statistic, more of spectra
+} RunSpread;
 
-#define ENSEMBLE_CONFIDENCE 0.99 // of the rule
-enum { ENSEMBLE_PILOT = 8 };
+#define STOPPING_RULE_CONFIDENCE 0.99
+enum { STOPPING_RULE_PILOT = 8 }; // runs before the first check
 
-// The error of the mean of `count` of `all` runs against the mean of all, relative to it, that is
-// not passed with ENSEMBLE_CONFIDENCE; 0 where none is left.
-double stopping_rule_error(const Spread *spread, size_t count, size_t all);
+// Relative error of the mean of `count` of `all` runs against the mean of all, which is exceeded
+// with a probability of 1 - STOPPING_RULE_CONFIDENCE; 0 if count >= all.
+double stopping_rule_error(const RunSpread *spread, size_t count, size_t all);
 
-// The fewest runs, from those made on, by which the error is foretold to be within `target`.
-size_t stopping_rule_predict(const Spread *spread, size_t all, double target);
+// Smallest number of runs, at least those made, whose estimated error is within `target`.
+size_t stopping_rule_predict(const RunSpread *spread, size_t all, double target);
 
-// The number of runs at which the error is looked at after it was at `count`.
+// Number of runs at the check that follows the one at `count`.
 size_t stopping_rule_next_check(size_t count);
 
 #endif

@@ -1,6 +1,10 @@
-// A study's whole way on one thread. Who shares members out goes the same way: begin, make each,
-// fold each in turn, end.
+// The steps of a study: begin, make and fold each member, end. study_run takes them all on one
+// thread; an executor with many threads calls them one by one.
 #include "core/study/study.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
@@ -9,55 +13,114 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
     const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
     own.progress = &progress;
-    *work = NULL;
     *answer = variant_new(kind->answer);
-    if (*answer == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer");
-    const Status status = kind->members->begin((const Study *)(const void *)study, simulation, &own,
-                                               *answer, work, problem);
+    StudyWork *made = *work = calloc(1, kind->work_size);
+    Status status = STATUS_NO_MEMORY;
+    if (*answer == NULL || made == NULL) {
+        (void)study_no_memory(problem);
+    } else {
+        *made =
+            (StudyWork){.kind = kind, .study = study, .simulation = simulation, .answer = *answer};
+        status = kind->begin(made, &own, problem);
+        if (made->wanted == 0)
+            made->wanted = made->members;
+        made->expected = made->members;
+    }
     if (status != STATUS_OK) {
+        study_free(made);
         variant_free(*answer);
+        *work = NULL;
         *answer = NULL;
     }
     return status;
 }
 
+Status study_part_make(const StudyWork *work, size_t member, const StudyTools *tools,
+                       StudyPart **made, Problem *problem) {
+    const StudyKind *kind = work->kind;
+    StudyPart *part = *made = calloc(1, kind->part_size);
+    Simulation scene = {0};
+    Outcome *outcome = NULL;
+    if (part == NULL)
+        return study_no_memory(problem);
+    RunRecord *run = &part->run;
+    run->steps = (double)NAN;
+    (void)fields_default(summary_fields, &run->summary); // absent: nothing to allocate
+    run->status = kind->scene(work, member, tools, &scene, part, problem);
+    part->is_refused = run->status != STATUS_OK;
+    if (run->status == STATUS_OK)
+        run->status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
+                                     &outcome, problem);
+    simulation_clear(&scene);
+    if (study_run_ends_study(run->status))
+        return run->status;
+    if (run->status != STATUS_OK) {
+        const Status copied = study_copy_text(problem->detail, &run->why, NULL);
+        problem_clear(problem);
+        return copied == STATUS_OK ? copied : study_no_memory(problem);
+    }
+    Status status = STATUS_OK;
+    run->steps = outcome->steps;
+    run->summary = outcome->summary;
+    if (kind->keep != NULL) {
+        status = kind->keep(work, outcome, tools, part, problem);
+    } else {
+        part->spectrum = outcome->spectrum;
+        outcome->spectrum = (Spectrum){0};
+    }
+    outcome_unref(outcome);
+    return status;
+}
+
+Status study_part_fold(StudyWork *work, size_t member, StudyPart *part, Problem *problem) {
+    return work->kind->fold(work, member, part, problem);
+}
+
 Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem) {
-    const StudyMembers *members = work->kind->members;
-    return members->end != NULL ? members->end(work, tools, problem) : STATUS_OK;
+    return work->kind->end != NULL ? work->kind->end(work, tools, problem) : STATUS_OK;
+}
+
+void study_part_free(const StudyWork *work, StudyPart *part) {
+    if (part == NULL)
+        return;
+    if (work->kind->clear != NULL)
+        work->kind->clear(part);
+    free(part->run.why);
+    spectrum_clear(&part->spectrum);
+    free(part);
 }
 
 void study_free(StudyWork *work) {
-    if (work != NULL)
-        work->kind->members->free(work);
+    if (work != NULL && work->kind != NULL && work->kind->free != NULL)
+        work->kind->free(work);
+    free(work);
 }
 
-static Status study_make_member(StudyWork *work, size_t member, const StudyTools *tools,
-                                const Progress *whole, Problem *problem) {
-    const StudyMembers *members = work->kind->members;
+static Status study_run_member(StudyWork *work, size_t member, const StudyTools *tools,
+                               const Progress *whole, Problem *problem) {
     const double share = 1 / (double)work->expected;
     ProgressRange range = progress_range(whole, (double)member * share, share);
     const Progress progress = progress_range_view(&range);
     StudyTools own = *tools;
-    void *part = NULL;
+    StudyPart *part = NULL;
     own.progress = &progress;
     if (!progress_advance(&progress, 0))
         return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
-    Status status = members->make(work, member, &own, &part, problem);
+    Status status = study_part_make(work, member, &own, &part, problem);
     if (status == STATUS_OK)
-        status = members->fold(work, member, part, problem);
-    members->drop(part);
+        status = study_part_fold(work, member, part, problem);
+    study_part_free(work, part);
     return status;
 }
 
-static Status study_make_all(const Variant *study, const Simulation *simulation,
-                             const StudyTools *tools, Variant **answer, Problem *problem) {
+static Status study_run_members(const Variant *study, const Simulation *simulation,
+                                const StudyTools *tools, Variant **answer, Problem *problem) {
     StudyWork *work;
     ProgressRange range = progress_range(tools->progress, STUDY_BEGUN, 1 - STUDY_BEGUN);
     const Progress whole = progress_range_view(&range);
     Status status = study_begin(study, simulation, tools, answer, &work, problem);
     for (size_t i = 0; status == STATUS_OK && i < work->wanted; i++)
-        status = study_make_member(work, i, tools, &whole, problem);
+        status = study_run_member(work, i, tools, &whole, problem);
     if (status == STATUS_OK)
         status = study_end(work, tools, problem);
     study_free(work);
@@ -68,14 +131,12 @@ Status study_run(const Variant *study, const Simulation *simulation, const Study
                  Variant **answer, Problem *problem) {
     const StudyKind *kind = study_kind(study);
     Status status;
-    if (kind->members != NULL) {
-        status = study_make_all(study, simulation, tools, answer, problem);
+    if (kind->run == NULL) {
+        status = study_run_members(study, simulation, tools, answer, problem);
     } else {
         *answer = variant_new(kind->answer);
-        status = *answer == NULL
-                     ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's answer")
-                     : kind->run((const Study *)(const void *)study, simulation, tools, *answer,
-                                 problem);
+        status = *answer == NULL ? study_no_memory(problem)
+                                 : kind->run(study, simulation, tools, *answer, problem);
     }
     if (status != STATUS_OK) {
         variant_free(*answer);

@@ -1,75 +1,68 @@
-// What ONE study is; studies.c lists all. A study asks one completed scene many ways and folds what
-// comes of it into an answer. Not a run of a scene: that is simulation/. Used by inquiry.c, by the
-// jobs room and by the commands.
+// One study: many runs of a completed scene, folded into one answer. studies.c lists all kinds.
 #ifndef CORE_STUDY_STUDY_H
 #define CORE_STUDY_STUDY_H
 
-#include "core/simulation/simulation.h"
-
-// First member of every study's struct: what was asked. The scene's "study" object.
-typedef struct Study {
-    Variant variant; // kind is a StudyKind's
-} Study;
-
-// What a study is given to work with.
-typedef struct StudyTools {
-    const SimulationLimits *limits; // of every run, and of the steps of all; may be NULL
-    const Progress *progress;       // may be NULL
-    Workspace *workspace;           // may be NULL
-    double (*cpu)(void *context);   // CPU time that this thread has taken [s]
-    void *cpu_context;
-} StudyTools;
+#include "core/study/study_run.h"
 
 typedef struct StudyKind StudyKind;
 
-// A study made ready for its members, first member of each kind's own struct: runs that know
-// nothing of one another, made by any threads in any order, and folded in theirs.
+// A study in progress; first member of each kind's own struct. Its members are independent runs:
+// they are made by any threads in any order, and folded in the order of their numbers.
 typedef struct StudyWork {
     const StudyKind *kind;
+    const void *study; // the request; borrowed, as the next two
+    const Simulation *simulation;
+    void *answer;
     size_t members;    // at most
-    size_t wanted;     // these first ones: with the last of them folded it is at its end
-    size_t expected;   // so many will be wanted, as far as can be told
-    size_t bytes;      // that it holds, about
-    size_t part_bytes; // and each part, at most
+    size_t wanted;     // the first ones; the study ends when the last of them is folded
+    size_t expected;   // estimate of the final `wanted`
+    size_t bytes;      // of memory held by the work, about
+    size_t part_bytes; // and by each part, at most
 } StudyWork;
 
-typedef struct StudyMembers {
-    // Makes ready: judges, runs what all members stand beside, fills what is known of `answer`,
-    // which it borrows with `study` and `simulation`. *work is freed by `free`, NULL after a
-    // failure.
-    Status (*begin)(const Study *study, const Simulation *simulation, const StudyTools *tools,
-                    Variant *answer, StudyWork **work, Problem *problem);
-    // Makes a member, from 0, beside others: `work` does not change. A member that fails is a part
-    // too; the status tells what ends the study. *part is freed by `drop`. `problem` is not NULL.
-    Status (*make)(const StudyWork *work, size_t member, const StudyTools *tools, void **part,
-                   Problem *problem);
-    // Takes what it needs out of a part, member after member. May change what is wanted.
-    Status (*fold)(StudyWork *work, size_t member, void *part, Problem *problem);
-    void (*drop)(void *part); // NULL is fine, as is one that could not be made
-    // All that were wanted are folded: what remains to be told. NULL: nothing.
-    Status (*end)(StudyWork *work, const StudyTools *tools, Problem *problem);
-    void (*free)(StudyWork *work);
-} StudyMembers;
+// Result of one member; first member of each kind's own struct.
+typedef struct StudyPart {
+    RunRecord run;
+    bool is_refused; // it failed before its run
+    Spectrum spectrum;
+} StudyPart;
 
-#define STUDY_BEGUN 0.1 // of its progress, until members are made
+#define STUDY_BEGUN 0.1 // progress of the study when its first member is made
 
 struct StudyKind {
     Kind kind;
-    const Kind *answer; // of the same name; its value struct begins with a Variant
-    const char *lessen; // what makes it shorter: "ask for fewer runs"
-    bool is_measured;   // its answer holds CPU times, which another time will differ
-    double most_runs;   // it may take as long as so many runs may; 0: ten
-    // Judges what rows cannot say and completes defaults, below "/study", for a completed scene.
-    Status (*complete)(Study *study, const Simulation *simulation, const SimulationLimits *limits,
+    const Kind *answer;  // of the same name; its value struct begins with a Variant
+    const char *shorten; // what makes it shorter: "ask for fewer runs"
+    bool is_measured;    // its answer holds CPU times, which differ in another run
+    double max_runs;     // its cost may be that of so many runs at their limit; 0: ten
+    // Validates what rows cannot express and completes defaults, below "/study", for a completed
+    // scene.
+    Status (*complete)(void *study, const Simulation *simulation, const SimulationLimits *limits,
                        Problem *problem);
-    // What it will cost, in solver steps.
-    Status (*cost)(const Study *study, const Simulation *simulation, const SimulationLimits *limits,
+    // Estimated cost in solver steps.
+    Status (*cost)(const void *study, const Simulation *simulation, const SimulationLimits *limits,
                    double *steps, Problem *problem);
-    const StudyMembers *members; // NULL: it is made by `run`, on one thread
-    // Fills `answer`, which holds its defaults; the caller frees it, also after a failure. Stops
-    // with STATUS_CANCELLED when the progress says so.
-    Status (*run)(const Study *study, const Simulation *simulation, const StudyTools *tools,
-                  Variant *answer, Problem *problem);
+    // Runs a study without members on one thread. Fills `answer`, which holds its defaults, in part
+    // after a failure. The functions below are NULL then.
+    Status (*run)(const void *study, const Simulation *simulation, const StudyTools *tools,
+                  void *answer, Problem *problem);
+    size_t work_size, part_size; // of the kind's structs, which begin zeroed
+    // Validates, runs what all members need, fills `members` and the first part of the answer.
+    // `free` follows also after a failure.
+    Status (*begin)(void *work, const StudyTools *tools, Problem *problem);
+    // Makes the scene of a member, from 0; other threads make other members at the same time.
+    // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
+    Status (*scene)(const void *work, size_t member, const StudyTools *tools, Simulation *scene,
+                    void *part, Problem *problem);
+    // Keeps what the fold needs of a run beside steps and summary. NULL: the spectra.
+    Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools, void *part,
+                   Problem *problem);
+    // Adds a part to the answer and may take its contents. May change what is wanted.
+    Status (*fold)(void *work, size_t member, void *part, Problem *problem);
+    // Completes the answer when all wanted members are folded. May be NULL.
+    Status (*end)(void *work, const StudyTools *tools, Problem *problem);
+    void (*clear)(void *part); // what a part owns beside its StudyPart; may be NULL
+    void (*free)(void *work);  // what the work owns; may be NULL
 };
 
 extern const StudyKind *const studies[]; // NULL-terminated
@@ -81,31 +74,44 @@ static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;
 }
 
-// An answer on its own, as it is kept: {"study": {"kind": ...}}. Cleared by fields_clear.
+// Whether a study has members, which threads can share.
+static inline bool study_has_members(const Variant *study) {
+    return study_kind(study)->run == NULL;
+}
+
+// An answer as a document: {"study": {"kind": ...}}. Cleared by fields_clear.
 typedef struct StudyAnswer {
     Variant *study;
 } StudyAnswer;
 extern const Field study_answer_fields[];
 
-// Runs a completed study of a completed simulation, member after member. The answer is freed by
-// variant_free; NULL after a failure. `problem` is empty.
+// Runs a completed study of a completed simulation on this thread. The answer is freed by
+// variant_free; NULL after a failure. Stops with STATUS_CANCELLED when the progress says so.
+// `problem` is empty.
 Status study_run(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                  Variant **answer, Problem *problem);
 
-// The same in steps, for those who make members side by side: until there is work to share out. The
-// work borrows all three, the answer too. NULL both after a failure.
+// The same in steps, for a study with members that several threads make: begin, make and fold each
+// wanted member, end, free. The work borrows study, simulation and answer; both outputs are NULL
+// after a failure.
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem);
+// Makes a member. One that fails is a part too; an error ends the study. The part is freed by
+// study_part_free in any case. `problem` is not NULL.
+Status study_part_make(const StudyWork *work, size_t member, const StudyTools *tools,
+                       StudyPart **part, Problem *problem);
+Status study_part_fold(StudyWork *work, size_t member, StudyPart *part, Problem *problem);
 Status study_end(StudyWork *work, const StudyTools *tools, Problem *problem);
-void study_free(StudyWork *work); // NULL is fine
+void study_part_free(const StudyWork *work, StudyPart *part); // NULL is fine
+void study_free(StudyWork *work);                             // NULL is fine
 
-// All that a document asks: a scene, and perhaps a study of it.
+// A document: a scene, and perhaps a study of it.
 typedef struct StudyRequest {
     Simulation simulation;
-    Variant *study; // a Study; NULL: none
+    Variant *study; // NULL: none
 } StudyRequest;
 
-// Without a study, to the byte what simulation_fields are: in JSON and in the canonical form.
+// Without a study the same bytes as simulation_fields, in JSON and in the canonical form.
 extern const Field study_request_fields[];
 
 void study_request_clear(StudyRequest *request);

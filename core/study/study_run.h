@@ -1,42 +1,103 @@
-// One run of a study: the completed scene with something changed and nothing sampled that nobody
-// looks at. Not the study. Used by the studies whose runs are scenes.
+// One run of a study: its scene, its result, and the tables that hold the results of many.
 #ifndef CORE_STUDY_STUDY_RUN_H
 #define CORE_STUDY_STUDY_RUN_H
 
-#include "core/study/study.h"
+#include "core/simulation/simulation.h"
 
-// The scene without sampled channels; spectra and ledger as there. `target` is cleared by
-// simulation_clear in any case.
-Status study_run_copy(const Simulation *simulation, Simulation *target, Problem *problem);
+// The environment of a study.
+typedef struct StudyTools {
+    const SimulationLimits *limits; // of every run, and of the steps of all; may be NULL
+    const Progress *progress;       // may be NULL
+    Workspace *workspace;           // may be NULL
+    double (*cpu)(void *context);   // CPU time of this thread [s]
+    void *cpu_context;
+} StudyTools;
 
-// Where an error is aimed at, each run could take another way to it, and runs would differ by their
-// ways: takes the solver that is chosen without a target.
-Status study_run_fix_solver(Simulation *target, Problem *problem);
+// Result of one run. A run that failed has a reason and no numbers.
+typedef struct RunRecord {
+    uint64_t number; // its seed, or its place
+    Status status;
+    char *why;       // reason of the failure; NULL: none
+    double steps;    // solver steps; NAN after a failure
+    Summary summary; // absent after a failure
+} RunRecord;
 
-// Whether contacts of the simulation have a force.
+typedef struct RunTable {
+    RunRecord *at;
+    size_t count;
+} RunTable;
+
+// Runs that failed for one reason.
+typedef struct StudyFailure {
+    int status;            // the key of the reason
+    char *reason;          // in a word; may be NULL
+    uint64_t count, first; // number of the first of them
+    char *detail;          // its `why`
+} StudyFailure;
+
+typedef struct StudyFailures {
+    StudyFailure *at;
+    size_t count;
+} StudyFailures;
+
+// Counts a failure. STATUS_NO_MEMORY.
+Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
+                          const char *why, Problem *problem);
+
+// Counts the failures of a table by their status, in its order.
+Status study_failures_fill(const RunTable *table, StudyFailures *failures, Problem *problem);
+
+// Densities of many runs at each frequency; a study fills some of the lists.
+typedef struct RunSpectrum {
+    char *channel, *unit;
+    Reals mean, standard_deviation, low, high; // the last two of the mean
+    Reals value, q05, median, q95;             // the first of the study's own scene
+} RunSpectrum;
+
+typedef struct RunSpectra {
+    RunSpectrum *at;
+    size_t count;
+} RunSpectra;
+
+// Fills the frequencies and the channels' names and units like those of a run. STATUS_NO_MEMORY.
+Status run_spectra_make(const Spectrum *like, Reals *frequency, RunSpectra *spectra,
+                        Problem *problem);
+
+// Limit on the densities of one run's spectra.
+enum { STUDY_DENSITIES_MAX = 1 << 18 };
+
+// Densities that a run's spectra hold; 0 without spectra.
+double study_run_densities(const Simulation *simulation);
+
+// Whether the contacts of the simulation have a force.
 bool study_run_has_force(const Simulation *simulation);
 
-// Whether a fault of one run ends the whole study.
-static inline bool study_run_ends_all(Status status) {
+// Validates that the scene can have a metric, the value of /study/metric.
+Status study_run_check_metric(const Simulation *simulation, const char *metric, Problem *problem);
+
+// Validates a list of names below `pointer` against a NULL-terminated list.
+Status study_run_check_names(const Texts *given, const char *const *names, const char *pointer,
+                             Problem *problem);
+
+// The scene without sampled channels; spectra and impacts as in the original. `target` is cleared
+// by simulation_clear in any case.
+Status study_run_copy(const Simulation *simulation, Simulation *target, Problem *problem);
+
+// Replaces an accuracy target by the solver that is chosen without one: otherwise the runs of one
+// study could use different settings, and their differences would not be those of the scenes.
+Status study_run_fix_solver(Simulation *target, Problem *problem);
+
+// Whether a failure of one run ends the whole study.
+static inline bool study_run_ends_study(Status status) {
     return status == STATUS_CANCELLED || status == STATUS_NO_MEMORY;
 }
 
-// What a fault says, with its place, as a text of the caller's. NULL without memory.
-char *study_run_why(const Problem *fault);
+Status study_no_memory(Problem *problem);
 
-// All of a run that is folded. All zero is empty.
-typedef struct StudyPart {
-    Status status;
-    char *why;    // it failed; NULL: it did not
-    double steps; // solver steps; NAN where it failed, as all of the summary is absent
-    Summary summary;
-    Spectrum spectrum;
-} StudyPart;
+// A copy of `text` (NULL: none). STATUS_NO_MEMORY.
+Status study_copy_text(const char *text, char **target, Problem *problem);
 
-// Runs a member. One that fails is a part too, unless that ends all. `part` is cleared by
-// study_run_clear in any case; `problem` is not NULL.
-Status study_run_make(const Simulation *member, const StudyTools *tools, StudyPart *part,
-                      Problem *problem);
-void study_run_clear(StudyPart *part);
+// Appends a copy of `text`. STATUS_NO_MEMORY.
+Status study_add_text(const char *text, Texts *texts, Problem *problem);
 
 #endif

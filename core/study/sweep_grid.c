@@ -1,41 +1,42 @@
-// A point's number in a grid is written in the axes' lengths as digits, the last axis the lowest:
+// The number of a point in a grid has the indices of its values as digits, the last axis the
+// lowest:
 //
-//     value of axis a = (point / stride_a) mod count_a,  stride_a = product of the later counts
+//     index on axis a = (point / stride_a) mod count_a,  stride_a = product of the later counts
 //
-// and in a list it is each axis's own index. Its scene is a copy of the sweep's with those values
-// set, completed like any other.
-// A point is judged by making its scene. Its faults are told where their cause stands: at a value
-// of an axis, not in a scene that nobody wrote.
+// In a list it is the index on every axis. The scene of a point is a copy of the sweep's with these
+// values set, completed like any other.
 #include "core/study/sweep_grid.h"
 
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/excitation/recorded_motion.h"
+#include "core/study/study_run.h"
 
 enum {
     PLACE = sizeof((Fault){0}.pointer),
     COST_SAMPLES = 64,
-    COST_SCENES = 2000, // what they may cost
+    COST_SCENES = 2000, // limit on their work
     AFFORDED_MIN = 16,
-    SWEEP_VALUES = 1 << 21,
+    VALUES_MAX = 1 << 21,
     RANGE_SAMPLES = 512,
 };
 
-static bool sweep_grid_is_range(const SweepAxis *axis) {
+static bool sweep_axis_is_range(const SweepAxis *axis) {
     return axis->values.count == 0;
 }
 
-static size_t sweep_grid_axis_length(const SweepAxis *axis) {
-    return sweep_grid_is_range(axis) ? (size_t)axis->count : axis->values.count;
+static size_t sweep_axis_length(const SweepAxis *axis) {
+    return sweep_axis_is_range(axis) ? (size_t)axis->count : axis->values.count;
 }
 
 size_t sweep_points(const SweepStudy *study) {
     size_t points = study->axes.count > 0;
     for (size_t i = 0; i < study->axes.count; i++) {
-        const size_t length = sweep_grid_axis_length(&study->axes.at[i]);
+        const size_t length = sweep_axis_length(&study->axes.at[i]);
         if (study->mode == SWEEP_LIST && i > 0)
             continue; // all are as long as the first
         if (length > 0 && points > SIZE_MAX / length)
@@ -45,8 +46,8 @@ size_t sweep_points(const SweepStudy *study) {
     return points;
 }
 
-// Equal differences as they are: whole numbers stay whole.
-static double sweep_grid_range_value(const SweepAxis *axis, size_t index) {
+// Equal differences are not scaled: whole numbers stay whole.
+static double sweep_axis_value(const SweepAxis *axis, size_t index) {
     const double last = (double)(axis->count - 1);
     if (index == 0)
         return axis->from;
@@ -57,22 +58,18 @@ static double sweep_grid_range_value(const SweepAxis *axis, size_t index) {
                : axis->from + (axis->to - axis->from) / last * (double)index;
 }
 
-static Status sweep_grid_no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep's points");
-}
-
-static Status sweep_grid_read_values(const SweepAxis *axis, SweepValues *values, Problem *problem) {
+static Status sweep_axis_read(const SweepAxis *axis, SweepValues *values, Problem *problem) {
     size_t room = 1;
     for (size_t i = 0; i < axis->values.count; i++)
         room += strlen(axis->values.at[i]) + 1;
     values->at = calloc(values->count, sizeof *values->at);
     values->texts = malloc(room);
     if (values->at == NULL || values->texts == NULL)
-        return sweep_grid_no_memory(problem);
+        return study_no_memory(problem);
     char *text = values->texts;
     for (size_t i = 0; i < values->count; i++) {
-        if (sweep_grid_is_range(axis)) {
-            values->at[i] = scalar_number(sweep_grid_range_value(axis, i));
+        if (sweep_axis_is_range(axis)) {
+            values->at[i] = scalar_number(sweep_axis_value(axis, i));
             continue;
         }
         if (!scalar_read(axis->values.at[i], &values->at[i], text))
@@ -82,23 +79,23 @@ static Status sweep_grid_read_values(const SweepAxis *axis, SweepValues *values,
     return STATUS_OK;
 }
 
-void sweep_grid_free(SweepGrid *plan) {
-    if (plan == NULL)
+void sweep_grid_free(SweepGrid *grid) {
+    if (grid == NULL)
         return;
-    for (size_t i = 0; plan->axes != NULL && i < plan->axis_count; i++) {
-        free(plan->axes[i].at);
-        free(plan->axes[i].texts);
+    for (size_t i = 0; i < grid->axis_count; i++) {
+        free(grid->axes[i].at);
+        free(grid->axes[i].texts);
     }
-    free(plan->axes);
-    free(plan);
+    free(grid->axes);
+    free(grid);
 }
 
-size_t sweep_grid_index(const SweepGrid *plan, size_t axis, size_t point) {
-    const SweepValues *values = &plan->axes[axis];
+size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point) {
+    const SweepValues *values = &grid->axes[axis];
     return point / values->stride % values->count;
 }
 
-// A side of its own, where the scene has one buffer for both.
+// A pointer to one side's buffer splits the buffer that both sides share.
 static Status sweep_grid_split_buffer(const char *pointer, Simulation *target) {
     static const char before[] = "/dampers/";
     if (strncmp(pointer, before, sizeof before - 1) != 0)
@@ -119,8 +116,8 @@ static Status sweep_grid_split_buffer(const char *pointer, Simulation *target) {
     return STATUS_OK;
 }
 
-// What a name stands for: who changes a number takes the name away. But a completed scene has left
-// out what its contact model does not use, which a point's may.
+// Fills the numbers of a material: those that an axis set have removed its name, but a completed
+// scene has dropped numbers that its contact model does not use, and a point's model may use them.
 static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
     if (isnan(buffer->restitution))
         buffer->restitution = pinned->restitution;
@@ -139,7 +136,7 @@ static Status sweep_grid_fill_material(const Buffer *pinned, Buffer *buffer) {
     return STATUS_OK;
 }
 
-// Materials' numbers come from where the study pins them.
+// Resolves materials to the numbers that the study holds.
 static Status sweep_grid_fill_materials(const Buffers *materials, Simulation *target) {
     for (size_t i = 0; i < 3 * target->scene.dampers.count; i++) {
         Damper *damper = &target->scene.dampers.at[i / 3];
@@ -152,7 +149,7 @@ static Status sweep_grid_fill_materials(const Buffers *materials, Simulation *ta
     return STATUS_OK;
 }
 
-// Likewise the ground motion that the scene names now.
+// Likewise a named ground motion.
 static Status sweep_grid_fill_record(const PinnedRecords *records, Simulation *target) {
     ExcitationRecord *record = (ExcitationRecord *)(void *)target->scene.excitation;
     if (excitation_kind(&record->excitation) != &excitation_record || record->name == NULL)
@@ -173,49 +170,47 @@ static void sweep_grid_clear_texts(Texts *texts) {
     *texts = (Texts){NULL, 0};
 }
 
-static void sweep_grid_clear_output(Simulation *target) {
-    sweep_grid_clear_texts(&target->output.channels);
-    sweep_grid_clear_texts(&target->output.psd.channels);
-    target->output.impacts = false;
-}
-
-// Without judging it. `*axis` is the one whose value cannot be there.
-static Status sweep_grid_apply(const SweepGrid *plan, size_t point, Simulation *target,
+// `*axis` is the one whose value cannot be set.
+static Status sweep_grid_apply(const SweepGrid *grid, size_t point, Simulation *target,
                                size_t *axis, char why[POINTER_SENTENCE]) {
-    TRY(fields_copy(simulation_fields, plan->simulation, target));
-    for (size_t i = 0; i < plan->axis_count; i++) {
-        const SweepValues *values = &plan->axes[i];
+    TRY(fields_copy(simulation_fields, grid->simulation, target));
+    for (size_t i = 0; i < grid->axis_count; i++) {
+        const SweepValues *values = &grid->axes[i];
         if (values->field == NULL)
-            continue; // its pointer leads nowhere, which was told
+            continue; // its pointer is faulty, which is reported already
         *axis = i;
         TRY(sweep_grid_split_buffer(values->pointer, target));
         TRY(pointer_set(simulation_fields, target, values->pointer,
-                        &values->at[sweep_grid_index(plan, i, point)], why));
+                        &values->at[sweep_grid_index(grid, i, point)], why));
     }
-    TRY(sweep_grid_fill_materials(&plan->study->materials, target));
+    TRY(sweep_grid_fill_materials(&grid->study->materials, target));
     for (size_t i = 0; i < target->scene.dampers.count; i++)
-        damper_ask_rig(&plan->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
-    return sweep_grid_fill_record(&plan->study->records, target);
+        damper_ask_rig(&grid->simulation->scene.dampers.at[i], &target->scene.dampers.at[i]);
+    return sweep_grid_fill_record(&grid->study->records, target);
 }
 
-Status sweep_grid_scene(const SweepGrid *plan, size_t point, bool is_bare,
+Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
                         const SimulationLimits *limits, Simulation *target, Problem *problem) {
     size_t axis = 0;
     char why[POINTER_SENTENCE] = "";
-    const Status status = sweep_grid_apply(plan, point, target, &axis, why);
+    const Status status = sweep_grid_apply(grid, point, target, &axis, why);
     if (status == STATUS_INVALID)
-        return problem_add(problem, status, plan->axes[axis].pointer, "%s", why);
+        return problem_add(problem, status, grid->axes[axis].pointer, "%s", why);
     if (status != STATUS_OK)
-        return sweep_grid_no_memory(problem);
-    if (is_bare)
-        sweep_grid_clear_output(target);
+        return study_no_memory(problem);
+    if (is_bare) {
+        sweep_grid_clear_texts(&target->output.channels);
+        sweep_grid_clear_texts(&target->output.psd.channels);
+        target->output.impacts = false;
+    }
     return simulation_complete(target, limits, NULL, problem);
 }
 
-// Measured: 3 us with one storey, 0.1 ms with 40 and 0.7 ms with 100; a record's own
-// samples are copied, those of a named one are not.
-size_t sweep_grid_affordable(const SweepGrid *plan, size_t scenes) {
-    const Scene *scene = &plan->simulation->scene;
+// Number of points, at least 16, whose scenes are as much work to complete as `scenes` scenes of
+// one storey; SIZE_MAX for SIZE_MAX. Measured: 3 us with one storey, 0.1 ms with 40 and 0.7 ms with
+// 100; a record's own samples are copied, those of a named one are not.
+static size_t sweep_grid_affordable(const SweepGrid *grid, size_t scenes) {
+    const Scene *scene = &grid->simulation->scene;
     const Excitation *excitation = scene_excitation(scene);
     const double n = (double)structure_storeys(scene_structure(scene));
     double cost = 1 + n / 4 + n * n / 64;
@@ -223,28 +218,28 @@ size_t sweep_grid_affordable(const SweepGrid *plan, size_t scenes) {
         cost += 1e-3 * (double)((const ExcitationRecord *)(const void *)excitation)->samples.count;
     if (scenes == SIZE_MAX)
         return SIZE_MAX;
-    const size_t most = (size_t)((double)scenes / cost);
-    return most > AFFORDED_MIN ? most : AFFORDED_MIN;
+    const size_t max = (size_t)((double)scenes / cost);
+    return max > AFFORDED_MIN ? max : AFFORDED_MIN;
 }
 
-double sweep_grid_steps(const SweepGrid *plan, const SimulationLimits *limits) {
-    const size_t afforded = sweep_grid_affordable(plan, COST_SCENES);
-    const size_t most = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
-    const size_t samples = plan->points < most ? plan->points : most;
+double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits) {
+    const size_t afforded = sweep_grid_affordable(grid, COST_SCENES);
+    const size_t max = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
+    const size_t samples = grid->points < max ? grid->points : max;
     double steps = 0;
     for (size_t i = 0; i < samples; i++) {
-        // Odd multiples of half a part: an axis's period does not hide the other axes.
-        const size_t point = (size_t)((double)plan->points * ((double)i + 0.5) / (double)samples);
+        // Midpoints of equal parts, which do not follow the period of an axis.
+        const size_t point = (size_t)((double)grid->points * ((double)i + 0.5) / (double)samples);
         Simulation target;
-        if (sweep_grid_scene(plan, point, true, limits, &target, NULL) == STATUS_OK)
+        if (sweep_grid_scene(grid, point, true, limits, &target, NULL) == STATUS_OK)
             steps += simulation_cost(&target).steps;
         simulation_clear(&target);
     }
-    return samples > 0 ? steps * (double)plan->points / (double)samples : 0;
+    return samples > 0 ? steps * (double)grid->points / (double)samples : 0;
 }
 
-// What an axis asks for beside what rows can see.
-static Status sweep_grid_check_axis(const SweepAxis *axis, size_t number, Problem *problem) {
+// Checks of an axis beyond those of its rows.
+static Status sweep_axis_check(const SweepAxis *axis, size_t number, Problem *problem) {
     char place[PLACE];
     snprintf(place, sizeof place, "/study/axes/%zu", number);
     const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
@@ -263,12 +258,12 @@ static Status sweep_grid_check_axis(const SweepAxis *axis, size_t number, Proble
     return STATUS_OK;
 }
 
-static Status sweep_grid_check_axes(const SweepGrid *plan, Problem *problem) {
-    const SweepAxes *axes = &plan->study->axes;
+static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
+    const SweepAxes *axes = &study->axes;
     Status status = STATUS_OK;
     for (size_t i = 0; i < axes->count; i++) {
         char place[PLACE];
-        if (sweep_grid_check_axis(&axes->at[i], i, problem) != STATUS_OK)
+        if (sweep_axis_check(&axes->at[i], i, problem) != STATUS_OK)
             status = STATUS_INVALID;
         for (size_t k = 0; k < i; k++)
             if (strcmp(axes->at[i].pointer, axes->at[k].pointer) == 0) {
@@ -276,26 +271,45 @@ static Status sweep_grid_check_axes(const SweepGrid *plan, Problem *problem) {
                 status = problem_add(problem, STATUS_INVALID, place,
                                      "is the pointer of axis %zu too: one axis each", k);
             }
+        const size_t length = sweep_axis_length(&axes->at[i]),
+                     first = sweep_axis_length(&axes->at[0]);
         snprintf(place, sizeof place, "/study/axes/%zu", i);
-        if (status == STATUS_OK && plan->study->mode == SWEEP_LIST &&
-            sweep_grid_axis_length(&axes->at[i]) != sweep_grid_axis_length(&axes->at[0]))
+        if (status == STATUS_OK && study->mode == SWEEP_LIST && length != first)
             status = problem_add(problem, STATUS_INVALID, place,
                                  "has %zu values, the first axis has %zu: in a list all are as "
                                  "long",
-                                 sweep_grid_axis_length(&axes->at[i]),
-                                 sweep_grid_axis_length(&axes->at[0]));
+                                 length, first);
     }
     return status;
 }
 
-// Every pointer leads somewhere, by values of the axes before it.
-static Status sweep_grid_check_pointers(SweepGrid *plan, Problem *problem) {
+// All values of the axes are held in memory.
+static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLimits *limits,
+                                    Problem *problem) {
+    const size_t points = sweep_points(study);
+    const size_t max = limits != NULL && limits->points > 0 ? limits->points : SWEEP_POINTS;
+    size_t values = 0;
+    for (size_t i = 0; i < study->axes.count; i++)
+        values += sweep_axis_length(&study->axes.at[i]);
+    if (limits != NULL && points > max)
+        return problem_add(
+            problem, STATUS_INVALID, "/study/axes",
+            "are %.4g points, at most %zu are allowed: take fewer values%s", (double)points, max,
+            study->axes.count > 1 && study->mode == SWEEP_GRID ? " or fewer axes, or mode list"
+                                                               : "");
+    if (values > VALUES_MAX)
+        return problem_add(problem, STATUS_INVALID, "/study/axes",
+                           "have %zu values in all, at most %d are allowed: take fewer", values,
+                           VALUES_MAX);
+    return STATUS_OK;
+}
+
+// Finds the member of each pointer; earlier axes may make it by their values.
+static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
     Simulation scene;
-    Status status = fields_copy(simulation_fields, plan->simulation, &scene);
-    if (status != STATUS_OK)
-        return sweep_grid_no_memory(problem);
-    for (size_t i = 0; i < plan->axis_count && status != STATUS_NO_MEMORY; i++) {
-        SweepValues *values = &plan->axes[i];
+    Status status = fields_copy(simulation_fields, grid->simulation, &scene);
+    for (size_t i = 0; i < grid->axis_count && status != STATUS_NO_MEMORY; i++) {
+        SweepValues *values = &grid->axes[i];
         char why[POINTER_SENTENCE];
         if (sweep_grid_split_buffer(values->pointer, &scene) != STATUS_OK) {
             status = STATUS_NO_MEMORY;
@@ -311,7 +325,7 @@ static Status sweep_grid_check_pointers(SweepGrid *plan, Problem *problem) {
             status = problem_put(problem, STATUS_INVALID, &fault);
             continue;
         }
-        // Values that cannot stand there are told point by point; one that can is enough here.
+        // Impossible values are reported point by point; a possible one is enough here.
         Status set = STATUS_INVALID;
         for (size_t k = 0; k < values->count && set == STATUS_INVALID; k++)
             set = pointer_set(simulation_fields, &scene, values->pointer, &values->at[k], why);
@@ -319,199 +333,128 @@ static Status sweep_grid_check_pointers(SweepGrid *plan, Problem *problem) {
             status = set;
     }
     simulation_clear(&scene);
-    return status == STATUS_NO_MEMORY ? sweep_grid_no_memory(problem) : status;
-}
-
-// All axes are held in memory, value by value.
-static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLimits *limits,
-                                    Problem *problem) {
-    const size_t points = sweep_points(study);
-    const size_t most = limits != NULL && limits->points > 0 ? limits->points : SWEEP_POINTS;
-    size_t values = 0;
-    for (size_t i = 0; i < study->axes.count; i++)
-        values += sweep_grid_axis_length(&study->axes.at[i]);
-    if (limits != NULL && points > most)
-        return problem_add(
-            problem, STATUS_INVALID, "/study/axes",
-            "are %.4g points, at most %zu are allowed: take fewer values%s", (double)points, most,
-            study->axes.count > 1 && study->mode == SWEEP_GRID ? " or fewer axes, or mode list"
-                                                               : "");
-    if (values > SWEEP_VALUES)
-        return problem_add(problem, STATUS_INVALID, "/study/axes",
-                           "have %zu values in all, at most %d are allowed: take fewer", values,
-                           SWEEP_VALUES);
-    return STATUS_OK;
-}
-
-Status sweep_grid_make(const SweepStudy *study, const Simulation *simulation,
-                       const SimulationLimits *limits, SweepGrid **made, Problem *problem) {
-    SweepGrid *plan = calloc(1, sizeof *plan);
-    *made = NULL;
-    if (plan == NULL)
-        return sweep_grid_no_memory(problem);
-    plan->study = study;
-    plan->simulation = simulation;
-    Status status = sweep_grid_check_axes(plan, problem);
-    if (status == STATUS_OK)
-        status = sweep_grid_check_size(study, limits, problem);
-    if (status == STATUS_OK) {
-        plan->points = sweep_points(study);
-        plan->axes = calloc(study->axes.count, sizeof *plan->axes);
-        if (plan->axes == NULL)
-            status = sweep_grid_no_memory(problem);
-        else
-            plan->axis_count = study->axes.count;
-    }
-    size_t stride = 1;
-    for (size_t i = plan->axis_count; i-- > 0 && status == STATUS_OK;) {
-        SweepValues *values = &plan->axes[i];
-        values->pointer = study->axes.at[i].pointer;
-        values->count = sweep_grid_axis_length(&study->axes.at[i]);
-        values->stride = study->mode == SWEEP_LIST ? 1 : stride;
-        stride *= values->count;
-        status = sweep_grid_read_values(&study->axes.at[i], values, problem);
-    }
-    if (status != STATUS_OK) {
-        sweep_grid_free(plan);
-        return status;
-    }
-    *made = plan;
-    return sweep_grid_check_pointers(plan, problem);
+    return status == STATUS_NO_MEMORY ? study_no_memory(problem) : status;
 }
 
 Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
                       const SimulationLimits *limits, SweepGrid **made, Problem *problem) {
-    const Status status = sweep_grid_make(study, simulation, limits, made, problem);
-    if (status != STATUS_OK) {
-        sweep_grid_free(*made);
-        *made = NULL;
+    *made = NULL;
+    TRY(sweep_grid_check_axes(study, problem));
+    TRY(sweep_grid_check_size(study, limits, problem));
+    SweepGrid *grid = calloc(1, sizeof *grid);
+    SweepValues *axes = calloc(study->axes.count, sizeof *axes);
+    if (grid == NULL || axes == NULL) {
+        free(grid);
+        free(axes);
+        return study_no_memory(problem);
     }
-    return status;
+    *grid = (SweepGrid){study, simulation, sweep_points(study), study->axes.count, axes};
+    Status status = STATUS_OK;
+    size_t stride = 1;
+    for (size_t i = grid->axis_count; i-- > 0 && status == STATUS_OK;) {
+        SweepValues *values = &axes[i];
+        values->pointer = study->axes.at[i].pointer;
+        values->count = sweep_axis_length(&study->axes.at[i]);
+        values->stride = study->mode == SWEEP_LIST ? 1 : stride;
+        stride *= values->count;
+        status = sweep_axis_read(&study->axes.at[i], values, problem);
+    }
+    if (status != STATUS_OK) {
+        sweep_grid_free(grid);
+        return status;
+    }
+    *made = grid;
+    return sweep_grid_find_fields(grid, problem);
 }
 
-// Where the value stands that the point has on an axis.
-static void sweep_grid_value_pointer(const SweepGrid *plan, size_t axis, size_t index,
-                                     char place[PLACE]) {
-    if (sweep_grid_is_range(&plan->study->axes.at[axis]))
-        snprintf(place, PLACE, "/study/axes/%zu", axis);
-    else
-        snprintf(place, PLACE, "/study/axes/%zu/values/%zu", axis, index);
-}
-
-// Whether `pointer` is `above` or lies below it.
+// Whether `pointer` is `above` or below it.
 static bool sweep_grid_is_below(const char *pointer, const char *above) {
     const size_t length = strlen(above);
     return strncmp(pointer, above, length) == 0 &&
            (pointer[length] == '\0' || pointer[length] == '/');
 }
 
-// A fault of a point's scene, told where its cause is: the last axis that leads there, else the
-// only one, else all of them.
-static void sweep_grid_report_fault(const SweepGrid *plan, size_t point, const Fault *fault,
-                                    Problem *problem) {
-    Fault told = *fault;
-    size_t cause = plan->axis_count > 1 ? plan->axis_count : 0;
-    for (size_t i = 0; i < plan->axis_count; i++)
-        if (sweep_grid_is_below(fault->pointer, plan->axes[i].pointer) ||
-            sweep_grid_is_below(plan->axes[i].pointer, fault->pointer))
+// Adds a fault of a point's scene at its cause: the value of the last axis that sets its place or
+// is part of it, else of the only axis, else all axes.
+static void sweep_grid_add_fault(const SweepGrid *grid, size_t point, const Fault *fault,
+                                 Problem *problem) {
+    Fault own = *fault;
+    size_t cause = grid->axis_count > 1 ? grid->axis_count : 0;
+    for (size_t i = 0; i < grid->axis_count; i++)
+        if (sweep_grid_is_below(fault->pointer, grid->axes[i].pointer) ||
+            sweep_grid_is_below(grid->axes[i].pointer, fault->pointer))
             cause = i;
-    if (cause < plan->axis_count)
-        sweep_grid_value_pointer(plan, cause, sweep_grid_index(plan, cause, point), told.pointer);
+    if (cause == grid->axis_count)
+        snprintf(own.pointer, PLACE, "/study/axes");
+    else if (sweep_axis_is_range(&grid->study->axes.at[cause]))
+        snprintf(own.pointer, PLACE, "/study/axes/%zu", cause);
     else
-        snprintf(told.pointer, sizeof told.pointer, "/study/axes");
-    char detail[sizeof told.detail + PLACE + 64];
+        snprintf(own.pointer, PLACE, "/study/axes/%zu/values/%zu", cause,
+                 sweep_grid_index(grid, cause, point));
+    char detail[sizeof own.detail + PLACE + 64];
     snprintf(detail, sizeof detail, "point %zu, %s: %s", point, fault->pointer, fault->detail);
-    text_fit(told.detail, sizeof told.detail, detail);
-    problem_put(problem, STATUS_INVALID, &told);
+    text_fit(own.detail, sizeof own.detail, detail);
+    problem_put(problem, STATUS_INVALID, &own);
 }
 
-static Status sweep_grid_check_point(const SweepGrid *plan, size_t point,
-                                     const SimulationLimits *limits, Problem *fault,
-                                     Problem *problem) {
-    Simulation target;
-    problem_clear(fault);
-    const Status status = sweep_grid_scene(plan, point, true, limits, &target, fault);
-    simulation_clear(&target);
-    if (status == STATUS_OK)
-        return STATUS_OK;
-    if (status != STATUS_INVALID)
-        return problem_set(problem, status, "%s", fault->detail);
-    for (size_t i = 0; i < fault->count && i < PROBLEM_FAULTS; i++)
-        sweep_grid_report_fault(plan, point, &fault->faults[i], problem);
-    return status;
-}
-
-typedef struct Check {
-    const SweepGrid *plan;
+typedef struct Validation {
+    const SweepGrid *grid;
     const SimulationLimits *limits;
     const Progress *progress;
-    Problem *fault, *problem;
+    Problem *fault, *problem; // of a point, of all
     bool is_faulty;
-} Check;
+} Validation;
 
-static Status sweep_grid_check_next(Check *check, size_t point) {
-    if (!progress_advance(check->progress, (double)point / (double)check->plan->points))
-        return problem_set(check->problem, STATUS_CANCELLED, "the sweep was stopped");
-    const Status status =
-        sweep_grid_check_point(check->plan, point, check->limits, check->fault, check->problem);
-    check->is_faulty = check->is_faulty || status == STATUS_INVALID;
-    return status == STATUS_INVALID ? STATUS_OK : status;
+// Makes the scene of a point.
+static Status sweep_grid_validate_point(Validation *of, size_t point) {
+    Simulation target;
+    if (!progress_advance(of->progress, (double)point / (double)of->grid->points))
+        return problem_set(of->problem, STATUS_CANCELLED, "the sweep was stopped");
+    problem_clear(of->fault);
+    const Status status = sweep_grid_scene(of->grid, point, true, of->limits, &target, of->fault);
+    simulation_clear(&target);
+    if (status == STATUS_OK)
+        return status;
+    if (status != STATUS_INVALID)
+        return problem_set(of->problem, status, "%s", of->fault->detail);
+    for (size_t i = 0; i < of->fault->count && i < PROBLEM_FAULTS; i++)
+        sweep_grid_add_fault(of->grid, point, &of->fault->faults[i], of->problem);
+    of->is_faulty = true;
+    return STATUS_OK;
 }
 
-// Number k of `samples` among `count`, both ends among them.
-static size_t sweep_grid_sample(size_t k, size_t samples, size_t count) {
-    return samples == count ? k : k * (count - 1) / (samples - 1);
-}
-
-static Status sweep_grid_check_sample(Check *check, size_t most) {
-    const SweepGrid *plan = check->plan;
-    const bool is_list = plan->study->mode == SWEEP_LIST;
-    const size_t axes = is_list ? 1 : plan->axis_count;
-    const size_t share = most / axes > 2 ? most / axes : 2; // of each axis
-    TRY(sweep_grid_check_next(check, plan->points - 1));
+static Status sweep_grid_validate_sample(Validation *of, size_t max) {
+    const SweepGrid *grid = of->grid;
+    const bool is_list = grid->study->mode == SWEEP_LIST;
+    const size_t axes = is_list ? 1 : grid->axis_count;
+    const size_t share = max / axes > 2 ? max / axes : 2; // of each axis
+    TRY(sweep_grid_validate_point(of, grid->points - 1));
     for (size_t i = 0; i < axes; i++) {
-        const size_t count = plan->axes[i].count;
-        const bool is_short = is_list || sweep_grid_is_range(&plan->study->axes.at[i]);
+        const size_t count = grid->axes[i].count;
+        const bool is_short = is_list || sweep_axis_is_range(&grid->study->axes.at[i]);
         const size_t wanted = is_short && share > RANGE_SAMPLES ? RANGE_SAMPLES : share;
         const size_t samples = count < wanted ? count : wanted;
-        for (size_t k = i > 0; k < samples; k++)
-            TRY(sweep_grid_check_next(check,
-                                      sweep_grid_sample(k, samples, count) * plan->axes[i].stride));
+        // Both ends are among them.
+        for (size_t k = i > 0; k < samples; k++) {
+            const size_t index = samples == count ? k : k * (count - 1) / (samples - 1);
+            TRY(sweep_grid_validate_point(of, index * grid->axes[i].stride));
+        }
     }
     return STATUS_OK;
 }
 
-static Status sweep_grid_check_all(Check *check) {
-    for (size_t i = 0; i < check->plan->points; i++)
-        TRY(sweep_grid_check_next(check, i));
-    return STATUS_OK;
-}
-
-Status sweep_grid_check_points(const SweepGrid *plan, size_t scenes, const SimulationLimits *limits,
-                               const Progress *progress, Problem *problem) {
-    Check check = {.plan = plan,
-                   .limits = limits,
-                   .progress = progress,
-                   .fault = malloc(sizeof(Problem)),
-                   .problem = problem};
-    if (check.fault == NULL)
-        return sweep_grid_no_memory(problem);
-    const size_t most = sweep_grid_affordable(plan, scenes);
-    const Status status =
-        plan->points > most ? sweep_grid_check_sample(&check, most) : sweep_grid_check_all(&check);
-    free(check.fault);
-    return status == STATUS_OK && check.is_faulty ? STATUS_INVALID : status;
-}
-
-Status sweep_grid_validate(const SweepStudy *study, const Simulation *simulation, size_t scenes,
-                           const SimulationLimits *limits, Problem *problem) {
-    SweepGrid *plan;
-    Status status = sweep_grid_make(study, simulation, limits, &plan, problem);
-    // Without limits it was judged before.
-    if (plan != NULL && limits != NULL) {
-        const Status points = sweep_grid_check_points(plan, scenes, limits, NULL, problem);
-        status = status == STATUS_OK ? points : status;
-    }
-    sweep_grid_free(plan);
-    return status;
+Status sweep_grid_validate(const SweepGrid *grid, size_t scenes, const SimulationLimits *limits,
+                           const Progress *progress, Problem *problem) {
+    Validation of = {grid, limits, progress, malloc(sizeof(Problem)), problem, false};
+    Status status = STATUS_OK;
+    if (of.fault == NULL)
+        return study_no_memory(problem);
+    const size_t max = sweep_grid_affordable(grid, scenes);
+    if (grid->points > max)
+        status = sweep_grid_validate_sample(&of, max);
+    else
+        for (size_t i = 0; i < grid->points && status == STATUS_OK; i++)
+            status = sweep_grid_validate_point(&of, i);
+    free(of.fault);
+    return status == STATUS_OK && of.is_faulty ? STATUS_INVALID : status;
 }

@@ -1,22 +1,71 @@
-// The points of a sweep made ready: point i's scene is computed from i alone. Shared by threads,
-// never changes. Not their judging (sweep_grid_validate.h) and not runs (sweep_run.h). Used by
-// those and server/jobs.
+// The request of the study "sweep" and its points: the scene of point i is computed from i alone.
 #ifndef CORE_STUDY_SWEEP_GRID_H
 #define CORE_STUDY_SWEEP_GRID_H
 
 #include "core/base/json_pointer.h"
-#include "core/study/sweep.h"
+#include "core/simulation/simulation.h"
 
-// An axis's values, read.
+enum {
+    SWEEP_AXES = 64,
+    SWEEP_AXIS_VALUES = 1 << 20,
+    SWEEP_METRICS = 16,
+    SWEEP_POINTS = 1000000, // where the limits say nothing
+};
+
+typedef enum SweepSpacing { SWEEP_LINEAR, SWEEP_LOGARITHMIC } SweepSpacing;
+typedef enum SweepMode { SWEEP_GRID, SWEEP_LIST } SweepMode;
+
+// One axis: values, or a range.
+typedef struct SweepAxis {
+    char *pointer; // into the completed scene
+    Texts values;  // scalars as JSON text
+    double from, to;
+    uint64_t count;
+    int spacing; // SweepSpacing; CHOICE_ABSENT beside values
+} SweepAxis;
+
+typedef struct SweepAxes {
+    SweepAxis *at;
+    size_t count;
+} SweepAxes;
+
+typedef struct Buffers {
+    Buffer *at;
+    size_t count;
+} Buffers;
+
+// A record that an axis names, in its version at submission.
+typedef struct PinnedRecord {
+    char *name, *digest;
+    Shared *named; // a NamedRecord; NULL: not found yet
+} PinnedRecord;
+
+typedef struct PinnedRecords {
+    PinnedRecord *at;
+    size_t count;
+} PinnedRecords;
+
+// The request.
+typedef struct SweepStudy {
+    Variant variant;
+    SweepAxes axes; // of a grid the last one varies fastest
+    int mode;       // SweepMode
+    Texts metrics;
+    Buffers materials;     // the numbers of every material that the scene or an axis names
+    PinnedRecords records; // the ground motions that an axis names
+} SweepStudy;
+
+// The values of an axis, parsed.
 typedef struct SweepValues {
     const char *pointer;
     size_t count, stride; // point p has value (p / stride) % count
     Scalar *at;
-    char *texts; // of all its values
-    const Field *field;
+    char *texts;        // of all its values
+    const Field *field; // NULL: the pointer is faulty, the axis changes nothing
     bool is_tag;
 } SweepValues;
 
+// Immutable, shared by threads.
 typedef struct SweepGrid {
     const SweepStudy *study;
     const Simulation *simulation;
@@ -24,41 +73,33 @@ typedef struct SweepGrid {
     SweepValues *axes;
 } SweepGrid;
 
-// Borrows both, which must be completed (the study: by rows at least). Adds the faults of axes
-// below "/study/axes", all of them; `limits` NULL: as many points as there are. Freed by
-// sweep_grid_free.
+// Number of points; SIZE_MAX on overflow.
+size_t sweep_points(const SweepStudy *study);
+
+// Borrows study and simulation, both completed (the study by its rows at least). Adds all faults of
+// axes below "/study/axes"; `limits` NULL: without a limit on the points. *grid is freed by
+// sweep_grid_free also after STATUS_INVALID, where it may be there: then only pointers are faulty.
 Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
-                      const SimulationLimits *limits, SweepGrid **plan, Problem *problem);
-void sweep_grid_free(SweepGrid *plan);
-// The same, but where only pointers are faulty the plan is made all the same, beside
-// STATUS_INVALID: those axes then change nothing.
-Status sweep_grid_make(const SweepStudy *study, const Simulation *simulation,
-                       const SimulationLimits *limits, SweepGrid **plan, Problem *problem);
+                      const SimulationLimits *limits, SweepGrid **grid, Problem *problem);
+void sweep_grid_free(SweepGrid *grid);
 
-// Which of an axis's values a point has.
-size_t sweep_grid_index(const SweepGrid *plan, size_t axis, size_t point);
+// Index of a point's value on an axis.
+size_t sweep_grid_index(const SweepGrid *grid, size_t axis, size_t point);
 
-// The completed scene of a point: as the sweep's own, with this point's values. `is_bare`: nothing
-// sampled, as a row needs it. Cleared by simulation_clear in any case. Faults are the scene's.
-Status sweep_grid_scene(const SweepGrid *plan, size_t point, bool is_bare,
+// The completed scene of a point: the sweep's own with this point's values. `is_bare`: without
+// output, as a row needs it. Cleared by simulation_clear in any case. Faults have the pointers of
+// that scene.
+Status sweep_grid_scene(const SweepGrid *grid, size_t point, bool is_bare,
                         const SimulationLimits *limits, Simulation *target, Problem *problem);
 
-// How many of its points are as much work to make ready as `scenes` of one storey; at least 16, and
-// all for SIZE_MAX.
-size_t sweep_grid_affordable(const SweepGrid *plan, size_t scenes);
+// Estimated solver steps of all points, from a sample of them.
+double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits);
 
-// Solver steps foretold for all, from some points spread over them.
-double sweep_grid_steps(const SweepGrid *plan, const SimulationLimits *limits);
-
-// Validates every point where they are no more work than `scenes` small ones, else about as many as
-// that: points where one axis alone leaves its first value, of long axes some, and the last one.
-// Each fault has the pointer of the value that causes it and the number of its point. `progress`,
-// asked before each point, may stop it.
-Status sweep_grid_check_points(const SweepGrid *plan, size_t scenes, const SimulationLimits *limits,
-                               const Progress *progress, Problem *problem);
-
-// Validates axes and points, these as sweep_grid_check_points does; `limits` NULL: the axes alone.
-Status sweep_grid_validate(const SweepStudy *study, const Simulation *simulation, size_t scenes,
-                           const SimulationLimits *limits, Problem *problem);
+// Validates every point if that is no more work than `scenes` small scenes, else about as many as
+// that: points where one axis alone leaves its first value, of long axes a sample, and the last
+// one. Each fault has the pointer of the value that causes it, and the number of its point.
+// `progress`, asked before each point, may stop it.
+Status sweep_grid_validate(const SweepGrid *grid, size_t scenes, const SimulationLimits *limits,
+                           const Progress *progress, Problem *problem);
 
 #endif

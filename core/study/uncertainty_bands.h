@@ -1,28 +1,28 @@
-// What drawn runs came to, statistic by statistic and frequency by frequency. Not the runs. Used by
-// sensitivity_run.c.
+// Quantiles of the spectra of many runs, frequency by frequency. They need all densities of a
+// frequency at once, so those of every run are kept.
 #ifndef CORE_STUDY_UNCERTAINTY_BANDS_H
 #define CORE_STUDY_UNCERTAINTY_BANDS_H
 
-#include "core/study/sensitivity.h"
+#include "core/study/study_run.h"
 
-enum { UNCERTAINTY_DENSITIES_MAX = 1 << 22 }; // kept of all runs, at most
+enum { UNCERTAINTY_BANDS_MAX = 1 << 22 }; // limit on the densities kept of all runs
 
-// Densities of runs, run by run, channel by channel. All zero is empty.
-typedef struct UncertaintyDensities {
-    size_t channels, rows, runs, room;
+// Densities run by run, channel by channel. All zero is empty.
+typedef struct UncertaintyBands {
+    size_t channels, rows, runs;
     double *at;
-} UncertaintyDensities;
+} UncertaintyBands;
 
-// Keeps a run's spectra, all of one shape; the first makes room for `most` of them.
-Status uncertainty_bands_add(UncertaintyDensities *kept, const Spectrum *spectrum, size_t most,
+// Keeps the spectra of a run, of the same shape as those before; the first one allocates memory for
+// `max` of them.
+Status uncertainty_bands_add(UncertaintyBands *bands, const Spectrum *spectrum, size_t max,
                              Problem *problem);
-void uncertainty_bands_clear(UncertaintyDensities *kept);
+void uncertainty_bands_clear(UncertaintyBands *bands);
 
-// Fills statistics, failures and spectra of the answer. The table's "seed" is the run's number.
-// Sorting many densities takes long: `progress` may stop it.
-Status uncertainty_bands_report(const EnsembleRuns *table, const Status *statuses,
-                                const UncertaintyDensities *kept, const Outcome *own,
-                                bool has_force, const Progress *progress, Sensitivity *answer,
+// Fills frequencies and spectra: mean and quantiles, and the values of `own`. `progress` may stop
+// the sorting.
+Status uncertainty_bands_report(const UncertaintyBands *bands, const Spectrum *own,
+                                const Progress *progress, Reals *frequency, RunSpectra *spectra,
                                 Problem *problem);
 
 #endif

@@ -54,15 +54,14 @@ static bool advance(void *context, double fraction) {
 
 static Status make_member(Hand *hand, Workspace *workspace, size_t member) {
     Crew *crew = hand->crew;
-    const StudyMembers *members = crew->order.work->kind->members;
     const Progress watch = {hand, advance};
     const StudyTools tools = {.limits = crew->limits, .progress = &watch, .workspace = workspace};
-    void *part = NULL;
+    StudyPart *part = NULL;
     hand->told = 0;
     problem_clear(&hand->problem);
-    const Status status = members->make(crew->order.work, member, &tools, &part, &hand->problem);
+    const Status status = study_part_make(crew->order.work, member, &tools, &part, &hand->problem);
     if (status != STATUS_OK) {
-        members->drop(part);
+        study_part_free(crew->order.work, part);
         return status;
     }
     (void)advance(hand, 1);

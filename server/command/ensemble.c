@@ -27,14 +27,14 @@ static const Field ensemble_fields[] = {
                 "seed of the first (the scene's own)"),
     FIELD_REAL(EnsembleSettings, target, NULL, ANY, OPTIONAL,
                "relative error wanted of the metric's mean: no more runs than keep it"),
-    FIELD_CHOICE(EnsembleSettings, metric, ensemble_metric_names, OPTIONAL,
+    FIELD_CHOICE(EnsembleSettings, metric, statistics_metric_names, OPTIONAL,
                  "peak_displacement, rms_displacement (usual), peak_acceleration, "
                  "rms_acceleration, impacts, peak_contact_force or psd"),
     SCENE_FILE_CPU_ROW(EnsembleSettings),
     FIELD_END,
 };
 
-static void study_choose(Study *asked, void *of) {
+static void study_choose(void *asked, void *of) {
     const EnsembleSettings *settings = of;
     EnsembleStudy *study = (EnsembleStudy *)(void *)asked;
     if (settings->runs != COUNT_ABSENT)
@@ -47,10 +47,10 @@ static void study_choose(Study *asked, void *of) {
         study->metric = settings->metric;
 }
 
-static void statistic_print(int metric, const EnsembleStatistic *statistic) {
+static void statistic_print(int metric, const RunStatistic *statistic) {
     char name[48], cell[7][24];
     const bool has_unit = statistic->unit != NULL && strcmp(statistic->unit, "1") != 0;
-    snprintf(name, sizeof name, "%s%s%s%s", ensemble_metric_names[metric], has_unit ? " [" : "",
+    snprintf(name, sizeof name, "%s%s%s%s", statistics_metric_names[metric], has_unit ? " [" : "",
              has_unit ? statistic->unit : "", has_unit ? "]" : "");
     printf("  %-25s %10s %8s %8s %9s %9s %9s\n", name,
            study_number(cell[0], "%.5g", statistic->mean),
@@ -65,11 +65,11 @@ static void statistics_print(const Ensemble *ensemble) {
     EnsembleStatistics statistics = ensemble->statistics; // a borrowed view
     printf("  %-25s %10s %8s %8s %9s %9s %9s\n", "", "mean", "+-", "s.d.", "smallest", "median",
            "largest");
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         statistic_print(metric, ensemble_statistic(&statistics, metric));
 }
 
-static void spectrum_print(const Ensemble *ensemble, const EnsembleSpectrum *spectrum) {
+static void spectrum_print(const Ensemble *ensemble, const RunSpectrum *spectrum) {
     size_t peak = 0;
     for (size_t k = 1; k < spectrum->mean.count; k++)
         if (spectrum->mean.at[k] > spectrum->mean.at[peak])
@@ -81,10 +81,10 @@ static void spectrum_print(const Ensemble *ensemble, const EnsembleSpectrum *spe
            spectrum->low.at[peak], spectrum->high.at[peak]);
 }
 
-static void failures_print(const EnsembleFailures *failures) {
+static void failures_print(const StudyFailures *failures) {
     for (size_t i = 0; i < failures->count; i++)
         printf("%llu failed, %s; first seed %llu: %s\n", (unsigned long long)failures->at[i].count,
-               failures->at[i].reason, (unsigned long long)failures->at[i].first_seed,
+               failures->at[i].reason, (unsigned long long)failures->at[i].first,
                failures->at[i].detail);
 }
 

@@ -79,7 +79,7 @@ static Status study_make(const StudyCommand *command, const StudyRequest *inquir
     bar_start(&bar);
     const Progress watch = bar_watch(&bar);
     Status status =
-        study_kind(inquiry->study)->members != NULL
+        study_has_members(inquiry->study)
             ? crew_run(inquiry->study, &inquiry->simulation, limits, &watch, &answer, problem)
             : measure(inquiry, limits, &watch, &answer, problem);
     bar_stop(&bar);
@@ -109,7 +109,7 @@ static Status study_choose(const StudyCommand *command, StudyRequest *inquiry, v
     if (inquiry->study == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
     if (command->choose != NULL)
-        command->choose((Study *)(void *)inquiry->study, settings);
+        command->choose(inquiry->study, settings);
     return STATUS_OK;
 }
 

@@ -14,7 +14,7 @@ typedef struct StudyCommand {
     // Puts what the flags say into the document's own study of this kind, or into a new one; may
     // take what `settings` own. NULL: the document alone counts, and nothing is printed where files
     // are written.
-    void (*choose)(Study *study, void *settings);
+    void (*choose)(void *study, void *settings);
     void (*print)(const Variant *answer); // on standard output, for people
 } StudyCommand;
 

@@ -21,7 +21,7 @@ static const Field sweep_fields[] = {
     FIELD_END,
 };
 
-static void study_choose(Study *asked, void *of) {
+static void study_choose(void *asked, void *of) {
     (void)asked; // axes stand in the scene's own study
     (void)of;
 }
@@ -68,7 +68,7 @@ static void sweep_print(const Variant *answer) {
         printf("\n%llu failed, %s; point %llu: %s\n",
                (unsigned long long)table->failures.at[i].count,
                sweep_status_names[table->failures.at[i].status],
-               (unsigned long long)table->failures.at[i].first_point, table->failures.at[i].detail);
+               (unsigned long long)table->failures.at[i].first, table->failures.at[i].detail);
 }
 
 static const StudyCommand study = {"sweep", &study_sweep, study_choose, sweep_print};

@@ -88,7 +88,7 @@ static void table_print(const Variant *answer) {
            metric_names[tradeoff->metric], tradeoff->recommendation.why);
 }
 
-static void study_choose(Study *asked, void *of) {
+static void study_choose(void *asked, void *of) {
     TradeoffSettings *settings = of;
     TradeoffStudy *study = (TradeoffStudy *)(void *)asked;
     if (settings->metric != CHOICE_ABSENT && settings->metric != study->metric) {

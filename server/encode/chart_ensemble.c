@@ -26,7 +26,7 @@ static size_t drawn(const Ensemble *ensemble) {
 }
 
 static void put_spectrum(const Plot *plot, const Ensemble *ensemble, size_t index) {
-    const EnsembleSpectrum *spectrum = &ensemble->spectra.at[index];
+    const RunSpectrum *spectrum = &ensemble->spectra.at[index];
     const char *name = spectrum->channel != NULL ? spectrum->channel : "";
     char text[2 * NAME];
     if (spectrum->low.count > 0 && spectrum->high.count > 0)
@@ -41,14 +41,14 @@ typedef struct Scale {
     double least, most;
 } Scale;
 
-static bool has_scale(const EnsembleStatistic *statistic) {
+static bool has_scale(const RunStatistic *statistic) {
     return statistic->mean > 0 && isfinite(statistic->mean);
 }
 
 static Scale scale_rows(EnsembleStatistics *statistics) {
     Scale of = {1, 1};
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++) {
-        const EnsembleStatistic *statistic = ensemble_statistic(statistics, metric);
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
+        const RunStatistic *statistic = ensemble_statistic(statistics, metric);
         if (!has_scale(statistic))
             continue;
         of.least = fmin(of.least, fmin(statistic->minimum, statistic->low) / statistic->mean);
@@ -59,19 +59,19 @@ static Scale scale_rows(EnsembleStatistics *statistics) {
     return of;
 }
 
-static double row_x(const Scale *of, const EnsembleStatistic *statistic, double value) {
+static double row_x(const Scale *of, const RunStatistic *statistic, double value) {
     const double share = (value / statistic->mean - of->least) / (of->most - of->least);
     return label_right + 10 + (value_left - label_right - 20) * fmin(fmax(share, 0), 1);
 }
 
 static void plain_name(int metric, char name[NAME]) {
-    snprintf(name, NAME, "%s", ensemble_metric_names[metric]);
+    snprintf(name, NAME, "%s", statistics_metric_names[metric]);
     for (char *c = name; *c != '\0'; c++)
         if (*c == '_')
             *c = ' ';
 }
 
-static void put_row(Bytes *bytes, const Scale *of, int metric, const EnsembleStatistic *statistic,
+static void put_row(Bytes *bytes, const Scale *of, int metric, const RunStatistic *statistic,
                     double y) {
     char name[NAME];
     plain_name(metric, name);
@@ -143,7 +143,7 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
         plot_fit(&plot, &ensemble->frequency, &ensemble->spectra.at[i].mean);
     const bool has_spectra = plot.x_max > plot.x_min;
     const double from = has_spectra ? bottom + 62 : top + 12;
-    const double height = from + row_height * ENSEMBLE_STATISTICS + 12;
+    const double height = from + row_height * STATISTICS_METRICS + 12;
     char text[96];
     snprintf(text, sizeof text, "Mean of %llu runs",
              (unsigned long long)(ensemble->made - ensemble->failed));
@@ -157,7 +157,7 @@ void chart_ensemble(const Ensemble *ensemble, Bytes *bytes) {
         for (size_t i = 0; i < drawn(ensemble); i++)
             put_spectrum(&plot, ensemble, i);
     const Scale of = scale_rows(&statistics);
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         put_row(bytes, &of, metric, ensemble_statistic(&statistics, metric),
                 from + row_height * (metric + 0.5));
     svg_close(bytes);

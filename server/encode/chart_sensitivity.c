@@ -20,7 +20,7 @@ static void put_spectra(Plot *plot, const Sensitivity *sensitivity) {
     if (!plot_axes(plot))
         return;
     for (size_t i = 0; i < drawn(sensitivity); i++) {
-        const SensitivitySpectrum *spectrum = &sensitivity->spectra.at[i];
+        const RunSpectrum *spectrum = &sensitivity->spectra.at[i];
         char text[120];
         plot_band(plot, &sensitivity->frequency, &spectrum->q05, &spectrum->q95, i);
         plot_line(plot, &sensitivity->frequency, &spectrum->value, i, spectrum->channel);
@@ -48,10 +48,10 @@ static void put_slope(Bytes *bytes, const SensitivitySlope *slope, double x, dou
 }
 
 static void put_table(const Sensitivity *sensitivity, double top, Bytes *bytes) {
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++) {
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         bytes_format(bytes, "<text x=\"%.0f\" y=\"%.0f\" text-anchor=\"end\">", label_right,
                      top + row_height * (metric + 1));
-        put_plain(bytes, ensemble_metric_names[metric]);
+        put_plain(bytes, statistics_metric_names[metric]);
         bytes_text(bytes, "</text>\n");
     }
     for (size_t i = 0; i < sensitivity->response.count; i++) {
@@ -81,7 +81,7 @@ void chart_sensitivity(const Sensitivity *sensitivity, Bytes *bytes) {
         plot_fit(&plot, &sensitivity->frequency, &sensitivity->spectra.at[i].q95);
     }
     const double top = plot.x_max > plot.x_min ? 420 : 60;
-    const double height = top + row_height * (ENSEMBLE_STATISTICS + 2);
+    const double height = top + row_height * (STATISTICS_METRICS + 2);
     svg_open(bytes, width, height, "Sensitivity");
     bytes_format(bytes,
                  "<desc>Relative change of each statistic over the relative change of each "

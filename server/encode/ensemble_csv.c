@@ -7,8 +7,8 @@ void ensemble_csv(const Ensemble *ensemble, Bytes *bytes) {
     cells_header(bytes, summary_fields);
     bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
-        const EnsembleRun *run = &ensemble->table.at[i];
-        bytes_format(bytes, "%llu,", (unsigned long long)run->seed);
+        const RunRecord *run = &ensemble->table.at[i];
+        bytes_format(bytes, "%llu,", (unsigned long long)run->number);
         cells_real(bytes, run->steps);
         cells_members(bytes, summary_fields, &run->summary);
         bytes_text(bytes, ",");

@@ -34,7 +34,7 @@ void sensitivity_csv(const Sensitivity *sensitivity, Bytes *bytes) {
         for (size_t k = 0; k < row->slopes.count; k++) {
             const SensitivitySlope *slope = &row->slopes.at[k];
             bytes_format(bytes, "%s,%s,", sensitivity_parameter_names[row->parameter],
-                         ensemble_metric_names[slope->metric]);
+                         statistics_metric_names[slope->metric]);
             cells_real(bytes, slope->value);
             bytes_text(bytes, ",");
             cells_real(bytes, slope->derivative);

@@ -64,13 +64,13 @@ static bool put_axis(SweepText *text, size_t axis, Bytes *bytes) {
 }
 
 static void put_failures(Bytes *bytes, const Sweep *sweep) {
-    const SweepFailures *failures = &sweep->table.failures;
+    const StudyFailures *failures = &sweep->table.failures;
     bytes_text(bytes, "], \"failures\": [");
     for (size_t i = 0; i < failures->count; i++) {
-        const SweepFailure *failure = &failures->at[i];
+        const StudyFailure *failure = &failures->at[i];
         bytes_format(bytes, "%s{\"status\": \"%s\", \"count\": %llu, \"first_point\": %llu",
                      i > 0 ? ", " : "", sweep_status_names[failure->status],
-                     (unsigned long long)failure->count, (unsigned long long)failure->first_point);
+                     (unsigned long long)failure->count, (unsigned long long)failure->first);
         bytes_text(bytes, ", \"detail\": ");
         bytes_json_string(bytes, failure->detail);
         bytes_text(bytes, "}");

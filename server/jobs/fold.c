@@ -51,7 +51,7 @@ static Status fold_submit(StudyRun *run, Problem *problem) {
     return to > from ? submit_stretch(run, from, to, problem) : STATUS_OK;
 }
 
-static Status fold_take(StudyRun *run, Shift *shift, void *part, Problem *problem) {
+static Status fold_take(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem) {
     TRY(order_put(&run->fold->order, shift->chunk.first + shift->done * shift->chunk.stride, part,
                   problem));
     return fold_submit(run, problem);

@@ -14,7 +14,7 @@ typedef struct Gather {
     // Hands chunks to the executor: those that are not there and that nobody is at.
     Status (*submit)(StudyRun *run, Problem *problem);
     // Takes the part that the shift's next member came to, in any case.
-    Status (*take)(StudyRun *run, Shift *shift, void *part, Problem *problem);
+    Status (*take)(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem);
     void (*free)(StudyRun *run);
     // What follows is NULL where there is nothing to be done. Before the first member of a chunk:
     Status (*begin)(StudyRun *run, Shift *shift, Problem *problem);

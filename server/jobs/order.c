@@ -19,23 +19,22 @@ Status order_make(StudyWork *work, size_t slots, Order *order, Problem *problem)
 
 void order_clear(Order *order) {
     for (size_t i = 0; order->parts != NULL && i < order->window; i++)
-        order->work->kind->members->drop(order->parts[i]);
+        study_part_free(order->work, order->parts[i]);
     free(order->parts);
     pthread_mutex_destroy(&order->lock);
 }
 
 // With the lock held, which is given up for each member: nobody else folds meanwhile.
 static Status fold(Order *order, Problem *problem) {
-    const StudyMembers *members = order->work->kind->members;
     Status status = STATUS_OK;
     while (status == STATUS_OK && order->next < order->work->wanted) {
-        void **place = &order->parts[order->next % order->window], *part = *place;
+        StudyPart **place = &order->parts[order->next % order->window], *part = *place;
         if (part == NULL)
             break;
         *place = NULL;
         pthread_mutex_unlock(&order->lock);
-        status = members->fold(order->work, order->next, part, problem);
-        members->drop(part);
+        status = study_part_fold(order->work, order->next, part, problem);
+        study_part_free(order->work, part);
         pthread_mutex_lock(&order->lock);
         order->next++;
         order->expected = order->work->expected;
@@ -43,7 +42,7 @@ static Status fold(Order *order, Problem *problem) {
     return status;
 }
 
-Status order_put(Order *order, size_t member, void *part, Problem *problem) {
+Status order_put(Order *order, size_t member, StudyPart *part, Problem *problem) {
     Status status = STATUS_OK;
     pthread_mutex_lock(&order->lock);
     order->parts[member % order->window] = part;

@@ -14,11 +14,11 @@
 typedef struct Order {
     pthread_mutex_t lock;
     StudyWork *work;
-    void **parts;    // member i's at i % window
-    size_t window;   // members
-    size_t next;     // to be folded
-    size_t begun;    // members that somebody was asked for
-    size_t expected; // as the work tells it
+    StudyPart **parts; // member i's at i % window
+    size_t window;     // members
+    size_t next;       // to be folded
+    size_t begun;      // members that somebody was asked for
+    size_t expected;   // as the work tells it
     bool is_folding;
 } Order;
 
@@ -28,7 +28,7 @@ void order_clear(Order *order);
 
 // Takes what a member came to. Whoever brings the next one folds it and all that follow; the others
 // leave theirs and go on.
-Status order_put(Order *order, size_t member, void *part, Problem *problem);
+Status order_put(Order *order, size_t member, StudyPart *part, Problem *problem);
 
 // Members that are wanted and that there is room for, begun herewith: *from ... *to - 1, at most so
 // many. None while half the window is on its way, or while others fold: those are to ask after

@@ -22,7 +22,7 @@ enum { STUDIES_BYTES = 512 << 20, STUDIES_PER_WORKER = 2 };
 
 bool study_is_shared(const Computation *computation) {
     const Variant *study = computation->inquiry.study;
-    return study != NULL && !computation->is_again && study_kind(study)->members != NULL;
+    return study != NULL && !computation->is_again && study_has_members(study);
 }
 
 void study_foretell(Computation *computation, const SimulationLimits *limits) {

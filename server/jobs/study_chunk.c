@@ -47,20 +47,19 @@ static bool advance(void *context, double fraction) {
 }
 
 static Status make_member(Worker *worker, StudyRun *run, Shift *shift, Problem *problem) {
-    const StudyMembers *members = run->work->kind->members;
     const Chunk *chunk = &shift->chunk;
     Making making = {run, 0};
     const Progress watch = {&making, advance};
     const StudyTools tools = {.limits = &worker->intake->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace};
-    void *part = NULL;
+    StudyPart *part = NULL;
     if (run->gather->has != NULL && run->gather->has(run, shift))
         return STATUS_OK;
-    const Status status = members->make(run->work, chunk->first + shift->done * chunk->stride,
-                                        &tools, &part, problem);
+    const Status status = study_part_make(run->work, chunk->first + shift->done * chunk->stride,
+                                          &tools, &part, problem);
     if (status != STATUS_OK) {
-        members->drop(part);
+        study_part_free(run->work, part);
         return status;
     }
     (void)advance(&making, 1);

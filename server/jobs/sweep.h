@@ -3,7 +3,7 @@
 #ifndef SERVER_JOBS_SWEEP_H
 #define SERVER_JOBS_SWEEP_H
 
-#include "core/study/sweep_grid.h"
+#include "core/study/sweep.h"
 #include "server/store/store.h"
 
 size_t sweep_rows_of(const SweepRow *row, size_t chunk);

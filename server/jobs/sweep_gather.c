@@ -26,10 +26,10 @@ static Status fly_pilot(Worker *worker, StudyRun *run, double *seconds, Problem 
     Status status = STATUS_OK;
     size_t made = 0;
     while (made < most && status == STATUS_OK) {
-        void *part = NULL;
-        status = sweep_members.make(run->work, (points - 1) * made / (most > 1 ? most - 1 : 1),
-                                    &tools, &part, problem);
-        sweep_members.drop(part);
+        StudyPart *part = NULL;
+        status = study_part_make(run->work, (points - 1) * made / (most > 1 ? most - 1 : 1), &tools,
+                                 &part, problem);
+        study_part_free(run->work, part);
         made++;
         *seconds = 1e-9 * (double)(clock_thread_cpu_ns() - began_ns) / (double)made;
         if (*seconds * (double)made > pilot_seconds)
@@ -158,16 +158,18 @@ static void keep_reason(Shift *shift, const char *why) {
     bytes_format(&shift->reasons, "%zu %s\n", shift->done, line);
 }
 
-static Status rows_take(StudyRun *run, Shift *shift, void *made, Problem *problem) {
-    const SweepPart *part = made;
+static Status rows_take(StudyRun *run, Shift *shift, StudyPart *part, Problem *problem) {
+    const SweepStudy *study = run->work->study;
+    double values[SWEEP_METRICS];
     (void)problem;
-    sweep_row_put(&run->row, &shift->row, shift->done, part->status, part->values);
-    if (part->status != SWEEP_MADE) {
-        keep_reason(shift, part->why);
+    sweep_values(&study->metrics, &part->run, values);
+    sweep_row_put(&run->row, &shift->row, shift->done, sweep_status(part->run.status), values);
+    if (part->run.why != NULL) {
+        keep_reason(shift, part->run.why);
         atomic_fetch_add(&run->rows_failed, 1);
     }
     atomic_fetch_add(&run->rows_done, 1);
-    sweep_members.drop(made);
+    study_part_free(run->work, part);
     return STATUS_OK;
 }
 

@@ -93,9 +93,8 @@ static Status find_failures(SweepShow *show, Problem *problem) {
                 first = &failed[i];
         if (first == NULL)
             return STATUS_OK;
-        if (sweep_add_failure(&table->failures, (SweepStatus)(first - failed), first->first,
-                              first->why) != STATUS_OK)
-            return no_memory(problem);
+        TRY(study_failures_add(&table->failures, (int)(first - failed), NULL, first->first,
+                               first->why, problem));
         table->failures.at[table->failures.count - 1].count = first->count;
         table->failed += first->count;
         first->count = 0;
@@ -190,7 +189,7 @@ bool sweep_show_read(void *of, size_t cell, size_t first, size_t count, double *
 
 Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, SweepPointShow *target,
                         Problem *problem) {
-    SweepGrid *plan;
+    SweepGrid *grid;
     SweepChunkRow chunk = {0};
     const SweepRow *row = &show->row;
     *target = (SweepPointShow){.status = SWEEP_PENDING};
@@ -208,9 +207,10 @@ Status sweep_point_load(Store *store, const SweepShow *show, uint64_t point, Swe
     sweep_row_values(row, &chunk, place, target->values);
     sweep_row_reason(&chunk, place, target->why, sizeof target->why);
     sweep_chunk_row_clear(&chunk);
-    TRY(sweep_grid_new(study_of(show), &show->inquiry.simulation, NULL, &plan, problem));
-    const Status made =
-        sweep_grid_scene(plan, (size_t)point, false, NULL, &target->scene.simulation, problem);
-    sweep_grid_free(plan);
+    Status made = sweep_grid_new(study_of(show), &show->inquiry.simulation, NULL, &grid, problem);
+    if (made == STATUS_OK)
+        made =
+            sweep_grid_scene(grid, (size_t)point, false, NULL, &target->scene.simulation, problem);
+    sweep_grid_free(grid);
     return made;
 }

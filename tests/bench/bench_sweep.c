@@ -119,7 +119,7 @@ static int bench_judging(Store *store, Problem *problem) {
     if (sweep_grid_new(study, &inquiry.simulation, &limits, &plan, problem) != STATUS_OK)
         return fail("planning", problem);
     began_ns = clock_monotonic_ns();
-    (void)sweep_grid_check_points(plan, SIZE_MAX, &limits, NULL, problem);
+    (void)sweep_grid_validate(plan, SIZE_MAX, &limits, NULL, problem);
     printf("all 100000 points judged before the first run: %.3f s\n",
            1e-9 * (double)(clock_monotonic_ns() - began_ns));
     sweep_grid_free(plan);

@@ -70,13 +70,6 @@ EXCEPTIONS = {
         "core/solve/steps_run > core/solve/solvers",
         "core/solve/time_stepping > core/solve/step_contact",
         "core/solve/workspace > core/solve/exact_state",
-        "core/study/ensemble > core/study/spectrum_accumulator",
-        "core/study/sensitivity > core/study/parameter_perturbation",
-        "core/study/statistics > core/study/ensemble",
-        "core/study/sweep_grid > core/study/sweep",
-        "core/study/tradeoff > core/study/candidate_settings",
-        "core/study/tradeoff > core/study/pareto",
-        "core/study/uncertainty_bands > core/study/sensitivity",
     ],
     "upward": [
         "core/drop_test/evaluation > core/plan/plan",

@@ -95,12 +95,12 @@ static void draw(Draws *draws, unsigned long *runs, bool *has_damper, bool *has_
 // All runs of one scene: numbers by run, and densities run by run.
 typedef struct Whole {
     size_t runs, rows;
-    double *values[ENSEMBLE_STATISTICS];
+    double *values[STATISTICS_METRICS];
     double *densities, *steps;
 } Whole;
 
 static void whole_clear(Whole *whole) {
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         free(whole->values[metric]);
     free(whole->densities);
     free(whole->steps);
@@ -111,14 +111,14 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
     *whole = (Whole){.runs = (size_t)study->runs};
     whole->steps = calloc(whole->runs, sizeof(double));
     assert_non_null(whole->steps);
-    for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         assert_non_null(whole->values[metric] = calloc(whole->runs, sizeof(double)));
     Workspace workspace = {0};
     for (size_t i = 0; i < whole->runs; i++) {
         Simulation member;
         Outcome *outcome;
         assert_int_equal(
-            ensemble_member(&inquiry->simulation, study->first_seed + i, &member, &problem),
+            ensemble_scene(&inquiry->simulation, study->first_seed + i, &member, &problem),
             STATUS_OK);
         if (simulation_run(&member, NULL, NULL, &workspace, &outcome, &problem) != STATUS_OK)
             fail_msg("%s", problem.detail);
@@ -127,7 +127,7 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
         const double values[] = {summary->peak_displacement, summary->rms_displacement,
                                  summary->peak_acceleration, summary->rms_acceleration,
                                  (double)summary->impacts,   summary->peak_contact_force};
-        for (int metric = 0; metric < ENSEMBLE_STATISTICS; metric++)
+        for (int metric = 0; metric < STATISTICS_METRICS; metric++)
             whole->values[metric][i] = values[metric];
         whole->rows = densities->rows;
         if (i == 0)
@@ -144,10 +144,10 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
 
 // The true errors by the number of runs, and the spread of all about their mean.
 static double errors_make(const Whole *whole, int metric, double *errors) {
-    const size_t rows = metric == ENSEMBLE_PSD ? whole->rows : 1;
+    const size_t rows = metric == STATISTICS_PSD ? whole->rows : 1;
     double *mean = calloc(rows, sizeof *mean), *sum = calloc(rows, sizeof *sum);
     assert_true(mean != NULL && sum != NULL);
-    const double *values = metric == ENSEMBLE_PSD ? whole->densities : whole->values[metric];
+    const double *values = metric == STATISTICS_PSD ? whole->densities : whole->values[metric];
     double norm = 0, squares = 0;
     for (size_t i = 0; i < whole->runs; i++)
         for (size_t k = 0; k < rows; k++)
@@ -196,7 +196,7 @@ static void judge(const Whole *whole, const double *errors, double spread, const
         lasting--;
     while (errors[lucky - 1] > target)
         lucky++;
-    const double z = student_quantile(ENSEMBLE_CONFIDENCE, 0);
+    const double z = student_quantile(STOPPING_RULE_CONFIDENCE, 0);
     while (knowing < whole->runs &&
            z * spread * sqrt(1 / (double)knowing - 1 / (double)whole->runs) > target)
         knowing++;
@@ -211,7 +211,7 @@ static void judge(const Whole *whole, const double *errors, double spread, const
     count->made += steps_of(whole, made);
     count->lasting += steps_of(whole, lasting);
     count->lucky += steps_of(whole, lucky);
-    if (answer->target.metric != ENSEMBLE_PSD) {
+    if (answer->target.metric != STATISTICS_PSD) {
         count->of_statistics += steps_of(whole, made);
         count->knowing += steps_of(whole, knowing);
     }
@@ -241,10 +241,10 @@ static void scene_judge(Draws *draws) {
     const StudyTools tools = {.workspace = &workspace};
     for (int asked = 0; asked < ASKED; asked++) {
         // One of four is of the spectra.
-        study->metric = asked == 0 ? (int)ENSEMBLE_PSD : (int)draws_uniform(draws, 0, 6);
-        if ((study->metric == ENSEMBLE_IMPACTS && !has_damper) ||
-            (study->metric == ENSEMBLE_PEAK_CONTACT_FORCE && !has_force))
-            study->metric = ENSEMBLE_RMS_DISPLACEMENT;
+        study->metric = asked == 0 ? (int)STATISTICS_PSD : (int)draws_uniform(draws, 0, 6);
+        if ((study->metric == STATISTICS_IMPACTS && !has_damper) ||
+            (study->metric == STATISTICS_PEAK_CONTACT_FORCE && !has_force))
+            study->metric = STATISTICS_RMS_DISPLACEMENT;
         const double spread = errors_make(&whole, study->metric, errors);
         for (size_t at = 0; at < COUNT(targets); at++) {
             // Where nearly all have to be run, two metrics tell as much as four.
@@ -259,7 +259,7 @@ static void scene_judge(Draws *draws) {
             judge(&whole, errors, spread, (const Ensemble *)(const void *)answer, at);
             if (counts[at].missed > missed)
                 printf("  missed: %s within %g, %llu of %zu runs: %.3g\n",
-                       ensemble_metric_names[study->metric], targets[at],
+                       statistics_metric_names[study->metric], targets[at],
                        (unsigned long long)((const Ensemble *)(const void *)answer)->made,
                        whole.runs, errors[((const Ensemble *)(const void *)answer)->made - 1]);
             variant_free(answer);

@@ -70,15 +70,15 @@ static void each_row_is_the_scene_with_its_seed(void **state) {
         Outcome *outcome;
         assert_int_equal(simulation_run(simulation, NULL, NULL, NULL, &outcome, &problem),
                          STATUS_OK);
-        const EnsembleRun *row = &answer->table.at[i];
-        assert_true(row->seed == 5 + i && row->steps == outcome->steps && row->why == NULL);
+        const RunRecord *row = &answer->table.at[i];
+        assert_true(row->number == 5 + i && row->steps == outcome->steps && row->why == NULL);
         assert_memory_equal(&row->summary, &outcome->summary, sizeof outcome->summary);
         steps += outcome->steps;
         outcome_unref(outcome);
     }
     assert_true(answer->steps == steps);
     assert_true(answer->target.why == NULL && answer->target.predicted_runs == COUNT_ABSENT);
-    const EnsembleStatistic *impacts = &answer->statistics.impacts;
+    const RunStatistic *impacts = &answer->statistics.impacts;
     assert_true(impacts->count == 5 && impacts->low < impacts->mean);
     assert_int_equal(answer->spectra.count, 1);
     assert_string_equal(answer->spectra.at[0].channel, "mean_acceleration");
@@ -92,7 +92,7 @@ static void a_target_ends_it_and_looser_ones_end_it_sooner(void **state) {
     static const double targets[] = {0.5, 0.1, 1e-9};
     StudyRequest inquiry = study_request_make(4, 60);
     double made[COUNT(targets)];
-    for (int metric = 0; metric <= ENSEMBLE_PSD; metric += ENSEMBLE_PSD) {
+    for (int metric = 0; metric <= STATISTICS_PSD; metric += STATISTICS_PSD) {
         for (size_t i = 0; i < COUNT(targets); i++) {
             study_of(&inquiry)->target = targets[i];
             study_of(&inquiry)->metric = metric;
@@ -115,7 +115,7 @@ static void all_are_made_where_none_differs(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(1, 30);
     study_of(&inquiry)->target = 0.5;
-    study_of(&inquiry)->metric = ENSEMBLE_IMPACTS;
+    study_of(&inquiry)->metric = STATISTICS_IMPACTS;
     // Nothing reaches the stops: a rare seed might.
     ((ExcitationRandom *)(void *)inquiry.simulation.scene.excitation)->rms = 1e-6;
     complete(&inquiry);
@@ -141,14 +141,14 @@ static void a_seed_that_fails_is_a_row_with_its_reason(void **state) {
     assert_true(answer->statistics.rms_displacement.count == 20 - answer->failed);
     bool is_first = true;
     for (size_t i = 0; i < 20; i++) {
-        const EnsembleRun *row = &answer->table.at[i];
+        const RunRecord *row = &answer->table.at[i];
         assert_true((row->why != NULL) == (whole->table.at[i].summary.impacts > limits.impacts));
         if (row->why == NULL)
             continue;
         assert_true(isnan(row->steps) && isnan(row->summary.rms_displacement));
         assert_non_null(strstr(row->why, "impacts"));
         if (is_first)
-            assert_int_equal(answer->failures.at[0].first_seed, row->seed);
+            assert_int_equal(answer->failures.at[0].first, row->number);
         is_first = false;
     }
     variant_free(&answer->variant);
@@ -237,7 +237,7 @@ static void the_same_study_has_the_same_bytes_in_any_workspace(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(3, 20);
     study_of(&inquiry)->target = 0.08;
-    study_of(&inquiry)->metric = ENSEMBLE_PSD;
+    study_of(&inquiry)->metric = STATISTICS_PSD;
     complete(&inquiry);
     Workspace workspace = {0};
     Taken taken[3] = {{NULL, 0}};
@@ -285,7 +285,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 
     inquiry = study_request_make(1, 20);
     study_of(&inquiry)->target = 0.1;
-    study_of(&inquiry)->metric = ENSEMBLE_PEAK_CONTACT_FORCE;
+    study_of(&inquiry)->metric = STATISTICS_PEAK_CONTACT_FORCE;
     paper_model(&inquiry.simulation, "impulse");
     assert_refused(&inquiry, NULL, "/study/metric", "impulses have none");
 
@@ -301,12 +301,12 @@ static void what_cannot_be_answered_is_refused(void **state) {
 static void a_metric_without_a_target_is_left_out(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(1, 20);
-    study_of(&inquiry)->metric = ENSEMBLE_PSD;
+    study_of(&inquiry)->metric = STATISTICS_PSD;
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->metric, CHOICE_ABSENT);
     study_of(&inquiry)->target = 0.1;
     complete(&inquiry);
-    assert_int_equal(study_of(&inquiry)->metric, ENSEMBLE_RMS_DISPLACEMENT);
+    assert_int_equal(study_of(&inquiry)->metric, STATISTICS_RMS_DISPLACEMENT);
     study_request_clear(&inquiry);
 }
 

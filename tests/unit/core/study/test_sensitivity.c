@@ -120,11 +120,12 @@ static void slopes_are_central_differences_of_the_summary(void **state) {
         simulation_clear(&simulation);
     }
     const SensitivitySlope *slope =
-        slope_of(answer, SENSITIVITY_CONTACT_TIME, ENSEMBLE_PEAK_CONTACT_FORCE);
+        slope_of(answer, SENSITIVITY_CONTACT_TIME, STATISTICS_PEAK_CONTACT_FORCE);
     assert_near(slope->derivative,
                 (forces[1] - forces[0]) / answer->summary.peak_contact_force / (2 * h), 1e-12);
     assert_true(slope->is_settled && slope->spread < 0.01 && slope->derivative < -0.5);
-    assert_true(slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_PEAK_DISPLACEMENT)->is_settled);
+    assert_true(
+        slope_of(answer, SENSITIVITY_RESTITUTION, STATISTICS_PEAK_DISPLACEMENT)->is_settled);
     assert_true(!answer->is_chaotic && answer->runs == 0 && answer->table.count == 0);
     clear(&inquiry, answer);
 }
@@ -137,7 +138,7 @@ static void chaos_is_told_and_its_slopes_do_not_settle(void **state) {
     Sensitivity *answer = make(&inquiry);
     assert_true(answer->is_chaotic && strstr(answer->why, "rounding alone") != NULL);
     const SensitivitySlope *slope =
-        slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_RMS_ACCELERATION);
+        slope_of(answer, SENSITIVITY_RESTITUTION, STATISTICS_RMS_ACCELERATION);
     assert_true(!slope->is_settled && slope->spread > 0.1);
     clear(&inquiry, answer);
 }
@@ -146,8 +147,8 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.9, 0.025, 1);
     SensitivityStudy *study = study_of(&inquiry);
-    study->restitution_deviation = 0.02;
-    study->contact_time_deviation = 0.1;
+    study->uncertainty.restitution_deviation = 0.02;
+    study->uncertainty.contact_time_deviation = 0.1;
     complete(&inquiry);
     assert_int_equal(study->runs, 200);
     Simulation member;
@@ -156,7 +157,8 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     enum { DRAWN = 20000 };
     for (uint64_t run = 1; run <= DRAWN; run++) {
         double factors[2];
-        perturbation_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
+        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
+                          &factors[0], &factors[1]);
         const Buffer *buffer = &member.scene.dampers.at[0].buffer;
         assert_true(buffer->restitution == 0.9 * factors[0] && buffer->restitution <= 1);
         assert_true(buffer->contact_time == 0.025 * factors[1]);
@@ -169,10 +171,11 @@ static void draws_have_the_stated_spread_and_stay_below_one(void **state) {
     assert_near(sums[1] / DRAWN, 1, 3e-3);
     assert_near(sqrt(squares[0] / DRAWN), 0.02, 5e-4);
     assert_near(sqrt(squares[1] / DRAWN), 0.1, 2e-3);
-    study->restitution_deviation = 0.5; // most of the upper half is beyond 1
+    study->uncertainty.restitution_deviation = 0.5; // most of the upper half is beyond 1
     for (uint64_t run = 1; run <= 200; run++) {
         double factors[2];
-        perturbation_draw(study, &inquiry.simulation, run, &member, &factors[0], &factors[1]);
+        perturbation_draw(&study->uncertainty, study->seed, &inquiry.simulation, run, &member,
+                          &factors[0], &factors[1]);
         assert_true(member.scene.dampers.at[0].buffer.restitution <= 1);
     }
     simulation_clear(&member);
@@ -198,8 +201,9 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
     SensitivityStudy *study = study_of(&inquiry);
     study->runs = 40;
     complete(&inquiry);
-    assert_true(isnan(study->restitution_deviation) && isnan(study->contact_time_deviation));
-    assert_int_equal(study->spread.count, 2);
+    assert_true(isnan(study->uncertainty.restitution_deviation) &&
+                isnan(study->uncertainty.contact_time_deviation));
+    assert_int_equal(study->uncertainty.spread.count, 2);
     Sensitivity *answer = make(&inquiry);
     double most[2] = {0};
     for (size_t i = 0; i < answer->table.count; i++) {
@@ -210,9 +214,9 @@ static void each_buffer_is_drawn_by_what_its_material_tells(void **state) {
         most[1] = fmax(most[1], fabs(draw->contact_time.at[1] - 1));
     }
     assert_true(most[0] > 0.05 && most[0] < 0.25 && most[1] > 0.2 && most[1] < 1);
-    assert_int_equal(answer->spread.count, 2);
-    assert_string_equal(answer->spread.at[0].source, "felt@2");
-    assert_int_equal(answer->spread.at[1].buffer, SENSITIVITY_RIGHT);
+    assert_int_equal(answer->uncertainty.spread.count, 2);
+    assert_string_equal(answer->uncertainty.spread.at[0].source, "felt@2");
+    assert_int_equal(answer->uncertainty.spread.at[1].buffer, SENSITIVITY_RIGHT);
     // And so are what follows for k_b and c_b.
     const SensitivityStop *left = &answer->contact.at[0], *right = &answer->contact.at[1];
     assert_near(left->stiffness_deviation, fabs(left->stiffness_by_restitution) * 0.05, 1e-15);
@@ -224,14 +228,15 @@ static void a_number_for_all_buffers_wins_over_their_materials(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_of_materials();
     SensitivityStudy *study = study_of(&inquiry);
-    study->restitution_deviation = 0;
-    study->contact_time_deviation = 0.01;
+    study->uncertainty.restitution_deviation = 0;
+    study->uncertainty.contact_time_deviation = 0.01;
     complete(&inquiry);
-    assert_int_equal(study->spread.count, 0);
+    assert_int_equal(study->uncertainty.spread.count, 0);
     for (int place = SENSITIVITY_LEFT; place <= SENSITIVITY_RIGHT; place++) {
         const SensitivityBuffer buffer = (SensitivityBuffer)place;
-        assert_true(deviation_find(study, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
-        assert_true(deviation_find(study, 0, buffer, SENSITIVITY_CONTACT_TIME) == 0.01);
+        assert_true(uncertainty_find(&study->uncertainty, 0, buffer, SENSITIVITY_RESTITUTION) == 0);
+        assert_true(uncertainty_find(&study->uncertainty, 0, buffer, SENSITIVITY_CONTACT_TIME) ==
+                    0.01);
     }
     study_request_clear(&inquiry);
 }
@@ -240,7 +245,7 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
     SensitivityStudy *study = study_of(&inquiry);
-    study->contact_time_deviation = 0.1;
+    study->uncertainty.contact_time_deviation = 0.1;
     study->runs = 20;
     study->seed = 7;
     complete(&inquiry);
@@ -256,10 +261,10 @@ static void a_drawn_run_is_the_scene_with_its_numbers(void **state) {
     assert_memory_equal(&draw->summary, &outcome->summary, sizeof draw->summary);
     outcome_unref(outcome);
     simulation_clear(&simulation);
-    const SensitivityBand *band = &answer->statistics.at[ENSEMBLE_RMS_DISPLACEMENT];
+    const RunStatistic *band = &answer->statistics.at[STATISTICS_RMS_DISPLACEMENT];
     assert_true(band->count == 20 && band->q05 <= band->median && band->median <= band->q95);
     assert_true(band->minimum <= band->q05 && band->q95 <= band->maximum);
-    const SensitivitySpectrum *spectrum = &answer->spectra.at[0];
+    const RunSpectrum *spectrum = &answer->spectra.at[0];
     for (size_t k = 1; k < answer->frequency.count; k += 97)
         assert_true(spectrum->q05.at[k] <= spectrum->median.at[k] &&
                     spectrum->median.at[k] <= spectrum->q95.at[k]);
@@ -281,8 +286,9 @@ static void the_papers_errors_move_the_response_as_it_is_stated(void **state) {
     complete(&inquiry);
     Sensitivity *answer = make(&inquiry);
     const double moved =
-        0.1 * slope_of(answer, SENSITIVITY_CONTACT_TIME, ENSEMBLE_PEAK_CONTACT_FORCE)->derivative -
-        0.15 * slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_PEAK_CONTACT_FORCE)->derivative;
+        0.1 *
+            slope_of(answer, SENSITIVITY_CONTACT_TIME, STATISTICS_PEAK_CONTACT_FORCE)->derivative -
+        0.15 * slope_of(answer, SENSITIVITY_RESTITUTION, STATISTICS_PEAK_CONTACT_FORCE)->derivative;
     assert_true(moved < -0.09 && moved > -0.14);
     clear(&inquiry, answer);
 }
@@ -294,7 +300,7 @@ static void what_has_no_closed_form_says_why(void **state) {
     Sensitivity *answer = make(&inquiry);
     assert_non_null(strstr(answer->contact.at[1].why, "impulses have no stiffness"));
     // Impulses have no force either.
-    assert_true(answer->response.at[0].slopes.count + 1 == ENSEMBLE_STATISTICS);
+    assert_true(answer->response.at[0].slopes.count + 1 == STATISTICS_METRICS);
     clear(&inquiry, answer);
     inquiry = study_request_make(0.61, 0.025, 1);
     paper_model(&inquiry.simulation, "flores");
@@ -312,7 +318,7 @@ static void a_restitution_at_its_end_is_stepped_to_one_side(void **state) {
     assert_true(perturbation_max_step(&inquiry.simulation, SENSITIVITY_CONTACT_TIME, 0.01) == 0.01);
     Sensitivity *answer = make(&inquiry);
     assert_true(
-        !isnan(slope_of(answer, SENSITIVITY_RESTITUTION, ENSEMBLE_RMS_DISPLACEMENT)->derivative));
+        !isnan(slope_of(answer, SENSITIVITY_RESTITUTION, STATISTICS_RMS_DISPLACEMENT)->derivative));
     assert_true(isnan(answer->contact.at[0].damping_by_restitution));
     clear(&inquiry, answer);
 }
@@ -347,7 +353,7 @@ static bool stop(void *context, double fraction) {
 static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.61, 0.025, 2);
-    study_of(&inquiry)->contact_time_deviation = 0.1;
+    study_of(&inquiry)->uncertainty.contact_time_deviation = 0.1;
     complete(&inquiry);
     double last = 0;
     const Progress progress = {&last, stop};
@@ -370,7 +376,7 @@ static void it_stops_when_told_and_its_cost_is_that_of_its_runs(void **state) {
 static void faults_are_told_at_their_places(void **state) {
     (void)state;
     StudyRequest inquiry = study_request_make(0.61, (double)NAN, 1);
-    study_of(&inquiry)->contact_time_deviation = 0.1; // impulses have no contact time
+    study_of(&inquiry)->uncertainty.contact_time_deviation = 0.1; // impulses have no contact time
     assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/study/contact_time_deviation");
     study_request_clear(&inquiry);
@@ -380,7 +386,7 @@ static void faults_are_told_at_their_places(void **state) {
     assert_string_equal(problem.faults[0].pointer, "/study/runs");
     study_request_clear(&inquiry);
     inquiry = study_request_make(0.61, 0.025, 100);
-    study_of(&inquiry)->restitution_deviation = 0.1;
+    study_of(&inquiry)->uncertainty.restitution_deviation = 0.1;
     study_of(&inquiry)->runs = 2000;
     inquiry.simulation.output.psd.segment = 65536;
     assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_INVALID);

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/study/ensemble.h"
 #include "core/study/spectrum_accumulator.h"
 
 static Problem problem;
@@ -50,7 +51,9 @@ static Ensemble *tell(const SpectrumAccumulator *fold) {
     spectrum_of(0, &like);
     Ensemble *answer = (Ensemble *)(void *)variant_new(study_ensemble.answer);
     assert_non_null(answer);
-    assert_int_equal(spectrum_accumulator_report(fold, &like, answer, &problem), STATUS_OK);
+    assert_int_equal(
+        spectrum_accumulator_report(fold, &like, &answer->frequency, &answer->spectra, &problem),
+        STATUS_OK);
     columns_clear(&like.densities);
     return answer;
 }
@@ -64,7 +67,7 @@ static void means_and_bands_are_numpys(void **state) {
     SpectrumAccumulator fold = fold_of(RUNS);
     Ensemble *answer = tell(&fold);
     assert_int_equal(answer->spectra.count, 2);
-    const EnsembleSpectrum *spectrum = &answer->spectra.at[0];
+    const RunSpectrum *spectrum = &answer->spectra.at[0];
     assert_string_equal(spectrum->channel, "displacement");
     assert_string_equal(spectrum->unit, "m^2/Hz");
     for (size_t k = 0; k < ROWS; k++) {
@@ -107,7 +110,7 @@ static void the_spread_is_that_of_the_channel_farthest_off(void **state) {
         spectrum.densities.count = 2;
         columns_clear(&spectrum.densities);
     }
-    const Spread spread = spectrum_accumulator_spread(&alone, 100);
+    const RunSpread spread = spectrum_accumulator_spread(&alone, 100);
     assert_int_equal(spread.count, RUNS);
     assert_near(spread.relative, 0.5322210623972516);
     assert_near(spread.freedom, 2.1325742019787195);

@@ -18,37 +18,38 @@ static void assert_near(double is, double should) {
         fail_msg("is %.17g, should be %.17g", is, should);
 }
 
-static EnsembleStatistic blank(void) {
-    return (EnsembleStatistic){.mean = (double)NAN,
-                               .standard_deviation = (double)NAN,
-                               .standard_error = (double)NAN,
-                               .low = (double)NAN,
-                               .high = (double)NAN};
+static RunStatistic blank(void) {
+    return (RunStatistic){.mean = (double)NAN,
+                          .standard_deviation = (double)NAN,
+                          .standard_error = (double)NAN,
+                          .low = (double)NAN,
+                          .high = (double)NAN};
 }
 
 enum { RUNS = 9 };
-static EnsembleRun runs[RUNS];
+static RunRecord runs[RUNS];
 static char unstable[] = "the numbers grew", limit[] = "too many impacts";
 
 // Seven runs that ended, seeds 10 to 18 but 12 and 15.
-static EnsembleRuns seven(void) {
+static RunTable seven(void) {
     static const double values[RUNS] = {3.1, 2.7, 0, 8.9, 1.0, 0, 4.4, 2.7, 5.2};
     for (size_t i = 0; i < RUNS; i++) {
-        runs[i] = (EnsembleRun){.seed = 10 + i, .why = i == 2 || i == 5 ? unstable : NULL};
+        runs[i] = (RunRecord){.number = 10 + i, .why = i == 2 || i == 5 ? unstable : NULL};
         runs[i].summary = (Summary){.rms_displacement = values[i],
                                     .impacts = COUNT_ABSENT,
                                     .error_estimate = i == 8 ? (double)NAN : 1e-9 * values[i],
                                     .trust_horizon = i == 3 || i == 4 ? values[i] : (double)NAN,
                                     .energy_residual = 1e-14};
     }
-    return (EnsembleRuns){runs, RUNS};
+    return (RunTable){runs, RUNS};
 }
 
 static void statistics_are_numpys_over_the_runs_that_ended(void **state) {
     (void)state;
-    const EnsembleRuns table = seven();
-    EnsembleStatistic of = blank();
-    assert_int_equal(statistics_fold(&table, ENSEMBLE_RMS_DISPLACEMENT, &of, &problem), STATUS_OK);
+    const RunTable table = seven();
+    RunStatistic of = blank();
+    assert_int_equal(statistics_fill(&table, STATISTICS_RMS_DISPLACEMENT, &of, &problem),
+                     STATUS_OK);
     assert_int_equal(of.count, 7);
     assert_string_equal(of.unit, "m");
     assert_near(of.mean, 4);
@@ -69,10 +70,11 @@ static void statistics_are_numpys_over_the_runs_that_ended(void **state) {
 static void a_mean_far_from_its_spread_loses_no_digits(void **state) {
     (void)state;
     for (size_t i = 0; i < RUNS; i++)
-        runs[i] = (EnsembleRun){.seed = i, .summary = {.rms_displacement = 1e9 + (double)i}};
-    const EnsembleRuns table = {runs, RUNS};
-    EnsembleStatistic of = blank();
-    assert_int_equal(statistics_fold(&table, ENSEMBLE_RMS_DISPLACEMENT, &of, &problem), STATUS_OK);
+        runs[i] = (RunRecord){.number = i, .summary = {.rms_displacement = 1e9 + (double)i}};
+    const RunTable table = {runs, RUNS};
+    RunStatistic of = blank();
+    assert_int_equal(statistics_fill(&table, STATISTICS_RMS_DISPLACEMENT, &of, &problem),
+                     STATUS_OK);
     assert_true(of.mean == 1e9 + 4);
     assert_near(of.standard_deviation, sqrt(60 / 8.0));
     free(of.unit);
@@ -83,14 +85,14 @@ static void numbers_of_any_size_have_statistics(void **state) {
     static const double scales[] = {1e-300, 1e-160, 1e160, 1e307};
     for (size_t k = 0; k < COUNT(scales); k++) {
         for (size_t i = 0; i < RUNS; i++)
-            runs[i] = (EnsembleRun){
-                .seed = i, .summary = {.rms_displacement = scales[k] * (double)(1 + i * i % 5)}};
-        const EnsembleRuns table = {runs, RUNS};
-        EnsembleStatistic of = blank();
-        Spread spread;
-        assert_int_equal(statistics_fold(&table, ENSEMBLE_RMS_DISPLACEMENT, &of, &problem),
+            runs[i] = (RunRecord){
+                .number = i, .summary = {.rms_displacement = scales[k] * (double)(1 + i * i % 5)}};
+        const RunTable table = {runs, RUNS};
+        RunStatistic of = blank();
+        RunSpread spread;
+        assert_int_equal(statistics_fill(&table, STATISTICS_RMS_DISPLACEMENT, &of, &problem),
                          STATUS_OK);
-        assert_int_equal(statistics_spread(&table, ENSEMBLE_RMS_DISPLACEMENT, &spread, &problem),
+        assert_int_equal(statistics_spread(&table, STATISTICS_RMS_DISPLACEMENT, &spread, &problem),
                          STATUS_OK);
         // 1, 2, 5, 5, 2, 1, 2, 5, 5
         assert_near(of.mean, scales[k] * (28 / 9.0));
@@ -103,51 +105,52 @@ static void numbers_of_any_size_have_statistics(void **state) {
 
 static void too_few_runs_leave_numbers_unknown(void **state) {
     (void)state;
-    EnsembleRuns table = seven();
-    EnsembleStatistic of = blank();
-    assert_int_equal(statistics_fold(&table, ENSEMBLE_IMPACTS, &of, &problem), STATUS_OK);
+    RunTable table = seven();
+    RunStatistic of = blank();
+    assert_int_equal(statistics_fill(&table, STATISTICS_IMPACTS, &of, &problem), STATUS_OK);
     assert_true(of.count == 0 && isnan(of.mean) && isnan(of.low));
     free(of.unit);
     of = blank();
     table.count = 1;
-    assert_int_equal(statistics_fold(&table, ENSEMBLE_RMS_DISPLACEMENT, &of, &problem), STATUS_OK);
+    assert_int_equal(statistics_fill(&table, STATISTICS_RMS_DISPLACEMENT, &of, &problem),
+                     STATUS_OK);
     assert_true(of.count == 1 && of.mean == 3.1 && of.median == 3.1 && isnan(of.high));
     free(of.unit);
 }
 
 static void the_spread_tells_what_the_rule_needs(void **state) {
     (void)state;
-    const EnsembleRuns table = seven();
-    Spread spread;
-    assert_int_equal(statistics_spread(&table, ENSEMBLE_RMS_DISPLACEMENT, &spread, &problem),
+    const RunTable table = seven();
+    RunSpread spread;
+    assert_int_equal(statistics_spread(&table, STATISTICS_RMS_DISPLACEMENT, &spread, &problem),
                      STATUS_OK);
     assert_int_equal(spread.count, 7);
     assert_near(spread.relative, 0.635741037425355);
     assert_near(spread.skewness, 0.9558840420092773);
     // Alike, or without a mean: nothing is known of the rest.
-    assert_int_equal(statistics_spread(&table, ENSEMBLE_PEAK_DISPLACEMENT, &spread, &problem),
+    assert_int_equal(statistics_spread(&table, STATISTICS_PEAK_DISPLACEMENT, &spread, &problem),
                      STATUS_OK);
     assert_true(isinf(spread.relative));
 }
 
 static void trust_and_failures_are_counted(void **state) {
     (void)state;
-    EnsembleRuns table = seven();
-    EnsembleTrust trust = {.shortest_horizon = (double)NAN,
-                           .largest_error_estimate = (double)NAN,
-                           .largest_energy_residual = (double)NAN};
+    RunTable table = seven();
+    RunTrust trust = {.shortest_horizon = (double)NAN,
+                      .largest_error_estimate = (double)NAN,
+                      .largest_energy_residual = (double)NAN};
     statistics_trust(&table, &trust);
     assert_true(trust.whole == 4 && trust.beyond == 2 && trust.unknown == 1);
     assert_true(trust.shortest_horizon == 1 && trust.largest_error_estimate == 1e-9 * 8.9);
     assert_true(trust.largest_energy_residual == 1e-14);
     runs[7].why = limit;
-    const Status statuses[RUNS] = {
-        [2] = STATUS_UNSTABLE, [5] = STATUS_UNSTABLE, [7] = STATUS_LIMIT};
-    EnsembleFailures failures = {NULL, 0};
-    assert_int_equal(statistics_failures(&table, statuses, &failures, &problem), STATUS_OK);
+    runs[2].status = runs[5].status = STATUS_UNSTABLE;
+    runs[7].status = STATUS_LIMIT;
+    StudyFailures failures = {NULL, 0};
+    assert_int_equal(study_failures_fill(&table, &failures, &problem), STATUS_OK);
     assert_int_equal(failures.count, 2);
     assert_string_equal(failures.at[0].reason, "unstable");
-    assert_true(failures.at[0].count == 2 && failures.at[0].first_seed == 12);
+    assert_true(failures.at[0].count == 2 && failures.at[0].first == 12);
     assert_string_equal(failures.at[1].detail, limit);
     for (size_t i = 0; i < failures.count; i++) {
         free(failures.at[i].reason);

@@ -17,7 +17,7 @@ static void assert_near(double is, double should, double most) {
 
 static void the_error_is_students_and_vanishes_where_all_are_made(void **state) {
     (void)state;
-    Spread spread = {.count = 8, .relative = 0.2, .freedom = 1};
+    RunSpread spread = {.count = 8, .relative = 0.2, .freedom = 1};
     assert_near(stopping_rule_error(&spread, 8, 1000), 0.2464590461075396, 1e-10);
     assert_true(stopping_rule_error(&spread, 1000, 1000) == 0 &&
                 stopping_rule_error(&spread, 3, 2) == 0);
@@ -29,21 +29,21 @@ static void the_error_is_students_and_vanishes_where_all_are_made(void **state) 
 
 static void skewed_runs_and_spectra_have_their_own_quantiles(void **state) {
     (void)state;
-    Spread skewed = {.count = 20, .relative = 0.2, .skewness = -0.7, .freedom = 1};
+    RunSpread skewed = {.count = 20, .relative = 0.2, .skewness = -0.7, .freedom = 1};
     assert_near(stopping_rule_error(&skewed, 20, 50), 0.11480278729943294, 1e-10);
     skewed.skewness = 0.7;
     assert_near(stopping_rule_error(&skewed, 20, 50), 0.11480278729943294, 1e-10);
-    const Spread spectra = {.count = 16, .relative = 0.5, .freedom = 6};
+    const RunSpread spectra = {.count = 16, .relative = 0.5, .freedom = 6};
     assert_near(stopping_rule_error(&spectra, 16, 100), 0.22040512916089305, 1e-10);
 }
 
 static void the_fewest_runs_that_keep_a_target_are_foretold(void **state) {
     (void)state;
-    const Spread spread = {.count = 8, .relative = 0.2, .freedom = 1};
+    const RunSpread spread = {.count = 8, .relative = 0.2, .freedom = 1};
     assert_int_equal(stopping_rule_predict(&spread, 1000, 0.01), 728);
     assert_int_equal(stopping_rule_predict(&spread, 1000, 1e-9), 1000);
     assert_int_equal(stopping_rule_predict(&spread, 1000, 10), 8); // those made are enough
-    const Spread unknown = {.count = 8, .relative = INFINITY, .freedom = 1};
+    const RunSpread unknown = {.count = 8, .relative = INFINITY, .freedom = 1};
     assert_int_equal(stopping_rule_predict(&unknown, 1000, 0.5), 1000);
 }
 

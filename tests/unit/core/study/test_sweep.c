@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/study/study.h"
-#include "core/study/sweep_grid.h"
+#include "core/study/sweep.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
 
@@ -96,7 +96,7 @@ static size_t judged(size_t storeys, size_t count, size_t scenes, int mode) {
     SweepGrid *plan = plan_of(&inquiry);
     size_t looks = 0;
     const Progress progress = {&looks, count_look};
-    assert_int_equal(sweep_grid_check_points(plan, scenes, NULL, &progress, &problem), STATUS_OK);
+    assert_int_equal(sweep_grid_validate(plan, scenes, NULL, &progress, &problem), STATUS_OK);
     sweep_grid_free(plan);
     study_request_clear(&inquiry);
     return looks;

@@ -38,8 +38,8 @@ static void every_study_has_its_formats_json_first(void **state) {
 
 static void a_run_that_failed_is_quoted_in_the_table(void **state) {
     (void)state;
-    EnsembleRun runs[2] = {{.seed = 7, .steps = 100, .summary = {.impacts = 3}},
-                           {.seed = 8, .steps = (double)NAN, .why = unstable}};
+    RunRecord runs[2] = {{.number = 7, .steps = 100, .summary = {.impacts = 3}},
+                         {.number = 8, .steps = (double)NAN, .why = unstable}};
     runs[0].summary.trust_horizon = (double)NAN;
     runs[0].summary.rms_displacement = 0.1;
     assert_int_equal(fields_default(summary_fields, &runs[1].summary), STATUS_OK);

@@ -20,7 +20,7 @@ static Sweep sweep_make(void) {
     static SweepAxisValues axes[] = {{clearance, metre, {lengths, 2}}, {buffer, NULL, {names, 2}}};
     static double points[] = {0, 2, 3}, statuses[] = {SWEEP_MADE, SWEEP_UNSTABLE, SWEEP_MADE};
     static double values[] = {0.1, 7, (double)NAN, (double)NAN, 0.3, 9};
-    static SweepFailure failures[] = {{SWEEP_UNSTABLE, 1, 2, grew}};
+    static StudyFailure failures[] = {{SWEEP_UNSTABLE, NULL, 1, 2, grew}};
     return (Sweep){.points = 4,
                    .axes = {axes, 2},
                    .metrics = {metrics, 2},

@@ -369,8 +369,8 @@ static void a_sensitivity_study_takes_the_recorded_spread(void **state) {
     say("foam", SPREAD_SAID);
     prepare_well("\"buffer\": \"foam\"", SENSITIVITY(""));
     assert_int_equal(study()->runs, 200);
-    assert_int_equal(study()->spread.count, 1);
-    assert_string_equal(study()->spread.at[0].source, "foam@1");
+    assert_int_equal(study()->uncertainty.spread.count, 1);
+    assert_string_equal(study()->uncertainty.spread.at[0].source, "foam@1");
     expect_member("\"spread\": [{\"damper\": 1, \"buffer\": \"buffer\", \"source\": \"foam@1\", "
                   "\"restitution\": 0.1, \"contact_time\": 0.05}], \"runs\": 200");
     char id[72], again[72];
@@ -405,7 +405,7 @@ static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
     expect_stable();
     prepare_well("\"buffer\": \"foam\"", SENSITIVITY(", \"restitution_deviation\": 0, "
                                                      "\"contact_time_deviation\": 0"));
-    assert_int_equal(study()->spread.count, 0);
+    assert_int_equal(study()->uncertainty.spread.count, 0);
     assert_int_equal(study()->runs, 0);
     prepare_well("\"buffer\": \"foam\"",
                  SENSITIVITY(", \"spread\": [{\"damper\": 1, \"restitution\": 0.02}]"));

@@ -72,36 +72,35 @@ typedef struct Noted {
     size_t folded, enough, parts, most;
 } Noted;
 
-static Status note(StudyWork *work, size_t member, void *part, Problem *fault) {
-    Noted *noted = (Noted *)(void *)work;
+static Status note(void *work, size_t member, void *made, Problem *fault) {
+    Noted *noted = work;
+    const StudyPart *part = made;
     (void)fault;
     assert_int_equal(member, noted->folded);
-    assert_int_equal(*(size_t *)part, member);
+    assert_int_equal(part->run.number, member);
     noted->folded++;
     if (noted->folded == noted->enough)
-        work->wanted = noted->folded;
+        noted->work.wanted = noted->folded;
     return STATUS_OK;
 }
 
 static Noted *noted_of_all;
 
-static void drop(void *part) {
-    if (part != NULL)
-        noted_of_all->parts--;
-    free(part);
+static void clear(void *part) {
+    (void)part;
+    noted_of_all->parts--;
 }
 
 static void put(Order *order, size_t member) {
-    size_t *part = malloc(sizeof *part);
+    StudyPart *part = calloc(1, sizeof *part);
     assert_non_null(part);
-    *part = member;
+    part->run.number = member;
     if (++noted_of_all->parts > noted_of_all->most)
         noted_of_all->most = noted_of_all->parts;
     assert_int_equal(order_put(order, member, part, &problem), STATUS_OK);
 }
 
-static const StudyMembers noted_members = {.fold = note, .drop = drop};
-static const StudyKind noted_kind = {.members = &noted_members};
+static const StudyKind noted_kind = {.fold = note, .clear = clear};
 
 // Hands members in the last of a stretch first. How many were folded.
 static size_t fold_backwards(size_t members, size_t enough, size_t part_bytes, size_t *most) {
