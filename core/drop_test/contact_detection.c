@@ -76,12 +76,12 @@ static double place_of(double i, size_t count) {
     return count > 1 ? 2 * i / (double)(count - 1) - 1 : 0;
 }
 
-double trace_found_baseline(const TraceFound *found, double sample) {
+double contact_detection_baseline(const ContactDetection *found, double sample) {
     const double u = place_of(sample, found->samples);
     return found->baseline + u * (found->bend[0] + u * found->bend[1]);
 }
 
-static void take_off(TraceFound *found, const Reals *force, const double *c) {
+static void take_off(ContactDetection *found, const Reals *force, const double *c) {
     for (size_t i = 0; i < force->count; i++) {
         const double u = place_of((double)i, force->count);
         found->force[i] = force->at[i] - (c[0] + u * (c[1] + u * c[2]));
@@ -147,7 +147,7 @@ static double refine_best(const Reals *force, const bool *is_inside, size_t outs
 }
 
 // Marks what is above the threshold, with half its length and a little about it; how many are not.
-static size_t mark(const TraceFound *found, size_t count, double threshold, bool *is_inside) {
+static size_t mark(const ContactDetection *found, size_t count, double threshold, bool *is_inside) {
     memset(is_inside, 0, count * sizeof *is_inside);
     size_t outside = count, marked = 0; // all before `marked` are done
     for (size_t i = 0; i < count; i++) {
@@ -170,7 +170,7 @@ static size_t mark(const TraceFound *found, size_t count, double threshold, bool
     return outside;
 }
 
-static Status find_baseline(const Reals *force, TraceFound *found) {
+static Status find_baseline(const Reals *force, ContactDetection *found) {
     const size_t n = force->count;
     double *scratch = malloc(n * sizeof *scratch);
     bool *is_inside = malloc(n * sizeof *is_inside);
@@ -210,14 +210,14 @@ static Status find_baseline(const Reals *force, TraceFound *found) {
     return STATUS_OK;
 }
 
-static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
+static bool add_run(ContactDetection *found, const DetectedContact *run, size_t *most) {
     if (found->count == TRACE_CONTACTS_MAX) {
         found->is_full = true;
         return true;
     }
     if (found->count == *most) {
         const size_t more = *most == 0 ? 16 : 2 * *most;
-        TraceRun *runs = realloc(found->runs, more * sizeof *runs);
+        DetectedContact *runs = realloc(found->runs, more * sizeof *runs);
         if (runs == NULL)
             return false;
         found->runs = runs;
@@ -229,7 +229,8 @@ static bool add_run(TraceFound *found, const TraceRun *run, size_t *most) {
 
 // Whether `next` belongs to the contact `run`: after noise that dips below the threshold, though
 // not to the baseline, or as the tensile end, which is smaller and follows soon.
-static bool belongs(const TraceFound *found, const TraceRun *run, const TraceRun *next) {
+static bool belongs(const ContactDetection *found, const DetectedContact *run,
+                    const DetectedContact *next) {
     const size_t length = run->last - run->first + 1, other = next->last - next->first + 1;
     const size_t longer = length > other ? length : other, gap = next->first - run->last - 1;
     if (gap > 2 + longer)
@@ -244,13 +245,13 @@ static bool belongs(const TraceFound *found, const TraceRun *run, const TraceRun
     return fabs(sum) > found->threshold / 2 * (double)gap && (sum > 0) == (run->peak > 0);
 }
 
-static Status find_runs(size_t count, TraceFound *found) {
+static Status find_runs(size_t count, ContactDetection *found) {
     size_t most = 0;
     for (size_t i = 0; i < count; i++) {
         const double value = found->force[i];
         if (!(fabs(value) > found->threshold))
             continue;
-        TraceRun run = {.first = i, .last = i, .pressed = i, .peak = value};
+        DetectedContact run = {.first = i, .last = i, .pressed = i, .peak = value};
         while (run.last + 1 < count && fabs(found->force[run.last + 1]) > found->threshold &&
                (found->force[run.last + 1] > 0) == (value > 0)) {
             run.last++;
@@ -259,7 +260,7 @@ static Status find_runs(size_t count, TraceFound *found) {
         }
         run.pressed = run.last;
         i = run.last;
-        TraceRun *before = found->count > 0 ? &found->runs[found->count - 1] : NULL;
+        DetectedContact *before = found->count > 0 ? &found->runs[found->count - 1] : NULL;
         if (before == NULL || found->is_full || !belongs(found, before, &run)) {
             if (!add_run(found, &run, &most))
                 return STATUS_NO_MEMORY;
@@ -275,8 +276,8 @@ static Status find_runs(size_t count, TraceFound *found) {
     return STATUS_OK;
 }
 
-Status trace_find(const Reals *force, double threshold, TraceFound *found) {
-    *found = (TraceFound){.noise_count = 0};
+Status contact_detection_run(const Reals *force, double threshold, ContactDetection *found) {
+    *found = (ContactDetection){.noise_count = 0};
     found->force = malloc((force->count + 1) * sizeof *found->force);
     if (found->force == NULL)
         return STATUS_NO_MEMORY;
@@ -288,8 +289,8 @@ Status trace_find(const Reals *force, double threshold, TraceFound *found) {
     return find_runs(force->count, found);
 }
 
-void trace_found_clear(TraceFound *found) {
+void contact_detection_clear(ContactDetection *found) {
     free(found->force);
     free(found->runs);
-    *found = (TraceFound){.count = 0};
+    *found = (ContactDetection){.count = 0};
 }

@@ -71,7 +71,7 @@ static double fall_speed(double height) {
     return sqrt(2 * STANDARD_GRAVITY * height);
 }
 
-double drop_test_mass(const DropTest *test) {
+double drop_test_effective_mass(const DropTest *test) {
     if (test->base == MATERIAL_BASE_FREE)
         return has(test->impactor_mass) && has(test->base_mass)
                    ? effective_mass(test->impactor_mass, test->base_mass)
@@ -79,18 +79,18 @@ double drop_test_mass(const DropTest *test) {
     return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
 }
 
-double drop_approach(const Drop *drop) {
+double drop_approach_speed(const Drop *drop) {
     return has(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
 }
 
-double drop_rebound(const DropTest *test, const Drop *drop) {
+double drop_rebound_speed(const DropTest *test, const Drop *drop) {
     if (has(drop->rebound_speed))
         return drop->rebound_speed;
     const double rise = fall_speed(drop->rebound_height);
     if (test->base != MATERIAL_BASE_FREE)
         return rise;
     const double m = test->impactor_mass, M = test->base_mass;
-    return (m * drop_approach(drop) + (m + M) * rise) / M;
+    return (m * drop_approach_speed(drop) + (m + M) * rise) / M;
 }
 
 static Status add(Problem *problem, const char *pointer, const char *name, double value,
@@ -131,11 +131,12 @@ static Status check_rebound(const DropTest *test, const Drop *drop, const char *
                  drop->drop_height, drop->rebound_height);
         return add(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
     }
-    if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE && !has(drop_test_mass(test)))
+    if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE &&
+        !has(drop_test_effective_mass(test)))
         return missing(problem, pointer, "rebound_height",
                        "needs impactor_mass and base_mass on a free base, which takes part of "
                        "the rebound; or rebound_speed relative to the base in its place");
-    const double before = drop_approach(drop), after = drop_rebound(test, drop);
+    const double before = drop_approach_speed(drop), after = drop_rebound_speed(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
     char sentence[160];
@@ -188,7 +189,7 @@ static Status check_drops(const DropTest *test, const char *pointer, Problem *pr
     return status;
 }
 
-size_t drop_test_samples(const DropTest *test) {
+size_t drop_test_sample_count(const DropTest *test) {
     size_t samples = 0;
     for (size_t i = 0; i < test->traces.count; i++)
         samples += test->traces.at[i].force.count;
@@ -204,10 +205,10 @@ static Status check_traces(const DropTest *test, const char *pointer, Problem *p
         pointer_index(trace, sizeof trace, traces, i);
         pointer_join(place, sizeof place, trace, "force");
         if (of->excluded == NULL && !problem_concerns(problem, trace) &&
-            trace_check(of->interval, &of->force, place, problem) != STATUS_OK)
+            trace_validate(of->interval, &of->force, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
-    const size_t samples = drop_test_samples(test);
+    const size_t samples = drop_test_sample_count(test);
     if (samples > TRACE_SAMPLES_MAX)
         status = problem_add(problem, STATUS_INVALID, traces,
                              "must have at most %d samples in all, have %zu: cut them to the "
@@ -225,7 +226,7 @@ static Status check_base(const DropTest *test, const char *pointer, Problem *pro
     return STATUS_OK;
 }
 
-Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem) {
+Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = fields_check(drop_test_fields, test, pointer, problem);
     char place[POINTER_SIZE], traces[POINTER_SIZE];
     pointer_join(place, sizeof place, pointer, "drops");

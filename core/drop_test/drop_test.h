@@ -62,17 +62,17 @@ extern const Field drop_test_fields[];
 // above the drop, heights beside speeds that they contradict, a date that is none, more samples
 // than a test may have, a trace that cannot be read ... What is excluded may contradict itself or
 // be unreadable: that may be why.
-Status drop_test_check(const DropTest *test, const char *pointer, Problem *problem);
+Status drop_test_validate(const DropTest *test, const char *pointer, Problem *problem);
 
 // In all traces.
-size_t drop_test_samples(const DropTest *test);
+size_t drop_test_sample_count(const DropTest *test);
 
 // What a drop says of its speeds [m/s]: as read, else by its heights; relative to the base. NAN
 // where nothing tells. A free base takes part of a rebound: heights then need both masses.
-double drop_approach(const Drop *drop);
-double drop_rebound(const DropTest *test, const Drop *drop);
+double drop_approach_speed(const Drop *drop);
+double drop_rebound_speed(const DropTest *test, const Drop *drop);
 
 // Of the test's pair; NAN where its masses are not known [kg].
-double drop_test_mass(const DropTest *test);
+double drop_test_effective_mass(const DropTest *test);
 
 #endif

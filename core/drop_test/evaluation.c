@@ -35,7 +35,7 @@ static const Field row_fields[] = {
     FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
     FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, in the words of who measured"),
     FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "what else there is to know of it"),
-    FIELD_ITEM(EvaluationRow, contact, trace_seen_fields, NULL, PRESENCE_OPTIONAL, "the contact as it was detected in its trace; null: none was, or a drop"),
+    FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as it was detected in its trace; null: none was, or a drop"),
     FIELD_END
 };
 
@@ -172,16 +172,16 @@ static Status make_contact_time(Reading *readings, Evaluation *evaluation, Probl
     return STATUS_OK;
 }
 
-size_t evaluation_samples(const Measurement *tests, size_t count) {
+size_t evaluation_sample_count(const Measurement *tests, size_t count) {
     size_t samples = 0;
     for (size_t i = 0; i < count; i++)
-        samples += drop_test_samples(tests[i].test);
+        samples += drop_test_sample_count(tests[i].test);
     return samples;
 }
 
 // They are all in memory.
 static Status check_size(const Measurement *tests, size_t count, Problem *problem) {
-    const size_t samples = evaluation_samples(tests, count);
+    const size_t samples = evaluation_sample_count(tests, count);
     if (samples <= EVALUATION_SAMPLES_MAX)
         return STATUS_OK;
     return problem_set(problem, STATUS_LIMIT,
@@ -189,8 +189,8 @@ static Status check_size(const Measurement *tests, size_t count, Problem *proble
                        EVALUATION_SAMPLES_MAX, samples);
 }
 
-Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       const Progress *progress, Evaluation *evaluation, Problem *problem) {
+Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
+                      const Progress *progress, Evaluation *evaluation, Problem *problem) {
     *evaluation = (Evaluation){.separation = (int)separation,
                                .confidence = EVALUATION_CONFIDENCE,
                                .ranges = ranges_unknown};

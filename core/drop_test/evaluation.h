@@ -44,7 +44,7 @@ typedef struct EvaluationRow {
     bool restitution_is_outlier, contact_time_is_outlier; // which counts all the same
     char *excluded;                                       // why neither counts
     char *note;                                           // what else there is to know of it
-    TraceSeen contact;                                    // as it is seen in the trace
+    TraceDetection contact;                               // as it is seen in the trace
     bool is_of_trace; // "/traces/0" rather than "/drops/0"; no members of the answer:
     size_t place;
     size_t test; // of those given
@@ -108,14 +108,14 @@ typedef struct Evaluation {
 extern const Field evaluation_fields[]; // without the warnings
 
 // Samples in all traces of all tests.
-size_t evaluation_samples(const Measurement *tests, size_t count);
+size_t evaluation_sample_count(const Measurement *tests, size_t count);
 
-// `tests` were judged by drop_test_check. STATUS_INVALID: a trace cannot be read at all;
+// `tests` were judged by drop_test_validate. STATUS_INVALID: a trace cannot be read at all;
 // STATUS_LIMIT: too many rows or samples; STATUS_CANCELLED: `progress` (NULL: nobody), asked
 // before each contact and each drop that gravity is taken out of, says so. Cleared by
 // evaluation_clear in any case.
-Status evaluation_make(const Measurement *tests, size_t count, Separation separation,
-                       const Progress *progress, Evaluation *evaluation, Problem *problem);
+Status evaluation_run(const Measurement *tests, size_t count, Separation separation,
+                      const Progress *progress, Evaluation *evaluation, Problem *problem);
 void evaluation_clear(Evaluation *evaluation);
 
 bool row_counts(const EvaluationRow *row); // at least one of e and T_c

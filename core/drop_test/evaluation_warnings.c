@@ -50,9 +50,10 @@ static Status warn_of_gravity(const Measurement *of, size_t test, Evaluation *ev
                             "pulls");
     if (!(e > 0))
         return STATUS_OK;
-    const Pull pull = {STANDARD_GRAVITY, row->approach_speed, (Separation)evaluation->separation,
-                       row->restitution_by == RESTITUTION_BY_HEIGHTS};
-    const Pulled pulled = gravity_pull(&pull, e, T);
+    const GravityLoad pull = {STANDARD_GRAVITY, row->approach_speed,
+                              (Separation)evaluation->separation,
+                              row->restitution_by == RESTITUTION_BY_HEIGHTS};
+    const GravityContact pulled = gravity_apply(&pull, e, T);
     static const char advice[] = "say \"gravity\": 9.80665 to take it out, 0 where none pulls";
     if (!(pulled.restitution > 0))
         return warnings_add(&evaluation->warnings, place,
@@ -101,7 +102,8 @@ static Status warn_of_pairs(const Measurement *tests, size_t count, Evaluation *
     for (size_t i = 1; i < count; i++) {
         char pointer[POINTER_SIZE];
         test_pointer(&tests[i], pointer);
-        const double first = drop_test_mass(tests[0].test), other = drop_test_mass(tests[i].test);
+        const double first = drop_test_effective_mass(tests[0].test),
+                     other = drop_test_effective_mass(tests[i].test);
         if (fabs(other - first) > pair_tolerance * first)
             TRY(warnings_add(&evaluation->warnings, pointer,
                              "was made with another pair of masses: effective mass %.4g kg, the "

@@ -20,7 +20,7 @@
 
 enum { START, END, DECAY };
 enum { REACH = 24, SIDE = 2 * REACH + 1 };
-enum { CONTACT_TIME = TRACE_PARTS, FIGURES };
+enum { CONTACT_TIME = FIT_PARTS, FIGURES };
 
 // A form that tells T_c as well as this needs no gaps. What drawing to their middle may be wrong
 // by, over the noise that remains; and where T_c is told worse than so, by how much it may.
@@ -33,9 +33,9 @@ static const double step_max = 0.1;
 typedef struct Piece {
     double weight; // its log, first
     double mean[FIGURES], deviation[FIGURES];
-    double spread[TRACE_PARTS][TRACE_PARTS];      // of start, end and L
-    double slope[FIGURES][TRACE_PARTS];           // of the figures by these
-    double least[TRACE_PARTS], most[TRACE_PARTS]; // the gaps
+    double spread[FIT_PARTS][FIT_PARTS];      // of start, end and L
+    double slope[FIGURES][FIT_PARTS];         // of the figures by these
+    double least[FIT_PARTS], most[FIT_PARTS]; // the gaps
 } Piece;
 
 // The gaps of start and of end that matter.
@@ -64,7 +64,7 @@ static double normal_share(double a, double b) {
 }
 
 // The share of start's and end's normal distribution that lies in a box.
-static double share_in(const TraceBox *box, const double *mean, double spread[3][3]) {
+static double share_in(const FitBox *box, const double *mean, double spread[3][3]) {
     enum { PLACES = 16 };
     const double width = sqrt(spread[START][START]);
     const double tilt = spread[START][END] / spread[START][START];
@@ -85,19 +85,19 @@ static double share_in(const TraceBox *box, const double *mean, double spread[3]
 }
 
 // T_c's derivatives by start, end and L.
-static bool slopes(const TraceWindow *window, const TracePoint *point, double *contact_time,
+static bool slopes(const FitWindow *window, const FitPoint *point, double *contact_time,
                    double *slope) {
-    TraceShape shape;
-    if (!trace_point_shape(window, point, &shape, contact_time))
+    PulseModel shape;
+    if (!pulse_fit_model(window, point, &shape, contact_time))
         return false;
-    for (int p = 0; p < TRACE_PARTS; p++) {
+    for (int p = 0; p < FIT_PARTS; p++) {
         const double step = 1e-4 * (p == DECAY ? 1 : *contact_time);
-        TracePoint other = *point;
+        FitPoint other = *point;
         double above, below;
         other.part[p] += step;
-        const bool is_above = trace_point_shape(window, &other, &shape, &above);
+        const bool is_above = pulse_fit_model(window, &other, &shape, &above);
         other.part[p] -= 2 * step;
-        if (!is_above || !trace_point_shape(window, &other, &shape, &below))
+        if (!is_above || !pulse_fit_model(window, &other, &shape, &below))
             return false;
         slope[p] = (above - below) / (2 * step);
     }
@@ -105,10 +105,9 @@ static bool slopes(const TraceWindow *window, const TracePoint *point, double *c
 }
 
 // From the best within the gaps one step of Newton's leads to the best beyond them.
-static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit *fit,
-                  Piece *piece) {
+static bool weigh(const FitWindow *window, const FitBox *box, const PulseFit *fit, Piece *piece) {
     double inverse[3][3], curvature[3][3], det, gain = 0, T;
-    const double variance = trace_variance(window, fit->residue.sum);
+    const double variance = pulse_fit_variance(window, fit->residue.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
     *piece = (Piece){.slope = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!slopes(window, &fit->at, &T, piece->slope[CONTACT_TIME]))
@@ -118,9 +117,9 @@ static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit
     if (!invert(curvature, inverse, &det))
         return false;
     piece->mean[CONTACT_TIME] = T;
-    for (int i = 0; i < TRACE_PARTS; i++) {
+    for (int i = 0; i < FIT_PARTS; i++) {
         double step = 0;
-        for (int j = 0; j < TRACE_PARTS; j++)
+        for (int j = 0; j < FIT_PARTS; j++)
             step -= inverse[i][j] * fit->slope[j];
         piece->mean[i] = fit->at.part[i] + step;
         piece->mean[CONTACT_TIME] += piece->slope[CONTACT_TIME][i] * step;
@@ -131,7 +130,7 @@ static bool weigh(const TraceWindow *window, const TraceBox *box, const TraceFit
             piece->spread[i][j] = inverse[i][j] * variance;
     memcpy(piece->least, box->least, sizeof piece->least);
     memcpy(piece->most, box->most, sizeof piece->most);
-    piece->weight = trace_likelihood(window, fit->residue.sum) + gain / variance / 2 -
+    piece->weight = pulse_fit_log_likelihood(window, fit->residue.sum) + gain / variance / 2 -
                     log(det / pow(variance, 3)) / 2 - piece->mean[DECAY] -
                     log(fit->residue.model_square) / 2 +
                     log(share_in(box, piece->mean, piece->spread));
@@ -159,12 +158,12 @@ typedef struct Drawn {
 // `laxity` times the square of half the range as its variance.
 static Drawn draw(const Piece *piece, const Gaps gaps_told[2], int figure, double laxity) {
     double with[2], own = 0, part[2] = {0, 0}, extra[2];
-    for (int i = 0; i < TRACE_PARTS; i++)
-        for (int j = 0; j < TRACE_PARTS; j++)
+    for (int i = 0; i < FIT_PARTS; i++)
+        for (int j = 0; j < FIT_PARTS; j++)
             own += piece->slope[figure][i] * piece->slope[figure][j] * piece->spread[i][j];
     for (int i = 0; i < 2; i++) {
         with[i] = 0;
-        for (int j = 0; j < TRACE_PARTS; j++)
+        for (int j = 0; j < FIT_PARTS; j++)
             with[i] += piece->slope[figure][j] * piece->spread[i][j];
         // What the form tells as well: there the gap came from it.
         const bool is_told = gaps_told[i].half > 1.5 * sqrt(piece->spread[i][i]);
@@ -219,30 +218,30 @@ static void settle(Piece *piece, const Gaps gaps_told[2], bool is_form_sure) {
 }
 
 // So many gaps at once that neither the pulse nor the jump tells them apart.
-static long gaps_of(const TraceWindow *window, const TraceFit *fit) {
+static long gaps_of(const FitWindow *window, const PulseFit *fit) {
     double curvature[3][3], spread[3][3], det;
-    const double variance = trace_variance(window, fit->residue.sum);
+    const double variance = pulse_fit_variance(window, fit->residue.sum);
     memcpy(curvature, fit->curvature, sizeof curvature);
     if (!invert(curvature, spread, &det))
         return 1;
-    TraceShape shape;
+    PulseModel shape;
     double T;
-    trace_point_shape(window, &fit->at, &shape, &T);
+    pulse_fit_model(window, &fit->at, &shape, &T);
     const double A = fit->residue.amplitude;
-    const double jump = fmax(fabs(A * trace_shape_force(&shape, 0)),
-                             fabs(A * trace_shape_force(&shape, shape.length)));
+    const double jump = fmax(fabs(A * pulse_model_force(&shape, 0)),
+                             fabs(A * pulse_model_force(&shape, shape.length)));
     const double deviation = sqrt(fmin(spread[START][START], spread[END][END]) * variance);
     return (long)fmin(fmax(floor(fmin(deviation, variance / (jump * jump)) / 2), 1), 1e6);
 }
 
 // From the best pair of gaps outwards as long as they matter; how many pieces these are.
-static size_t spread_out(const TraceWindow *window, const TraceFit *fits, size_t count,
+static size_t spread_out(const FitWindow *window, const PulseFit *fits, size_t count,
                          Piece *pieces) {
-    const TraceFit *fit = fits;
+    const PulseFit *fit = fits;
     static const int moves[8][2] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
                                     {-1, -1}, {1, 1}, {-1, 1}, {1, -1}};
     bool is_seen[SIDE][SIDE] = {{false}};
-    TraceFit from[SIDE * SIDE];
+    PulseFit from[SIDE * SIDE];
     int queue[SIDE * SIDE][2], head = 0, tail = 0;
     size_t found = 0;
     const long gaps = gaps_of(window, fit);
@@ -258,14 +257,14 @@ static size_t spread_out(const TraceWindow *window, const TraceFit *fits, size_t
         tail++;
     }
     while (head < tail) {
-        TraceFit here = from[head];
+        PulseFit here = from[head];
         const int p = queue[head][0], q = queue[head][1];
         head++;
-        const TraceBox box =
-            trace_box(fit->first + (p - REACH) * gaps, fit->last + (q - REACH) * gaps, gaps);
-        trace_fit_box(window, &box, &here);
-        const double gain =
-            trace_likelihood(window, here.residue.sum) - trace_likelihood(window, fit->residue.sum);
+        const FitBox box =
+            fit_box_make(fit->first + (p - REACH) * gaps, fit->last + (q - REACH) * gaps, gaps);
+        pulse_fit_in_box(window, &box, &here);
+        const double gain = pulse_fit_log_likelihood(window, here.residue.sum) -
+                            pulse_fit_log_likelihood(window, fit->residue.sum);
         if (!(gain > -14) || !weigh(window, &box, &here, &pieces[found]))
             continue;
         found++;
@@ -283,14 +282,14 @@ static size_t spread_out(const TraceWindow *window, const TraceFit *fits, size_t
     return found;
 }
 
-static TraceBelief belief(const Piece *pieces, size_t count, int figure) {
+static Posterior belief(const Piece *pieces, size_t count, int figure) {
     double mean = 0, square = 0;
     for (size_t i = 0; i < count; i++)
         mean += pieces[i].weight * pieces[i].mean[figure];
     for (size_t i = 0; i < count; i++)
         square += pieces[i].weight *
                   (pow(pieces[i].mean[figure] - mean, 2) + pow(pieces[i].deviation[figure], 2));
-    return (TraceBelief){mean, sqrt(square)};
+    return (Posterior){mean, sqrt(square)};
 }
 
 // Below which T_c lies with that share; `widening` is that of a Student distribution.
@@ -314,10 +313,10 @@ static double quantile(const Piece *pieces, size_t count, double share, double w
     return low + (high - low) / 2;
 }
 
-Status trace_interval(const TraceWindow *window, const TraceFit *fits, size_t count,
-                      bool is_form_sure, TraceInterval *interval) {
+Status fit_confidence_run(const FitWindow *window, const PulseFit *fits, size_t count,
+                          bool is_form_sure, FitConfidence *interval) {
     Piece *pieces = malloc(SIDE * SIDE * sizeof *pieces);
-    *interval = (TraceInterval){.least = (double)NAN, .most = (double)NAN};
+    *interval = (FitConfidence){.least = (double)NAN, .most = (double)NAN};
     if (pieces == NULL)
         return STATUS_NO_MEMORY;
     const size_t found = spread_out(window, fits, count, pieces);

@@ -21,23 +21,23 @@ static const double widest = 0.5, faintest = 4.2;
 static const double worst = 0.15;
 
 // clang-format off
-const Field trace_seen_fields[] = {
-    FIELD_REAL(TraceSeen, baseline, "N", ANY, OPTIONAL, "of the trace"),
-    FIELD_REAL(TraceSeen, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
-    FIELD_REAL(TraceSeen, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
-    FIELD_REAL(TraceSeen, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
-    FIELD_REAL(TraceSeen, last, "s", ANY, OPTIONAL, "the last such sample"),
-    FIELD_COUNT(TraceSeen, samples, NULL, AT_MIN(0), OPTIONAL, "how many samples these are"),
-    FIELD_REAL(TraceSeen, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
-    FIELD_REAL(TraceSeen, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
-    FIELD_REAL(TraceSeen, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceSeen, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
-    FIELD_REAL(TraceSeen, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
-    FIELD_REAL(TraceSeen, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, no pulse fits, or the trace begins or ends meanwhile"),
-    FIELD_REAL(TraceSeen, end, "s", ANY, OPTIONAL, "when it ends"),
-    FIELD_REALS(TraceSeen, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
-    FIELD_REAL(TraceSeen, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
-    FIELD_REAL(TraceSeen, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
+const Field trace_detection_fields[] = {
+    FIELD_REAL(TraceDetection, baseline, "N", ANY, OPTIONAL, "of the trace"),
+    FIELD_REAL(TraceDetection, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
+    FIELD_REAL(TraceDetection, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
+    FIELD_REAL(TraceDetection, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
+    FIELD_REAL(TraceDetection, last, "s", ANY, OPTIONAL, "the last such sample"),
+    FIELD_COUNT(TraceDetection, samples, NULL, AT_MIN(0), OPTIONAL, "how many samples these are"),
+    FIELD_REAL(TraceDetection, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
+    FIELD_REAL(TraceDetection, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
+    FIELD_REAL(TraceDetection, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
+    FIELD_REAL(TraceDetection, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
+    FIELD_REAL(TraceDetection, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
+    FIELD_REAL(TraceDetection, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, no pulse fits, or the trace begins or ends meanwhile"),
+    FIELD_REAL(TraceDetection, end, "s", ANY, OPTIONAL, "when it ends"),
+    FIELD_REALS(TraceDetection, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
+    FIELD_REAL(TraceDetection, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceDetection, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
     FIELD_END
 };
 // clang-format on
@@ -59,8 +59,8 @@ static double hidden(double level, int separation, double *before) {
     double most = 0;
     *before = 0;
     for (int i = 0; i <= 4; i++) {
-        const TraceShape shape = trace_shape(i * 0.75, 0, separation);
-        const TraceVisible visible = trace_shape_visible(&shape, fmin(level, 0.95));
+        const PulseModel shape = pulse_model_make(i * 0.75, 0, separation);
+        const PulseVisible visible = pulse_model_visible(&shape, fmin(level, 0.95));
         const double seen = fmax(visible.to - visible.from, 0.02);
         most = fmax(most, (1 - seen) / seen);
         *before = fmax(*before, visible.from / seen);
@@ -74,8 +74,8 @@ typedef struct Stretch {
     bool is_at_begin, is_at_end; // of the trace
 } Stretch;
 
-static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) {
-    const TraceRun *run = &found->runs[number];
+static Stretch stretch_of(const ContactDetection *found, size_t count, size_t number) {
+    const DetectedContact *run = &found->runs[number];
     const size_t length = run->last - run->first + 1;
     const double level = found->threshold / fabs(run->peak);
     double before;
@@ -99,11 +99,11 @@ static Stretch stretch_of(const TraceFound *found, size_t count, size_t number) 
     return stretch;
 }
 
-static void fill_window(const TraceFound *found, const TraceRun *run, const Stretch *stretch,
-                        int separation, TraceWindow *window) {
+static void fill_window(const ContactDetection *found, const DetectedContact *run,
+                        const Stretch *stretch, int separation, FitWindow *window) {
     const size_t samples = stretch->to - stretch->from;
-    const size_t m = (samples + TRACE_BLOCKS_MAX - 1) / TRACE_BLOCKS_MAX;
-    *window = (TraceWindow){
+    const size_t m = (samples + FIT_BLOCKS_MAX - 1) / FIT_BLOCKS_MAX;
+    *window = (FitWindow){
         .blocks = samples / m,
         .per_block = m,
         .separation = separation,
@@ -135,7 +135,7 @@ static void fill_window(const TraceFound *found, const TraceRun *run, const Stre
 }
 
 // Without a fit: from what is seen above the threshold.
-static void count_samples(const TraceFound *found, const TraceRun *run, int separation,
+static void count_samples(const ContactDetection *found, const DetectedContact *run, int separation,
                           double interval, TraceContact *contact) {
     const double seen = (double)(run->last - run->first);
     double before;
@@ -145,15 +145,15 @@ static void count_samples(const TraceFound *found, const TraceRun *run, int sepa
 }
 
 // rms of what the fit leaves of the window's means during contact [peak], of *count of them.
-static double left_over(const TraceWindow *window, const TraceFit *fit, size_t *count) {
-    TraceShape shape;
+static double left_over(const FitWindow *window, const PulseFit *fit, size_t *count) {
+    PulseModel shape;
     double T, sum = 0;
-    trace_point_shape(window, &fit->at, &shape, &T);
+    pulse_fit_model(window, &fit->at, &shape, &T);
     const long m = (long)window->per_block;
     *count = 0;
     for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++) {
         const double at = (double)(k * m) + (double)(m - 1) / 2;
-        const double force = trace_shape_force(&shape, (at - fit->at.part[0]) / T);
+        const double force = pulse_model_force(&shape, (at - fit->at.part[0]) / T);
         const double left =
             window->mean[k] - fit->residue.amplitude * force - fit->residue.baseline;
         sum += left * left;
@@ -170,7 +170,7 @@ static void withdraw(const TraceContact *counted, TraceContact *contact) {
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
-static Status judge(const TraceInterval *likely, bool is_form_sure, double noise, int separation,
+static Status judge(const FitConfidence *likely, bool is_form_sure, double noise, int separation,
                     const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
     const bool is_wide = !(width < widest * contact->contact_time);
@@ -199,38 +199,38 @@ static Status judge(const TraceInterval *likely, bool is_form_sure, double noise
 
 // The best pulse on the baseline there, from where the contact is taken to begin to where it is
 // taken to end; its window begins at sample `origin`.
-static Status draw(const TraceFit *fit, const TraceShape *shape, const TraceFound *found,
-                   const TraceRun *run, double origin, Reals *pulse) {
+static Status draw(const PulseFit *fit, const PulseModel *shape, const ContactDetection *found,
+                   const DetectedContact *run, double origin, Reals *pulse) {
     if (!reals_make(pulse, TRACE_PULSE))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < TRACE_PULSE; i++) {
         const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
         const double place = origin + part[0] + share * (part[1] - part[0]);
         const double force =
-            fit->residue.amplitude * trace_shape_force(shape, shape->length * share);
+            fit->residue.amplitude * pulse_model_force(shape, shape->length * share);
         pulse->at[i] =
-            trace_found_baseline(found, place) + run->peak * (fit->residue.baseline + force);
+            contact_detection_baseline(found, place) + run->peak * (fit->residue.baseline + force);
     }
     return STATUS_OK;
 }
 
-static Status fit_contact(TraceWindow *window, const TraceFound *found, const TraceRun *run,
-                          const Stretch *stretch, double interval, const TraceFit *fits,
-                          size_t count, TraceContact *contact) {
+static Status fit_contact(FitWindow *window, const ContactDetection *found,
+                          const DetectedContact *run, const Stretch *stretch, double interval,
+                          const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
         return tell(&contact->why, "no pulse of the model's fits");
-    const TraceFit *fit = &fits[0];
+    const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     const double origin = (double)stretch->from;
     contact->seen.first = (origin + (double)fit->first) * interval;
     contact->seen.last = (origin + (double)fit->last) * interval;
-    TraceShape shape;
+    PulseModel shape;
     double T;
-    trace_point_shape(window, &fit->at, &shape, &T);
-    const TraceVisible visible = trace_shape_visible(&shape, found->threshold / fabs(run->peak));
+    pulse_fit_model(window, &fit->at, &shape, &T);
+    const PulseVisible visible = pulse_model_visible(&shape, found->threshold / fabs(run->peak));
     contact->seen.crossing_shortfall = 1 - (visible.pressed - visible.from);
     contact->seen.impulse =
-        fit->residue.amplitude * T * trace_shape_impulse(&shape) * run->peak * interval;
+        fit->residue.amplitude * T * pulse_model_impulse(&shape) * run->peak * interval;
     size_t means;
     contact->seen.misfit_share = left_over(window, fit, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
@@ -250,8 +250,8 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
     const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
     const bool is_form_sure =
         !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
-    TraceInterval likely;
-    TRY(trace_interval(window, fits, count, is_form_sure, &likely));
+    FitConfidence likely;
+    TRY(fit_confidence_run(window, fits, count, is_form_sure, &likely));
     TRY(draw(fit, &shape, found, run, origin, &contact->seen.pulse));
     const TraceContact counted = *contact;
     contact->seen.start = (origin + fit->at.part[0]) * interval;
@@ -267,12 +267,12 @@ static Status fit_contact(TraceWindow *window, const TraceFound *found, const Tr
 
 // Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
 // is m_e g over the fitted m_e v0, and that hangs on the pull but little.
-static bool settle(double weight, double unit, TraceWindow *window, TraceFit *fit) {
+static bool settle(double weight, double unit, FitWindow *window, PulseFit *fit) {
     double rate_before = 0, gap_before = 0;
     for (int round = 0; round < 12; round++) {
-        TraceShape shape;
+        PulseModel shape;
         double T;
-        if (!isfinite(fit->residue.sum) || !trace_point_shape(window, &fit->at, &shape, &T))
+        if (!isfinite(fit->residue.sum) || !pulse_fit_model(window, &fit->at, &shape, &T))
             return false;
         const double rate = window->pull_rate;
         const double gap = weight / (fit->residue.amplitude * T * unit) - rate;
@@ -283,45 +283,45 @@ static bool settle(double weight, double unit, TraceWindow *window, TraceFit *fi
         rate_before = rate;
         gap_before = gap;
         window->pull_rate = fmax(rate - gap / fmin(slope, -0.1), 0);
-        trace_refit(window, fit);
+        pulse_fit_continue(window, fit);
     }
     return false;
 }
 
 // The fits under the pull. By g / v0; without v0 from the best fit on, until it is the best under
 // the pull that follows from it; *is_settled is false where there is no such.
-static size_t fit_pulled(const TraceWay *way, size_t number, double interval, double peak,
-                         TraceWindow *window, TraceFit *fits, bool *is_settled) {
+static size_t fit_pulled(const TraceOptions *way, size_t number, double interval, double peak,
+                         FitWindow *window, PulseFit *fits, bool *is_settled) {
     const bool is_known = number < way->approach_speed_count && way->approach_speeds[number] > 0;
     *is_settled = true;
     if (is_known)
         window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
-    size_t count = trace_fit(window, fits);
+    size_t count = pulse_fit_run(window, fits);
     if (is_known || !(way->effective_mass > 0))
         return count;
     for (int round = 0; round < 4 && count > 0; round++) {
-        TraceFit best = fits[0];
+        PulseFit best = fits[0];
         const double before = window->pull_rate;
         *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
         if (*is_settled && window->pull_rate == before)
             return count;
-        count = trace_fit(window, fits);
+        count = pulse_fit_run(window, fits);
     }
     *is_settled = false;
     return count;
 }
 
-static Status read_contact(double interval, const TraceWay *way, const TraceFound *found,
-                           size_t samples, size_t number, TraceWindow *window,
+static Status read_contact(double interval, const TraceOptions *way, const ContactDetection *found,
+                           size_t samples, size_t number, FitWindow *window,
                            TraceContact *contact) {
-    const TraceRun *run = &found->runs[number];
+    const DetectedContact *run = &found->runs[number];
     const Stretch stretch = stretch_of(found, samples, number);
     const double none = (double)NAN;
     *contact = (TraceContact){.contact_time = none,
                               .contact_time_uncertainty = none,
                               .restitution = none,
                               .restitution_uncertainty = none};
-    fields_clear(trace_seen_fields, &contact->seen);
+    fields_clear(trace_detection_fields, &contact->seen);
     contact->seen.baseline = found->baseline;
     contact->seen.noise = found->noise;
     contact->seen.threshold = found->threshold;
@@ -338,11 +338,11 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
                     run->first == 0 ? "begins" : "ends");
     }
     fill_window(found, run, &stretch, way->separation, window);
-    TraceFit fits[TRACE_FITS_MAX];
+    PulseFit fits[FITS_MAX];
     bool is_settled = true;
     const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
                                                        window, fits, &is_settled)
-                                          : trace_fit(window, fits);
+                                          : pulse_fit_run(window, fits);
     TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
         return tell(&contact->why,
@@ -354,7 +354,7 @@ static Status read_contact(double interval, const TraceWay *way, const TraceFoun
     return STATUS_OK;
 }
 
-Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem) {
+Status trace_validate(double interval, const Reals *force, const char *pointer, Problem *problem) {
     if (!(interval > 0) || !isfinite(interval))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "its interval must be above 0 s, is %g", interval);
@@ -368,13 +368,13 @@ Status trace_check(double interval, const Reals *force, const char *pointer, Pro
     return STATUS_OK;
 }
 
-Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
-                  TraceReading *reading, Problem *problem) {
-    *reading = (TraceReading){.why = NULL};
-    TRY(trace_check(interval, force, pointer, problem));
-    TraceFound found;
-    TraceWindow *window = malloc(sizeof *window);
-    Status status = trace_find(force, way->threshold, &found);
+Status trace_analysis_run(double interval, const Reals *force, const TraceOptions *way,
+                          const char *pointer, TraceAnalysis *reading, Problem *problem) {
+    *reading = (TraceAnalysis){.why = NULL};
+    TRY(trace_validate(interval, force, pointer, problem));
+    ContactDetection found;
+    FitWindow *window = malloc(sizeof *window);
+    Status status = contact_detection_run(force, way->threshold, &found);
     if (status == STATUS_OK && window != NULL && found.count > 0) {
         reading->contacts.at = calloc(found.count, sizeof *reading->contacts.at);
         if (reading->contacts.at == NULL)
@@ -398,17 +398,17 @@ Status trace_read(double interval, const Reals *force, const TraceWay *way, cons
         if (status == STATUS_OK && found.is_full)
             status = tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MAX);
     }
-    trace_found_clear(&found);
+    contact_detection_clear(&found);
     free(window);
     return status;
 }
 
-void trace_reading_clear(TraceReading *reading) {
+void trace_analysis_clear(TraceAnalysis *reading) {
     for (size_t i = 0; i < reading->contacts.count; i++) {
-        fields_clear(trace_seen_fields, &reading->contacts.at[i].seen);
+        fields_clear(trace_detection_fields, &reading->contacts.at[i].seen);
         free(reading->contacts.at[i].why);
     }
     free(reading->contacts.at);
     free(reading->why);
-    *reading = (TraceReading){.why = NULL};
+    *reading = (TraceAnalysis){.why = NULL};
 }

@@ -11,7 +11,7 @@
 enum { TRACE_CONTACTS_MAX = 200, TRACE_WHY_MAX = 400, TRACE_PULSE = 33 };
 
 // How a trace is read.
-typedef struct TraceWay {
+typedef struct TraceOptions {
     int separation;   // Separation
     double threshold; // of detection [N]; NAN: from the noise
     // What pulls the pair together during contact, 0: nothing [m/s^2]. Only with it are used the
@@ -22,10 +22,10 @@ typedef struct TraceWay {
     const double *approach_speeds;
     size_t approach_speed_count;
     const Progress *progress; // asked before each contact whether to go on; NULL: nobody watches
-} TraceWay;
+} TraceOptions;
 
 // Where a contact is in its trace, as it is shown and drawn. What is not known is NAN.
-typedef struct TraceSeen {
+typedef struct TraceDetection {
     double baseline, noise, threshold; // of the trace; the threshold is above the baseline [N]
     double first, last; // of the samples in contact, or above the threshold where nothing is
                         // fitted, from the first sample of the trace on [s]
@@ -40,12 +40,12 @@ typedef struct TraceSeen {
     Reals pulse;         // TRACE_PULSE forces of it as the trace has them, from start to end [N]
     double misfit;       // rms of what the fit leaves over the noise
     double misfit_share; // and over the peak
-} TraceSeen;
-extern const Field trace_seen_fields[];
+} TraceDetection;
+extern const Field trace_detection_fields[];
 
 // One contact. What is not known is NAN; uncertainties are standard ones.
 typedef struct TraceContact {
-    TraceSeen seen;
+    TraceDetection seen;
     double contact_time, contact_time_uncertainty; // T_c of an isolated pair, by the fit [s]
     double least_contact_time,
         most_contact_time; // within which it lies, 95 %; also where there is no figure [s]
@@ -57,18 +57,18 @@ typedef struct TraceContacts {
     size_t count;
 } TraceContacts;
 
-typedef struct TraceReading {
+typedef struct TraceAnalysis {
     TraceContacts contacts;
     char *why; // there are none, or not all; NULL
-} TraceReading;
+} TraceAnalysis;
 
 // Whether the trace can be read at all: STATUS_INVALID with the fault at `pointer`.
-Status trace_check(double interval, const Reals *force, const char *pointer, Problem *problem);
+Status trace_validate(double interval, const Reals *force, const char *pointer, Problem *problem);
 
-// STATUS_INVALID as trace_check, STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by trace_reading_clear
-// in any case.
-Status trace_read(double interval, const Reals *force, const TraceWay *way, const char *pointer,
-                  TraceReading *reading, Problem *problem);
-void trace_reading_clear(TraceReading *reading);
+// STATUS_INVALID as trace_validate, STATUS_NO_MEMORY, STATUS_CANCELLED. Cleared by
+// trace_analysis_clear in any case.
+Status trace_analysis_run(double interval, const Reals *force, const TraceOptions *way,
+                          const char *pointer, TraceAnalysis *reading, Problem *problem);
+void trace_analysis_clear(TraceAnalysis *reading);
 
 #endif

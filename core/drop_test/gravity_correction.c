@@ -42,8 +42,8 @@ static double hold(const Swing *of, Motion at) {
     return of->separation == SEPARATION_ZERO_FORCE ? of->w * y + 2 * of->Z * at.speed : y;
 }
 
-Pulled gravity_pull(const Pull *pull, double restitution, double contact_time) {
-    const Pulled never = {0, (double)INFINITY};
+GravityContact gravity_apply(const GravityLoad *pull, double restitution, double contact_time) {
+    const GravityContact never = {0, (double)INFINITY};
     const Identified isolated = identify_measured(1, restitution, 1, pull->separation);
     const double G = pull->gravity * contact_time / pull->speed, w = sqrt(isolated.stiffness);
     const Swing of = {w, isolated.damping_ratio, G / (w * w), pull->separation};
@@ -75,21 +75,22 @@ Pulled gravity_pull(const Pull *pull, double restitution, double contact_time) {
     // What is still inside the buffer at parting has to rise out of it.
     const double square = up * up - (pull->is_by_height ? 2 * G * deep : 0);
     if (!(up > 0) || !(square > 0))
-        return (Pulled){0, (strides * stride + most) * contact_time};
-    return (Pulled){sqrt(square), (strides * stride + most) * contact_time};
+        return (GravityContact){0, (strides * stride + most) * contact_time};
+    return (GravityContact){sqrt(square), (strides * stride + most) * contact_time};
 }
 
 // The logarithms of what is read over those of what should be; false where nothing comes back.
-static bool miss(const Pull *pull, double log_e, double log_T, const Unpulled *read,
+static bool miss(const GravityLoad *pull, double log_e, double log_T, const GravityCorrected *read,
                  double off[2]) {
-    const Pulled told = gravity_pull(pull, exp(log_e), exp(log_T));
+    const GravityContact told = gravity_apply(pull, exp(log_e), exp(log_T));
     off[0] = log(told.restitution / read->restitution);
     off[1] = log(told.contact_time / read->contact_time);
     return isfinite(off[0]) && isfinite(off[1]);
 }
 
 // d(off) / d(ln e, ln T_c), by differences towards what surely parts.
-static bool slopes(const Pull *pull, const double x[2], const Unpulled *read, double by[2][2]) {
+static bool slopes(const GravityLoad *pull, const double x[2], const GravityCorrected *read,
+                   double by[2][2]) {
     const double h = 1e-5;
     for (int i = 0; i < 2; i++) {
         const double low[2] = {x[0] - (i == 0 ? h : 0), x[1] - (i == 1 ? h : 0)};
@@ -102,7 +103,8 @@ static bool slopes(const Pull *pull, const double x[2], const Unpulled *read, do
     return true;
 }
 
-bool gravity_remove(const Pull *pull, const Unpulled *read, Unpulled *isolated) {
+bool gravity_correct(const GravityLoad *pull, const GravityCorrected *read,
+                     GravityCorrected *isolated) {
     // What was read is more damped and longer than what is looked for.
     double x[2] = {log(read->restitution), log(read->contact_time)}, off[2], by[2][2];
     for (int i = 0; !miss(pull, x[0], x[1], read, off); i++) {
@@ -136,19 +138,19 @@ bool gravity_remove(const Pull *pull, const Unpulled *read, Unpulled *isolated) 
         return false;
     const double area = fabs(by[0][0] * by[1][1] - by[0][1] * by[1][0]);
     const double e = read->restitution_uncertainty, T = read->contact_time_uncertainty;
-    *isolated = (Unpulled){exp(x[0]), exp(x[1]), hypot(by[1][1] * e, by[0][1] * T) / area,
-                           hypot(by[0][0] * T, by[1][0] * e) / area};
+    *isolated = (GravityCorrected){exp(x[0]), exp(x[1]), hypot(by[1][1] * e, by[0][1] * T) / area,
+                                   hypot(by[0][0] * T, by[1][0] * e) / area};
     return isfinite(isolated->restitution) && isfinite(isolated->contact_time);
 }
 
-bool gravity_remove_restitution(const Pull *pull, double read, double contact_time,
-                                double *restitution) {
-    if (gravity_pull(pull, 1, contact_time).restitution < read)
+bool gravity_correct_restitution(const GravityLoad *pull, double read, double contact_time,
+                                 double *restitution) {
+    if (gravity_apply(pull, 1, contact_time).restitution < read)
         return false;
     double least = read, most = 1; // the pull only takes away
     for (int i = 0; i < HALVINGS; i++) {
         const double middle = (least + most) / 2;
-        if (gravity_pull(pull, middle, contact_time).restitution < read)
+        if (gravity_apply(pull, middle, contact_time).restitution < read)
             least = middle;
         else
             most = middle;
@@ -157,12 +159,12 @@ bool gravity_remove_restitution(const Pull *pull, double read, double contact_ti
     return most > 0;
 }
 
-bool gravity_remove_contact_time(const Pull *pull, double read, double restitution,
-                                 double *contact_time) {
+bool gravity_correct_contact_time(const GravityLoad *pull, double read, double restitution,
+                                  double *contact_time) {
     double least = 0, most = read; // the pull only lengthens
     for (int i = 0; i < HALVINGS; i++) {
         const double middle = (least + most) / 2;
-        if (middle <= 0 || gravity_pull(pull, restitution, middle).contact_time < read)
+        if (middle <= 0 || gravity_apply(pull, restitution, middle).contact_time < read)
             least = middle;
         else
             most = middle;

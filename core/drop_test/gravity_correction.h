@@ -7,31 +7,32 @@
 #include "core/contact/contact.h"
 
 // What pulls, and how the rebound was read.
-typedef struct Pull {
+typedef struct GravityLoad {
     double gravity; // [m/s^2]
     double speed;   // of approach [m/s]
     Separation separation;
     bool is_by_height; // the rebound's speed is that above the buffer at rest, not at parting
-} Pull;
+} GravityLoad;
 
 // What e and T_c become; of a contact that does not part e is 0 and T_c infinite.
-typedef struct Pulled {
+typedef struct GravityContact {
     double restitution, contact_time;
-} Pulled;
-Pulled gravity_pull(const Pull *pull, double restitution, double contact_time);
+} GravityContact;
+GravityContact gravity_apply(const GravityLoad *pull, double restitution, double contact_time);
 
 // The isolated pair's e and T_c [s] of what was read, with their relative standard uncertainties,
 // which may be NAN. False where no contact with 0 < e <= 1 comes to that.
-typedef struct Unpulled {
+typedef struct GravityCorrected {
     double restitution, contact_time;
     double restitution_uncertainty, contact_time_uncertainty; // relative
-} Unpulled;
-bool gravity_remove(const Pull *pull, const Unpulled *read, Unpulled *isolated);
+} GravityCorrected;
+bool gravity_correct(const GravityLoad *pull, const GravityCorrected *read,
+                     GravityCorrected *isolated);
 
 // The same where one of the two is not read but known of the isolated pair.
-bool gravity_remove_restitution(const Pull *pull, double read, double contact_time,
-                                double *restitution);
-bool gravity_remove_contact_time(const Pull *pull, double read, double restitution,
-                                 double *contact_time);
+bool gravity_correct_restitution(const GravityLoad *pull, double read, double contact_time,
+                                 double *restitution);
+bool gravity_correct_contact_time(const GravityLoad *pull, double read, double restitution,
+                                  double *contact_time);
 
 #endif

@@ -19,7 +19,7 @@ static Status no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the proposal");
 }
 
-void proposal_clear(Proposal *proposal) {
+void material_proposal_clear(MaterialProposal *proposal) {
     fields_clear(material_fields, &proposal->material);
     free(proposal->why);
     proposal->why = NULL;
@@ -133,7 +133,7 @@ static bool is_by_pulse(const Behind *behind) {
     return false;
 }
 
-static Status take_constant(Evaluation *evaluation, Behind *behind, Proposal *proposal) {
+static Status take_constant(Evaluation *evaluation, Behind *behind, MaterialProposal *proposal) {
     Material *material = &proposal->material;
     const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
@@ -258,7 +258,7 @@ static Status fill_table(const Behind *behind, const Bin *bins, size_t count, Re
 
 // `bins` and `readings` have room for all rows.
 static Status take_table(Evaluation *evaluation, Behind *behind, Bin *bins, Reading *readings,
-                         Proposal *proposal) {
+                         MaterialProposal *proposal) {
     bool has_time;
     const size_t all = make_bins(evaluation, behind, bins);
     const size_t kept = keep_bins(behind, bins, all, &has_time);
@@ -282,7 +282,8 @@ static Status take_table(Evaluation *evaluation, Behind *behind, Bin *bins, Read
 }
 
 static Status make(Evaluation *evaluation, const Measurement *tests, size_t count,
-                   const Material *before, ProposalForm form, Behind *behind, Proposal *proposal) {
+                   const Material *before, ProposalForm form, Behind *behind,
+                   MaterialProposal *proposal) {
     Material *material = &proposal->material;
     TRY(describe(before, material));
     if (form == PROPOSAL_TABLE) {
@@ -312,10 +313,10 @@ static Status make(Evaluation *evaluation, const Measurement *tests, size_t coun
     return STATUS_OK;
 }
 
-Status proposal_make(Evaluation *evaluation, const Measurement *tests, size_t count,
-                     const Material *before, ProposalForm form, Proposal *proposal,
-                     Problem *problem) {
-    *proposal = (Proposal){.why = NULL};
+Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
+                             const Material *before, ProposalForm form, MaterialProposal *proposal,
+                             Problem *problem) {
+    *proposal = (MaterialProposal){.why = NULL};
     Behind behind = {.rows = calloc(evaluation->rows.count + 1, sizeof(const EvaluationRow *)),
                      .tests = calloc(count + 1, sizeof(Measurement))};
     const Status status = behind.rows != NULL && behind.tests != NULL

@@ -16,16 +16,16 @@ extern const char *const proposal_form_names[]; // "constant", "table"; NULL-ter
 
 // What is proposed, or why nothing can be: then `material` is empty. A word of warning goes to the
 // evaluation's.
-typedef struct Proposal {
+typedef struct MaterialProposal {
     Material material;
     char *why; // NULL: it can be
-} Proposal;
+} MaterialProposal;
 
 // `before` says what the material is: name, kind and so on are taken from it, figures are not.
-// STATUS_OK or STATUS_NO_MEMORY. Cleared by proposal_clear in any case.
-Status proposal_make(Evaluation *evaluation, const Measurement *tests, size_t count,
-                     const Material *before, ProposalForm form, Proposal *proposal,
-                     Problem *problem);
-void proposal_clear(Proposal *proposal);
+// STATUS_OK or STATUS_NO_MEMORY. Cleared by material_proposal_clear in any case.
+Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
+                             const Material *before, ProposalForm form, MaterialProposal *proposal,
+                             Problem *problem);
+void material_proposal_clear(MaterialProposal *proposal);
 
 #endif

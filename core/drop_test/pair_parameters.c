@@ -15,33 +15,33 @@
 
 // clang-format off
 static const Field figure_fields[] = {
-    FIELD_REAL(DerivedFigure, value, NULL, ANY, OPTIONAL, "null: not known"),
-    FIELD_REAL(DerivedFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c that the material states"),
-    FIELD_REAL(DerivedFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty: with high what 95 % of contacts lie between if e and T_c scatter log-normally with just these deviations, which few readings tell only roughly"),
-    FIELD_REAL(DerivedFigure, high, NULL, ANY, OPTIONAL, "value times exp(1.96 u)"),
+    FIELD_REAL(PairFigure, value, NULL, ANY, OPTIONAL, "null: not known"),
+    FIELD_REAL(PairFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c that the material states"),
+    FIELD_REAL(PairFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty: with high what 95 % of contacts lie between if e and T_c scatter log-normally with just these deviations, which few readings tell only roughly"),
+    FIELD_REAL(PairFigure, high, NULL, ANY, OPTIONAL, "value times exp(1.96 u)"),
     FIELD_END
 };
 
 static const Field contact_rows[] = {
-    FIELD_CHOICE(DerivedContact, separation, separation_names, OPTIONAL, "the rule by which a contact ends"),
-    FIELD_REAL(DerivedContact, approach_speed, "m/s", ANY, OPTIONAL, "of the material's row; null: for every speed"),
-    FIELD_ITEM(DerivedContact, restitution, figure_fields, NULL, PRESENCE_DEFAULT, "e of this pair"),
-    FIELD_ITEM(DerivedContact, contact_time, figure_fields, NULL, PRESENCE_DEFAULT, "T_c of this pair [s]"),
-    FIELD_ITEM(DerivedContact, stiffness, figure_fields, NULL, PRESENCE_DEFAULT, "k_b [N/m]"),
-    FIELD_ITEM(DerivedContact, damping, figure_fields, NULL, PRESENCE_DEFAULT, "c_b [N s/m]"),
-    FIELD_ITEM(DerivedContact, damping_ratio, figure_fields, NULL, PRESENCE_DEFAULT, "Z"),
+    FIELD_CHOICE(PairContact, separation, separation_names, OPTIONAL, "the rule by which a contact ends"),
+    FIELD_REAL(PairContact, approach_speed, "m/s", ANY, OPTIONAL, "of the material's row; null: for every speed"),
+    FIELD_ITEM(PairContact, restitution, figure_fields, NULL, PRESENCE_DEFAULT, "e of this pair"),
+    FIELD_ITEM(PairContact, contact_time, figure_fields, NULL, PRESENCE_DEFAULT, "T_c of this pair [s]"),
+    FIELD_ITEM(PairContact, stiffness, figure_fields, NULL, PRESENCE_DEFAULT, "k_b [N/m]"),
+    FIELD_ITEM(PairContact, damping, figure_fields, NULL, PRESENCE_DEFAULT, "c_b [N s/m]"),
+    FIELD_ITEM(PairContact, damping_ratio, figure_fields, NULL, PRESENCE_DEFAULT, "Z"),
     FIELD_END
 };
 
-const Field derived_pair_fields[] = {
-    FIELD_REAL(DerivedPair, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
-    FIELD_REAL(DerivedPair, structure_mass, "kg", ANY, OPTIONAL, "what it strikes; null: it does not move"),
-    FIELD_CHOICE(DerivedPair, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
-    FIELD_REAL(DerivedPair, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
-    FIELD_REAL(DerivedPair, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
-    FIELD_REAL(DerivedPair, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that was measured"),
-    FIELD_REAL(DerivedPair, most_speed, "m/s", ANY, OPTIONAL, "fastest"),
-    FIELD_LIST(DerivedPair, contacts, contact_rows, 0, PRESENCE_DEFAULT, "by row of the material's table, then by rule"),
+const Field pair_parameters_fields[] = {
+    FIELD_REAL(PairParameters, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
+    FIELD_REAL(PairParameters, structure_mass, "kg", ANY, OPTIONAL, "what it strikes; null: it does not move"),
+    FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
+    FIELD_REAL(PairParameters, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
+    FIELD_REAL(PairParameters, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
+    FIELD_REAL(PairParameters, least_speed, "m/s", ANY, OPTIONAL, "slowest approach that was measured"),
+    FIELD_REAL(PairParameters, most_speed, "m/s", ANY, OPTIONAL, "fastest"),
+    FIELD_LIST(PairParameters, contacts, contact_rows, 0, PRESENCE_DEFAULT, "by row of the material's table, then by rule"),
     FIELD_END
 };
 // clang-format on
@@ -54,8 +54,8 @@ static bool has(double value) {
     return !isnan(value);
 }
 
-void derived_pair_clear(DerivedPair *pair) {
-    fields_clear(derived_pair_fields, pair);
+void pair_parameters_clear(PairParameters *pair) {
+    fields_clear(pair_parameters_fields, pair);
     warnings_clear(&pair->warnings);
 }
 
@@ -74,13 +74,13 @@ static Known known_of(const Material *material, size_t index) {
                    row->contact_time_deviation / row->contact_time};
 }
 
-static DerivedFigure figure(double value, double relative) {
+static PairFigure figure(double value, double relative) {
     if (!isfinite(value))
-        return (DerivedFigure){(double)NAN, (double)NAN, (double)NAN, (double)NAN};
+        return (PairFigure){(double)NAN, (double)NAN, (double)NAN, (double)NAN};
     const double factor = exp(student_quantile(0.95, 0) * relative);
     if (!isfinite(factor))
-        return (DerivedFigure){value, (double)NAN, (double)NAN, (double)NAN};
-    return (DerivedFigure){value, value * relative, value / factor, value * factor};
+        return (PairFigure){value, (double)NAN, (double)NAN, (double)NAN};
+    return (PairFigure){value, value * relative, value / factor, value * factor};
 }
 
 // Z, e and T_c of this pair of what the test's pair had.
@@ -121,15 +121,15 @@ static void spread(const Asked *asked, const Known *known, double relative[OUTPU
     }
 }
 
-static DerivedContact contact_of(const Asked *asked, const Known *known) {
-    const DerivedFigure none = figure((double)NAN, 0);
-    DerivedContact contact = {.separation = (int)asked->separation,
-                              .approach_speed = known->speed,
-                              .restitution = figure(known->e, known->r_e),
-                              .contact_time = none,
-                              .stiffness = none,
-                              .damping = none,
-                              .damping_ratio = none};
+static PairContact contact_of(const Asked *asked, const Known *known) {
+    const PairFigure none = figure((double)NAN, 0);
+    PairContact contact = {.separation = (int)asked->separation,
+                           .approach_speed = known->speed,
+                           .restitution = figure(known->e, known->r_e),
+                           .contact_time = none,
+                           .stiffness = none,
+                           .damping = none,
+                           .damping_ratio = none};
     if (!(known->e > 0))
         return contact;
     // Without a contact time Z is still known, and the same for every mass.
@@ -154,7 +154,7 @@ static DerivedContact contact_of(const Asked *asked, const Known *known) {
     return contact;
 }
 
-static Status fill(const Material *material, int separation, DerivedPair *pair) {
+static Status fill(const Material *material, int separation, PairParameters *pair) {
     const size_t rows = material->table.count > 0 ? material->table.count : 1;
     pair->contacts.at = calloc(rows * RULES, sizeof *pair->contacts.at);
     if (pair->contacts.at == NULL)
@@ -171,7 +171,7 @@ static Status fill(const Material *material, int separation, DerivedPair *pair) 
 }
 
 // What e and T_c would be if the buffer's k_b and c_b were those of the test's pair.
-static Status warn_of_mass(const Material *material, DerivedPair *pair) {
+static Status warn_of_mass(const Material *material, PairParameters *pair) {
     const double mass = pair->effective_mass, test = pair->test_mass;
     const bool is_rig = pair->identified_for == IDENTIFIED_FOR_RIG;
     if (!has(test))
@@ -205,7 +205,7 @@ static Status warn_of_mass(const Material *material, DerivedPair *pair) {
                         known.T);
 }
 
-static Status warn_of_material(const Material *material, int separation, DerivedPair *pair) {
+static Status warn_of_material(const Material *material, int separation, PairParameters *pair) {
     const size_t rows = material->table.count > 0 ? material->table.count : 1;
     bool has_time = true, has_e = true, has_T = true, is_dead = false;
     for (size_t i = 0; i < rows; i++) {
@@ -243,9 +243,9 @@ static Status warn_of_material(const Material *material, int separation, Derived
     return STATUS_OK;
 }
 
-static Status warn_of_sticking(DerivedPair *pair) {
+static Status warn_of_sticking(PairParameters *pair) {
     for (size_t i = 0; i < pair->contacts.count; i++) {
-        const DerivedContact *contact = &pair->contacts.at[i];
+        const PairContact *contact = &pair->contacts.at[i];
         if (has(contact->stiffness.value) && !has(contact->contact_time.value))
             return warnings_add(&pair->warnings, "/contacts",
                                 "with this pair the contact is overdamped (Z = %.3g) and never "
@@ -256,9 +256,10 @@ static Status warn_of_sticking(DerivedPair *pair) {
     return STATUS_OK;
 }
 
-Status derived_make(const Material *material, double damper_mass, double structure_mass,
-                    int identified_for, int separation, DerivedPair *pair, Problem *problem) {
-    *pair = (DerivedPair){
+Status pair_parameters_run(const Material *material, double damper_mass, double structure_mass,
+                           int identified_for, int separation, PairParameters *pair,
+                           Problem *problem) {
+    *pair = (PairParameters){
         .damper_mass = damper_mass,
         .structure_mass = structure_mass,
         .identified_for = identified_for,

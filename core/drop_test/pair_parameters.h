@@ -12,41 +12,42 @@
 // contact, not of a mean. low and high are the value over and times exp(1.96 u) with the relative
 // uncertainty u: 95 % of contacts lie between them if e and T_c scatter log-normally with just
 // these deviations; that they were told by few readings is not in it. NAN: not known.
-typedef struct DerivedFigure {
+typedef struct PairFigure {
     double value, uncertainty, low, high;
-} DerivedFigure;
+} PairFigure;
 
 // Under one separation rule, at one row of the material's table.
-typedef struct DerivedContact {
-    int separation;                          // Separation
-    double approach_speed;                   // of the row; NAN: for every speed [m/s]
-    DerivedFigure restitution, contact_time; // of this pair [-], [s]
-    DerivedFigure stiffness, damping;        // k_b [N/m], c_b [N s/m]
-    DerivedFigure damping_ratio;             // Z [-]
-} DerivedContact;
-typedef struct DerivedContacts {
-    DerivedContact *at;
+typedef struct PairContact {
+    int separation;                       // Separation
+    double approach_speed;                // of the row; NAN: for every speed [m/s]
+    PairFigure restitution, contact_time; // of this pair [-], [s]
+    PairFigure stiffness, damping;        // k_b [N/m], c_b [N s/m]
+    PairFigure damping_ratio;             // Z [-]
+} PairContact;
+typedef struct PairContacts {
+    PairContact *at;
     size_t count;
-} DerivedContacts;
+} PairContacts;
 
-typedef struct DerivedPair {
+typedef struct PairParameters {
     double damper_mass;             // [kg]
     double structure_mass;          // NAN: it does not move [kg]
     int identified_for;             // IdentifiedFor
     double effective_mass;          // [kg]
     double test_mass;               // of the test's pair; NAN: not known [kg]
     double least_speed, most_speed; // for which the material was measured; NAN [m/s]
-    DerivedContacts contacts;       // by row, then by rule
+    PairContacts contacts;          // by row, then by rule
     Warnings warnings;
-} DerivedPair;
+} PairParameters;
 
-extern const Field derived_pair_fields[]; // without the warnings
+extern const Field pair_parameters_fields[]; // without the warnings
 
 // What is asked: a good material, masses above 0 (structure_mass NAN: fixed), and a rule or
 // CHOICE_ABSENT for both. STATUS_INVALID at "/identified_for" where the rig is not known. Cleared
-// by derived_pair_clear in any case.
-Status derived_make(const Material *material, double damper_mass, double structure_mass,
-                    int identified_for, int separation, DerivedPair *pair, Problem *problem);
-void derived_pair_clear(DerivedPair *pair);
+// by pair_parameters_clear in any case.
+Status pair_parameters_run(const Material *material, double damper_mass, double structure_mass,
+                           int identified_for, int separation, PairParameters *pair,
+                           Problem *problem);
+void pair_parameters_clear(PairParameters *pair);
 
 #endif

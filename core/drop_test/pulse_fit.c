@@ -16,8 +16,8 @@ enum { START, END, DECAY };
 static const double least_decay = -1,
                     most_decay = 4.6; // e from 2.7, which only noise makes, to 0.01
 
-TraceBox trace_box(long first, long last, long gaps) {
-    return (TraceBox){
+FitBox fit_box_make(long first, long last, long gaps) {
+    return (FitBox){
         .least = {(double)(first - gaps), (double)last, least_decay},
         .most = {(double)first, (double)(last + gaps), most_decay},
         .first = first - gaps + 1,
@@ -25,18 +25,18 @@ TraceBox trace_box(long first, long last, long gaps) {
     };
 }
 
-bool trace_point_shape(const TraceWindow *window, const TracePoint *point, TraceShape *shape,
-                       double *contact_time) {
+bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *shape,
+                     double *contact_time) {
     const double length = point->part[END] - point->part[START];
-    *shape =
-        trace_shape_lasting(point->part[DECAY], window->pull_rate * length, window->separation);
+    *shape = pulse_model_make_lasting(point->part[DECAY], window->pull_rate * length,
+                                      window->separation);
     *contact_time = length / shape->length;
     return length > 0 && isfinite(shape->length);
 }
 
 // The samples in contact; false: none.
-static bool members(const TraceWindow *window, const TracePoint *point, const TraceBox *box,
-                    long *first, long *last) {
+static bool members(const FitWindow *window, const FitPoint *point, const FitBox *box, long *first,
+                    long *last) {
     const long end = (long)(window->blocks * window->per_block) - 1;
     *first = (long)fmax(ceil(point->part[START]), (double)box->first);
     *last = (long)fmin(floor(point->part[END]), (double)box->last);
@@ -45,21 +45,21 @@ static bool members(const TraceWindow *window, const TracePoint *point, const Tr
 
 // The mean of so many values about s, `step` from one to the next: by the second difference over
 // their width, which is all that matters of a pulse over a block.
-static double mean_about(const TraceShape *shape, double s, double step, long count) {
-    const double middle = trace_shape_force(shape, s), half = step * (double)count / 2;
+static double mean_about(const PulseModel *shape, double s, double step, long count) {
+    const double middle = pulse_model_force(shape, s), half = step * (double)count / 2;
     if (count == 1)
         return middle;
     const double about =
-        (trace_shape_force(shape, s - half) + trace_shape_force(shape, s + half)) / 2;
+        (pulse_model_force(shape, s - half) + pulse_model_force(shape, s + half)) / 2;
     return middle + (about - middle) * (1 - 1 / ((double)count * (double)count)) / 3;
 }
 
 // The pulse of size 1 over blocks; those from *from to *to are other than 0.
-static bool pulse(const TraceWindow *window, const TracePoint *point, long first, long last,
-                  double *f, size_t *from, size_t *to) {
-    TraceShape shape;
+static bool pulse(const FitWindow *window, const FitPoint *point, long first, long last, double *f,
+                  size_t *from, size_t *to) {
+    PulseModel shape;
     double T;
-    if (!trace_point_shape(window, point, &shape, &T))
+    if (!pulse_fit_model(window, point, &shape, &T))
         return false;
     const long m = (long)window->per_block;
     const long begin = first / m, end = last / m;
@@ -89,7 +89,7 @@ static bool pulse(const TraceWindow *window, const TracePoint *point, long first
     return true;
 }
 
-static TraceResidue residue(const TraceWindow *window, const double *f, size_t from, size_t to) {
+static FitResidual residue(const FitWindow *window, const double *f, size_t from, size_t to) {
     const double n = (double)window->blocks, m = (double)window->per_block;
     double sum = 0, square = 0, product = 0;
     for (size_t k = from; k <= to; k++) {
@@ -100,7 +100,7 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
     const double ff = square - sum * sum / n, fx = product - sum * window->sum / n;
     const double A = fx / ff, b = (window->sum - A * sum) / n;
     if (!(ff > 0) || !(A > 0))
-        return (TraceResidue){.sum = (double)INFINITY};
+        return (FitResidual){.sum = (double)INFINITY};
     // In full where it matters: a difference of sums would lose small residues.
     double left = 0;
     for (size_t k = from; k <= to; k++) {
@@ -118,25 +118,24 @@ static TraceResidue residue(const TraceWindow *window, const double *f, size_t f
     } else {
         left += all;
     }
-    return (TraceResidue){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
+    return (FitResidual){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
 
 // INFINITY as sum where there is no such contact, or one of the other sign.
-static TraceResidue residue_at(const TraceWindow *window, const TracePoint *point,
-                               const TraceBox *box) {
-    double f[TRACE_BLOCKS_MAX];
+static FitResidual residue_at(const FitWindow *window, const FitPoint *point, const FitBox *box) {
+    double f[FIT_BLOCKS_MAX];
     long first, last;
     size_t from, to;
     if (!members(window, point, box, &first, &last) ||
         !pulse(window, point, first, last, f, &from, &to))
-        return (TraceResidue){.sum = (double)INFINITY};
+        return (FitResidual){.sum = (double)INFINITY};
     return residue(window, f, from, to);
 }
 
 // Slope and curvature of half the sum of squares, by differences of the pulse with the same samples
 // in contact; what size and baseline take up is projected out.
-static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
-    double f[TRACE_BLOCKS_MAX], above[TRACE_BLOCKS_MAX], d[TRACE_PARTS][TRACE_BLOCKS_MAX];
+static bool derive(const FitWindow *window, const FitBox *box, PulseFit *fit) {
+    double f[FIT_BLOCKS_MAX], above[FIT_BLOCKS_MAX], d[FIT_PARTS][FIT_BLOCKS_MAX];
     long first, last;
     size_t from, to;
     if (!members(window, &fit->at, box, &first, &last) ||
@@ -145,14 +144,14 @@ static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit
     const double n = (double)window->blocks, m = (double)window->per_block;
     const double A = fit->residue.amplitude, b = fit->residue.baseline;
     const double length = fit->at.part[END] - fit->at.part[START];
-    double f_sum = 0, ff = 0, d_sum[TRACE_PARTS] = {0}, df[TRACE_PARTS] = {0};
+    double f_sum = 0, ff = 0, d_sum[FIT_PARTS] = {0}, df[FIT_PARTS] = {0};
     for (size_t k = from; k <= to; k++) {
         f_sum += f[k];
         ff += f[k] * f[k];
     }
-    for (int p = 0; p < TRACE_PARTS; p++) {
+    for (int p = 0; p < FIT_PARTS; p++) {
         const double step = 1e-5 * (p == DECAY ? 1 : length);
-        TracePoint point = fit->at;
+        FitPoint point = fit->at;
         point.part[p] += step;
         if (!pulse(window, &point, first, last, above, &from, &to))
             return false;
@@ -166,7 +165,7 @@ static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit
         }
     }
     ff -= f_sum * f_sum / n;
-    for (int p = 0; p < TRACE_PARTS; p++) {
+    for (int p = 0; p < FIT_PARTS; p++) {
         fit->slope[p] = 0;
         // x - A f - b sums to 0 and is orthogonal to f: no projection is needed.
         for (size_t k = from; k <= to; k++)
@@ -183,10 +182,10 @@ static bool derive(const TraceWindow *window, const TraceBox *box, TraceFit *fit
 }
 
 // (curvature + damping diagonal) step = -slope over the free parts, by elimination.
-static bool solve(const TraceFit *fit, const bool *is_free, double damping, double *step) {
-    double a[TRACE_PARTS][TRACE_PARTS + 1];
-    int at[TRACE_PARTS], n = 0;
-    for (int p = 0; p < TRACE_PARTS; p++) {
+static bool solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
+    double a[FIT_PARTS][FIT_PARTS + 1];
+    int at[FIT_PARTS], n = 0;
+    for (int p = 0; p < FIT_PARTS; p++) {
         step[p] = 0;
         if (is_free[p])
             at[n++] = p;
@@ -214,8 +213,8 @@ static bool solve(const TraceFit *fit, const bool *is_free, double damping, doub
     return true;
 }
 
-void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit) {
-    for (int p = 0; p < TRACE_PARTS; p++)
+void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit) {
+    for (int p = 0; p < FIT_PARTS; p++)
         fit->at.part[p] = fmin(fmax(fit->at.part[p], box->least[p]), box->most[p]);
     fit->residue = residue_at(window, &fit->at, box);
     double damping = 1e-3;
@@ -225,20 +224,20 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
             return;
         is_derived = true;
         // What stands at a wall and wants through it stays there.
-        bool is_free[TRACE_PARTS];
-        for (int p = 0; p < TRACE_PARTS; p++)
+        bool is_free[FIT_PARTS];
+        for (int p = 0; p < FIT_PARTS; p++)
             is_free[p] = !(fit->at.part[p] <= box->least[p] && fit->slope[p] > 0) &&
                          !(fit->at.part[p] >= box->most[p] && fit->slope[p] < 0);
-        double step[TRACE_PARTS];
+        double step[FIT_PARTS];
         if (!solve(fit, is_free, damping, step)) {
             damping = 10 * damping + 1e-9;
             if (damping > 1e9)
                 return;
             continue;
         }
-        TraceFit next = *fit;
+        PulseFit next = *fit;
         double gain = 0, size = 0;
-        for (int p = 0; p < TRACE_PARTS; p++) {
+        for (int p = 0; p < FIT_PARTS; p++) {
             next.at.part[p] = fmin(fmax(fit->at.part[p] + step[p], box->least[p]), box->most[p]);
             gain -= step[p] * fit->slope[p];
             size = fmax(size, fabs(next.at.part[p] - fit->at.part[p]));
@@ -246,7 +245,7 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
         next.residue = residue_at(window, &next.at, box);
         if (next.residue.sum < fit->residue.sum) {
             const bool is_done = fit->residue.sum - next.residue.sum <
-                                 1e-7 * trace_variance(window, next.residue.sum);
+                                 1e-7 * pulse_fit_variance(window, next.residue.sum);
             *fit = next;
             is_derived = false;
             damping /= 10;
@@ -255,7 +254,7 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
         } else {
             damping = 10 * damping + 1e-9;
             if (damping > 1e9 || size < 1e-12 ||
-                gain < 1e-9 * trace_variance(window, fit->residue.sum))
+                gain < 1e-9 * pulse_fit_variance(window, fit->residue.sum))
                 break;
         }
     }
@@ -264,28 +263,28 @@ void trace_fit_box(const TraceWindow *window, const TraceBox *box, TraceFit *fit
     members(window, &fit->at, box, &fit->first, &fit->last);
 }
 
-double trace_variance(const TraceWindow *window, double sum) {
+double pulse_fit_variance(const FitWindow *window, double sum) {
     const double n = (double)window->blocks + window->noise_freedom;
     // Rounding of the data and of the model is noise as well.
     return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-16;
 }
 
-double trace_likelihood(const TraceWindow *window, double sum) {
+double pulse_fit_log_likelihood(const FitWindow *window, double sum) {
     const double n = (double)window->blocks + window->noise_freedom;
     return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-16);
 }
 
 // Coarsely over starts and ends, for one L.
-static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
+static bool seek(const FitWindow *window, double decay, PulseFit *fit) {
     enum { PLACES = 7 };
     const long lead = window->first - window->least_start, tail = window->most_end - window->last;
     const long lead_step = lead / PLACES + 1, tail_step = tail / PLACES + 1;
     fit->residue.sum = (double)INFINITY;
     for (long first = window->first; first >= window->least_start; first -= lead_step)
         for (long last = window->last; last <= window->most_end; last += tail_step) {
-            const TraceBox box = trace_box(first, last, 1);
-            const TracePoint point = {{(double)first - 0.5, (double)last + 0.5, decay}};
-            const TraceResidue left = residue_at(window, &point, &box);
+            const FitBox box = fit_box_make(first, last, 1);
+            const FitPoint point = {{(double)first - 0.5, (double)last + 0.5, decay}};
+            const FitResidual left = residue_at(window, &point, &box);
             if (left.sum < fit->residue.sum) {
                 fit->at = point;
                 fit->residue = left;
@@ -295,19 +294,19 @@ static bool seek(const TraceWindow *window, double decay, TraceFit *fit) {
 }
 
 // From gap to gap as long as it gets better.
-static void climb(const TraceWindow *window, TraceFit *fit) {
+static void climb(const FitWindow *window, PulseFit *fit) {
     static const int moves[8][2] = {{0, 1}, {0, -1},  {1, 0},  {-1, 0},
                                     {1, 1}, {-1, -1}, {-1, 1}, {1, -1}};
     long stride = 1;
     for (int way = 0, failed = 0; failed < 8; way = (way + 1) % 8) {
         const long from = fit->first + stride * moves[way][0];
         const long to = fit->last + stride * moves[way][1];
-        TraceFit other = *fit;
+        PulseFit other = *fit;
         other.residue.sum = (double)INFINITY;
         if (from >= window->least_start && from <= window->first && to >= window->last &&
             to <= window->most_end) {
-            const TraceBox box = trace_box(from, to, 1);
-            trace_fit_box(window, &box, &other);
+            const FitBox box = fit_box_make(from, to, 1);
+            pulse_fit_in_box(window, &box, &other);
         }
         if (other.residue.sum < fit->residue.sum * (1 - 1e-9)) {
             *fit = other;
@@ -323,14 +322,14 @@ static void climb(const TraceWindow *window, TraceFit *fit) {
     }
 }
 
-static bool is_known(const TraceFit *fits, size_t count, const TraceFit *fit) {
+static bool is_known(const PulseFit *fits, size_t count, const PulseFit *fit) {
     for (size_t i = 0; i < count; i++)
         if (fit->first == fits[i].first && fit->last == fits[i].last)
             return true;
     return false;
 }
 
-static size_t insert(TraceFit *fits, size_t count, const TraceFit *fit) {
+static size_t insert(PulseFit *fits, size_t count, const PulseFit *fit) {
     size_t at = count;
     for (; at > 0 && fits[at - 1].residue.sum > fit->residue.sum; at--)
         fits[at] = fits[at - 1];
@@ -338,31 +337,31 @@ static size_t insert(TraceFit *fits, size_t count, const TraceFit *fit) {
     return count + 1;
 }
 
-size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MAX]) {
-    static const double decays[TRACE_FITS_MAX] = {0.02, 0.3, 0.7, 1.3, 2, 3};
-    const TraceBox wide = {
+size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]) {
+    static const double decays[FITS_MAX] = {0.02, 0.3, 0.7, 1.3, 2, 3};
+    const FitBox wide = {
         .least = {(double)window->least_start - 1, (double)window->last, least_decay},
         .most = {(double)window->first, (double)window->most_end + 1, most_decay},
         .first = window->least_start,
         .last = window->most_end,
     };
-    TraceFit seeds[TRACE_FITS_MAX];
+    PulseFit seeds[FITS_MAX];
     size_t seeded = 0, count = 0;
-    for (size_t i = 0; i < TRACE_FITS_MAX; i++) {
-        TraceFit fit;
+    for (size_t i = 0; i < FITS_MAX; i++) {
+        PulseFit fit;
         if (!seek(window, decays[i], &fit))
             continue;
         // As if there were no jumps.
-        trace_fit_box(window, &wide, &fit);
-        const TraceBox box = trace_box(fit.first, fit.last, 1);
-        trace_fit_box(window, &box, &fit);
+        pulse_fit_in_box(window, &wide, &fit);
+        const FitBox box = fit_box_make(fit.first, fit.last, 1);
+        pulse_fit_in_box(window, &box, &fit);
         if (isfinite(fit.residue.sum) && !is_known(seeds, seeded, &fit))
             seeded = insert(seeds, seeded, &fit);
     }
     for (size_t i = 0; i < seeded; i++) {
         // Hopelessly worse than the best: no climbing mends that.
-        if (i > 0 && trace_likelihood(window, seeds[i].residue.sum) <
-                         trace_likelihood(window, fits[0].residue.sum) - 40)
+        if (i > 0 && pulse_fit_log_likelihood(window, seeds[i].residue.sum) <
+                         pulse_fit_log_likelihood(window, fits[0].residue.sum) - 40)
             break;
         climb(window, &seeds[i]);
         if (!is_known(fits, count, &seeds[i]))
@@ -371,9 +370,9 @@ size_t trace_fit(const TraceWindow *window, TraceFit fits[TRACE_FITS_MAX]) {
     return count;
 }
 
-void trace_refit(const TraceWindow *window, TraceFit *fit) {
-    const TraceBox box = trace_box(fit->first, fit->last, 1);
-    trace_fit_box(window, &box, fit);
+void pulse_fit_continue(const FitWindow *window, PulseFit *fit) {
+    const FitBox box = fit_box_make(fit->first, fit->last, 1);
+    pulse_fit_in_box(window, &box, fit);
     if (isfinite(fit->residue.sum))
         climb(window, fit);
 }

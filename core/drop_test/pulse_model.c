@@ -47,7 +47,7 @@ static double waves(double turn, double s, double *cosine) {
     return s * (turn > 0 ? sin(x) : sinh(x)) / x;
 }
 
-double trace_shape_force(const TraceShape *shape, double s) {
+double pulse_model_force(const PulseModel *shape, double s) {
     double cosine;
     const double sine = waves(shape->turn, s, &cosine);
     return shape->pull + exp(-shape->decay * s) * (shape->sine * sine + shape->cosine * cosine);
@@ -104,8 +104,8 @@ static double length_under_pull(double decay, double turn, int separation, doubl
     return (double)INFINITY;
 }
 
-static TraceShape shape_of(double decay, double turn, double pull, double length) {
-    return (TraceShape){
+static PulseModel shape_of(double decay, double turn, double pull, double length) {
+    return (PulseModel){
         .decay = decay,
         .turn = turn,
         .pull = pull,
@@ -119,20 +119,20 @@ static double turn_of(double decay, int separation) {
     return separation == SEPARATION_ZERO_FORCE ? zero_force_turn(decay) : pi * pi;
 }
 
-TraceShape trace_shape(double decay, double pull, int separation) {
+PulseModel pulse_model_make(double decay, double pull, int separation) {
     const double turn = turn_of(decay, separation);
     return shape_of(decay, turn, pull,
                     pull > 0 ? length_under_pull(decay, turn, separation, pull, false) : 1);
 }
 
-TraceShape trace_shape_lasting(double decay, double pull, int separation) {
+PulseModel pulse_model_make_lasting(double decay, double pull, int separation) {
     const double turn = turn_of(decay, separation);
     const double length = pull > 0 ? length_under_pull(decay, turn, separation, pull, true) : 1;
     return shape_of(decay, turn, pull / length, length);
 }
 
 // The change of momentum, v0 less the speed at the end, and what was pulled meanwhile.
-double trace_shape_impulse(const TraceShape *shape) {
+double pulse_model_impulse(const PulseModel *shape) {
     const double s = shape->length;
     double cosine;
     const double sine = waves(shape->turn, s, &cosine), fall = exp(-shape->decay * s);
@@ -140,12 +140,12 @@ double trace_shape_impulse(const TraceShape *shape) {
     return 1 - speed + shape->pull * s;
 }
 
-TraceVisible trace_shape_visible(const TraceShape *shape, double level) {
+PulseVisible pulse_model_visible(const PulseModel *shape, double level) {
     enum { PLACES = 400 };
-    TraceVisible visible = {.from = shape->length};
+    PulseVisible visible = {.from = shape->length};
     double forces[PLACES + 1], peak = 0;
     for (int i = 0; i <= PLACES; i++) {
-        forces[i] = trace_shape_force(shape, shape->length * i / PLACES);
+        forces[i] = pulse_model_force(shape, shape->length * i / PLACES);
         peak = fmax(peak, forces[i]);
     }
     for (int i = 0; i <= PLACES; i++) {

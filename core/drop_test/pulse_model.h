@@ -1,5 +1,5 @@
 // The force of one contact of the model's over the time since it began, whatever its size and
-// length. Not a contact law (contact/) and not a fit (trace_fit.h). Used by trace*.c.
+// length. Not a contact law (contact/) and not a fit (pulse_fit_run.h). Used by trace*.c.
 #ifndef CORE_DROP_TEST_PULSE_MODEL_H
 #define CORE_DROP_TEST_PULSE_MODEL_H
 
@@ -12,30 +12,30 @@
 //   F / (m_e v0 / T_c) = pull + e^(-L s) (sine S(s) + cosine C(s)),  s = t / T_c
 //
 // C and S are cos(sqrt(turn) s) and sin(sqrt(turn) s) / sqrt(turn), hyperbolic where turn < 0.
-typedef struct TraceShape {
+typedef struct PulseModel {
     double decay;        // L; below 0 a contact that gains energy, which noise can look like
     double turn;         // the square of the damped frequency times T_c
     double pull;         // g T_c / v0
     double sine, cosine; // as above
     double length; // of the contact under that pull, in T_c; 1 without, INFINITY: it never ends
-} TraceShape;
+} PulseModel;
 
 // `pull` is g T_c / v0 of what pulls the pair together during contact, 0: nothing.
-TraceShape trace_shape(double decay, double pull, int separation);
+PulseModel pulse_model_make(double decay, double pull, int separation);
 
 // `pull` is g / v0 times the time that the contact lasts, as a trace shows it.
-TraceShape trace_shape_lasting(double decay, double pull, int separation);
+PulseModel pulse_model_make_lasting(double decay, double pull, int separation);
 
-double trace_shape_force(const TraceShape *shape, double s);
+double pulse_model_force(const PulseModel *shape, double s);
 
 // The integral of the force over the contact [m_e v0].
-double trace_shape_impulse(const TraceShape *shape);
+double pulse_model_impulse(const PulseModel *shape);
 
 // From when to when in T_c the size of the force is above `level` of its largest; pressed: until
 // when without the tensile end.
-typedef struct TraceVisible {
+typedef struct PulseVisible {
     double from, pressed, to;
-} TraceVisible;
-TraceVisible trace_shape_visible(const TraceShape *shape, double level);
+} PulseVisible;
+PulseVisible pulse_model_visible(const PulseModel *shape, double level);
 
 #endif

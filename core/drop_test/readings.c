@@ -62,7 +62,7 @@ static Status row_new(const Measurement *of, size_t index, Evaluation *evaluatio
         .test = index,
     };
     *row = &rows->at[rows->count++];
-    fields_clear(trace_seen_fields, &(*row)->contact);
+    fields_clear(trace_detection_fields, &(*row)->contact);
     return STATUS_OK;
 }
 
@@ -84,7 +84,7 @@ static double speed_error(const DropTest *test, double speed, double height) {
 }
 
 static void read_restitution(const DropTest *test, const Drop *drop, EvaluationRow *row) {
-    const double before = row->approach_speed, after = drop_rebound(test, drop);
+    const double before = row->approach_speed, after = drop_rebound_speed(test, drop);
     if (!has(before) || !has(after))
         return;
     const bool is_by_height = !has(drop->rebound_speed);
@@ -108,7 +108,7 @@ static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation
     EvaluationRow *row = NULL;
     TRY(row_new(of, index, evaluation, &row, problem));
     row->place = i;
-    row->approach_speed = drop_approach(drop);
+    row->approach_speed = drop_approach_speed(drop);
     row->approach_speed_uncertainty =
         row->approach_speed * speed_error(test, drop->approach_speed, drop->drop_height);
     read_restitution(test, drop, row);
@@ -174,10 +174,10 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, const Pro
                         Evaluation *evaluation, Problem *problem) {
     const DropTest *test = of->test;
     const Trace *trace = &test->traces.at[i];
-    const TraceWay way = {
+    const TraceOptions way = {
         .separation = evaluation->separation,
         .threshold = (double)NAN,
-        .effective_mass = drop_test_mass(test),
+        .effective_mass = drop_test_effective_mass(test),
         .gravity = test->gravity > 0 ? test->gravity : 0,
         .approach_speeds = trace->approach_speed.at,
         .approach_speed_count = trace->approach_speed.count,
@@ -187,17 +187,17 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, const Pro
     row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i}, place,
                 sizeof place);
     pointer_join(pointer, sizeof pointer, place, "force");
-    TraceReading reading = {0};
+    TraceAnalysis reading = {0};
     // What cannot be read at all may be why it is excluded.
-    Status status = trace_read(trace->interval, &trace->force, &way, pointer, &reading,
-                               trace->excluded == NULL ? problem : NULL);
+    Status status = trace_analysis_run(trace->interval, &trace->force, &way, pointer, &reading,
+                                       trace->excluded == NULL ? problem : NULL);
     if (status == STATUS_INVALID && trace->excluded != NULL)
         status = add_silent(of, index, i, "it cannot be read", evaluation, problem);
     else if (status == STATUS_OK && reading.contacts.count == 0)
         status = add_silent(of, index, i, reading.why, evaluation, problem);
     for (size_t k = 0; status == STATUS_OK && k < reading.contacts.count; k++)
         status = add_contact(of, index, i, k, &reading.contacts.at[k], evaluation, problem);
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
     return status;
 }
 
@@ -210,9 +210,9 @@ Status rows_add(const Measurement *of, size_t index, const Progress *progress,
     return STATUS_OK;
 }
 
-static Pull pull_of(const Measurement *tests, const EvaluationRow *row, int separation) {
-    return (Pull){tests[row->test].test->gravity, row->approach_speed, (Separation)separation,
-                  row->restitution_by == RESTITUTION_BY_HEIGHTS};
+static GravityLoad pull_of(const Measurement *tests, const EvaluationRow *row, int separation) {
+    return (GravityLoad){tests[row->test].test->gravity, row->approach_speed,
+                         (Separation)separation, row->restitution_by == RESTITUTION_BY_HEIGHTS};
 }
 
 static bool is_pulled(const Measurement *tests, const EvaluationRow *row) {
@@ -221,12 +221,12 @@ static bool is_pulled(const Measurement *tests, const EvaluationRow *row) {
 }
 
 // Of a drop that tells both.
-static Status unpull(const Pull *pull, EvaluationRow *row, Problem *problem) {
-    const Unpulled read = {row->restitution, row->contact_time,
-                           row->restitution_uncertainty / row->restitution,
-                           row->contact_time_uncertainty / row->contact_time};
-    Unpulled isolated;
-    if (!(row->restitution > 0) || !gravity_remove(pull, &read, &isolated)) {
+static Status unpull(const GravityLoad *pull, EvaluationRow *row, Problem *problem) {
+    const GravityCorrected read = {row->restitution, row->contact_time,
+                                   row->restitution_uncertainty / row->restitution,
+                                   row->contact_time_uncertainty / row->contact_time};
+    GravityCorrected isolated;
+    if (!(row->restitution > 0) || !gravity_correct(pull, &read, &isolated)) {
         row->restitution_counts = row->contact_time_counts = false;
         return say(row, "does not count: no contact comes to this e and T_c under that gravity",
                    problem);
@@ -263,15 +263,16 @@ static void means_of(const Evaluation *evaluation, size_t test, double *restitut
 }
 
 // Of a drop that tells one of the two.
-static Status unpull_one(const Pull *pull, double restitution, double contact_time,
+static Status unpull_one(const GravityLoad *pull, double restitution, double contact_time,
                          EvaluationRow *row, Problem *problem) {
     const bool wants_e = has(row->restitution);
     const double known = wants_e ? contact_time : restitution;
     const bool can_tell = has(known) && has(pull->speed);
     double value = (double)NAN;
     const bool is_found =
-        can_tell && (wants_e ? gravity_remove_restitution(pull, row->restitution, known, &value)
-                             : gravity_remove_contact_time(pull, row->contact_time, known, &value));
+        can_tell &&
+        (wants_e ? gravity_correct_restitution(pull, row->restitution, known, &value)
+                 : gravity_correct_contact_time(pull, row->contact_time, known, &value));
     if (!is_found)
         return say(row,
                    can_tell  ? "gravity is not taken out: no contact comes to this under it"
@@ -299,7 +300,7 @@ Status rows_unpull(const Measurement *tests, size_t count, const Progress *progr
             continue;
         if (!progress_advance(progress, 1))
             return STATUS_CANCELLED;
-        const Pull pull = pull_of(tests, row, evaluation->separation);
+        const GravityLoad pull = pull_of(tests, row, evaluation->separation);
         TRY(unpull(&pull, row, problem));
     }
     for (size_t test = 0; test < count; test++) {
@@ -312,7 +313,7 @@ Status rows_unpull(const Measurement *tests, size_t count, const Progress *progr
                 continue;
             if (!progress_advance(progress, 1))
                 return STATUS_CANCELLED;
-            const Pull pull = pull_of(tests, row, evaluation->separation);
+            const GravityLoad pull = pull_of(tests, row, evaluation->separation);
             TRY(unpull_one(&pull, restitution, contact_time, row, problem));
         }
     }

@@ -6,7 +6,7 @@
 
 #include "core/drop_test/evaluation.h"
 
-// Appends the rows of test `index` of those given. Ends as evaluation_make does.
+// Appends the rows of test `index` of those given. Ends as evaluation_run does.
 Status rows_add(const Measurement *of, size_t index, const Progress *progress,
                 Evaluation *evaluation, Problem *problem);
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/formats/import_text.h"
+#include "core/formats/text_table.h"
 
 enum { UNIT_MAX = 12 };               // bytes; what is longer is no unit
 static const double unevenness = 0.3; // of an interval, that a printed time may be off
@@ -149,8 +149,8 @@ static Status take(TraceColumns *rows, double interval, Trace *trace, Problem *p
     return STATUS_OK;
 }
 
-Status trace_text_read(const char *text, size_t size, double interval, Trace *trace,
-                       Problem *problem) {
+Status force_trace_text_read(const char *text, size_t size, double interval, Trace *trace,
+                             Problem *problem) {
     TraceColumns rows = {0};
     // A byte order mark of UTF-8.
     const size_t skipped = size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;

@@ -11,7 +11,7 @@
 // stands there in brackets must be [s] and [N]. Sets interval and force of `trace`, which is all
 // zero before; force.at is freed by free. Faults stand at "line 12". STATUS_UNREADABLE,
 // STATUS_TOO_LARGE, STATUS_NO_MEMORY.
-Status trace_text_read(const char *text, size_t size, double interval, Trace *trace,
-                       Problem *problem);
+Status force_trace_text_read(const char *text, size_t size, double interval, Trace *trace,
+                             Problem *problem);
 
 #endif

@@ -8,16 +8,19 @@
 
 #include "core/excitation/recorded_motion.h"
 #include "core/formats/import_header.h"
-#include "core/formats/import_text.h"
+#include "core/formats/text_table.h"
 
 enum { VALUES_MAX = 2 * RECORD_SAMPLES };
 
-const char *const import_unit_names[] = {
-    [IMPORT_G] = "g", [IMPORT_METRES] = "m/s^2", [IMPORT_CENTIMETRES] = "cm/s^2", NULL};
-static const double unit_sizes[] = {
-    [IMPORT_G] = 9.80665, [IMPORT_METRES] = 1, [IMPORT_CENTIMETRES] = 0.01}; // [m/s^2]
+const char *const acceleration_unit_names[] = {[ACCELERATION_G] = "g",
+                                               [ACCELERATION_METRES] = "m/s^2",
+                                               [ACCELERATION_CENTIMETRES] = "cm/s^2",
+                                               NULL};
+static const double unit_sizes[] = {[ACCELERATION_G] = 9.80665,
+                                    [ACCELERATION_METRES] = 1,
+                                    [ACCELERATION_CENTIMETRES] = 0.01}; // [m/s^2]
 
-double import_unit_size(int unit) {
+double acceleration_unit_size(int unit) {
     return unit_sizes[unit];
 }
 
@@ -178,8 +181,8 @@ static Status check_rows(const Numbers *numbers, const ImportHeader *header, Pro
     return STATUS_OK;
 }
 
-static Status choose_interval(const ImportRequest *request, const ImportHeader *header,
-                              Import *import, Problem *problem) {
+static Status choose_interval(const GroundMotionOptions *request, const ImportHeader *header,
+                              GroundMotionText *import, Problem *problem) {
     const double told = !isnan(import->interval) ? import->interval : header->interval;
     char place[64], is[32], asked[32];
     (void)text_place(place, header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
@@ -195,8 +198,8 @@ static Status choose_interval(const ImportRequest *request, const ImportHeader *
     return STATUS_OK;
 }
 
-static Status choose_unit(const ImportRequest *request, const ImportHeader *header, Import *import,
-                          Problem *problem) {
+static Status choose_unit(const GroundMotionOptions *request, const ImportHeader *header,
+                          GroundMotionText *import, Problem *problem) {
     char place[64];
     import->stated_unit = header->unit;
     import->unit = request->unit;
@@ -206,18 +209,18 @@ static Status choose_unit(const ImportRequest *request, const ImportHeader *head
     if (header->conflict_line != 0)
         return problem_add(problem, STATUS_UNREADABLE, text_place(place, header->conflict_line, 0),
                            "tells another unit than line %zu, %s: unit must be given",
-                           header->unit_line, import_unit_names[header->unit]);
+                           header->unit_line, acceleration_unit_names[header->unit]);
     if (header->unit != CHOICE_ABSENT)
         return STATUS_OK;
     // PEER's files are in g.
-    import->unit = IMPORT_G;
+    import->unit = ACCELERATION_G;
     if (strncmp(import->layout, "at2", 3) == 0)
         return STATUS_OK;
     return problem_add(problem, STATUS_UNREADABLE, text_place(place, 1, 0),
                        "must tell the unit, or unit must be given: g, m/s^2 or cm/s^2");
 }
 
-static Status convert(Numbers *numbers, const ImportHeader *header, Import *import,
+static Status convert(Numbers *numbers, const ImportHeader *header, GroundMotionText *import,
                       Problem *problem) {
     char place[64], is[32];
     if (numbers->count < 2 || numbers->count > RECORD_SAMPLES)
@@ -240,8 +243,8 @@ static Status convert(Numbers *numbers, const ImportHeader *header, Import *impo
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a header");
 }
 
-static Status read_all(TextReader reader, const ImportRequest *request, Numbers *numbers,
-                       Import *import, Problem *problem) {
+static Status read_all(TextReader reader, const GroundMotionOptions *request, Numbers *numbers,
+                       GroundMotionText *import, Problem *problem) {
     ImportHeader header;
     TRY(import_header_read(reader, &header, problem));
     TRY(read_numbers(header.data, numbers, problem));
@@ -261,9 +264,9 @@ static Status read_all(TextReader reader, const ImportRequest *request, Numbers 
     return convert(numbers, &header, import, problem);
 }
 
-Status import_read(const char *text, size_t size, const ImportRequest *request, Import *import,
-                   Problem *problem) {
-    *import = (Import){0};
+Status ground_motion_text_read(const char *text, size_t size, const GroundMotionOptions *request,
+                               GroundMotionText *import, Problem *problem) {
+    *import = (GroundMotionText){0};
     Numbers numbers = {0};
     // A byte order mark of UTF-8.
     const size_t skipped = size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
@@ -273,12 +276,12 @@ Status import_read(const char *text, size_t size, const ImportRequest *request, 
                           problem);
     free(numbers.at);
     if (status != STATUS_OK)
-        import_clear(import);
+        ground_motion_text_clear(import);
     return status;
 }
 
-void import_clear(Import *import) {
+void ground_motion_text_clear(GroundMotionText *import) {
     free(import->header);
     free(import->samples.at);
-    *import = (Import){0};
+    *import = (GroundMotionText){0};
 }

@@ -92,7 +92,7 @@ static bool has_g(const char *line) {
     return false;
 }
 
-static void see_unit(ImportHeader *header, ImportUnit unit, size_t line) {
+static void see_unit(ImportHeader *header, AccelerationUnit unit, size_t line) {
     if (header->unit == CHOICE_ABSENT) {
         header->unit = (int)unit;
         header->unit_line = line;
@@ -103,14 +103,14 @@ static void see_unit(ImportHeader *header, ImportUnit unit, size_t line) {
 
 static void see_units(ImportHeader *header, const char *line, size_t number) {
     if (has_g(line))
-        see_unit(header, IMPORT_G, number);
+        see_unit(header, ACCELERATION_G, number);
     if (word_find(line, line, "GAL") != NULL)
-        see_unit(header, IMPORT_CENTIMETRES, number);
+        see_unit(header, ACCELERATION_CENTIMETRES, number);
     for (const char *at = line; (at = strstr(at, "M/S")) != NULL; at++) {
         const bool is_centi = at > line && at[-1] == 'C';
         const char *first = is_centi ? at - 1 : at;
         if ((first == line || is_word_edge(first[-1])) && is_squared(at + 3))
-            see_unit(header, is_centi ? IMPORT_CENTIMETRES : IMPORT_METRES, number);
+            see_unit(header, is_centi ? ACCELERATION_CENTIMETRES : ACCELERATION_METRES, number);
     }
 }
 

@@ -3,14 +3,14 @@
 #ifndef CORE_FORMATS_IMPORT_HEADER_H
 #define CORE_FORMATS_IMPORT_HEADER_H
 
-#include "core/formats/import_text.h"
+#include "core/formats/text_table.h"
 
 typedef struct ImportHeader {
     const char *layout;   // of the line that tells the count; NULL: there is none
     size_t count_line;    // its number
     double count;         // NAN: not told
     double interval;      // [s]; NAN: not told
-    int unit;             // ImportUnit; CHOICE_ABSENT: not told
+    int unit;             // AccelerationUnit; CHOICE_ABSENT: not told
     size_t unit_line;     // where it is told
     size_t conflict_line; // where another unit is told; 0: nowhere
     bool is_time;         // its last line begins with "time"

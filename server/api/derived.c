@@ -32,12 +32,13 @@ static Status read_query(const Request *request, Asked *asked, Problem *problem)
                         problem);
 }
 
-static void write_answer(Bytes *bytes, const MaterialRevision *material, const DerivedPair *pair) {
+static void write_answer(Bytes *bytes, const MaterialRevision *material,
+                         const PairParameters *pair) {
     const char *base = link_base();
     const unsigned long long revision = material->revision;
     bytes_format(bytes, "{\"material\": \"%s@%llu\", \"status\": \"%s\", ", material->slug,
                  revision, material->status);
-    (void)write_members(bytes, derived_pair_fields, pair, WRITE_REPORT);
+    (void)write_members(bytes, pair_parameters_fields, pair, WRITE_REPORT);
     bytes_text(bytes, ", \"warnings\": ");
     write_list(bytes, warning_fields, pair->warnings.at, pair->warnings.count,
                sizeof *pair->warnings.at, WRITE_REPORT);
@@ -52,13 +53,13 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
     Asked asked;
     TRY(read_query(request, &asked, problem));
     MaterialRevision material = {.slug = NULL};
-    DerivedPair pair = {.contacts = {NULL, 0}};
+    PairParameters pair = {.contacts = {NULL, 0}};
     Status status =
         catalogue_find(app->store, request->parameters[0], revision, &material, problem);
     problem->whose = "query";
     if (status == STATUS_OK)
-        status = derived_make(&material.material, asked.damper_mass, asked.structure_mass,
-                              asked.identified_for, asked.separation, &pair, problem);
+        status = pair_parameters_run(&material.material, asked.damper_mass, asked.structure_mass,
+                                     asked.identified_for, asked.separation, &pair, problem);
     if (status == STATUS_OK) {
         char tag[MATERIAL_TAG];
         material_tag(material.slug, material.revision, material.version, tag);
@@ -68,7 +69,7 @@ static Status show(App *app, const Request *request, uint64_t revision, Reply *r
             status = reply_bytes(reply, 200, type_json, &bytes, problem);
         }
     }
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     material_revision_clear(&material);
     return status;
 }

@@ -68,13 +68,13 @@ static Status read_choice(const Request *request, const char *name, const char *
 }
 
 // The table; `text` is the caller's.
-static Status read_table(const char *text, size_t size, const ImportRequest *wanted,
+static Status read_table(const char *text, size_t size, const GroundMotionOptions *wanted,
                          MeasuredRequest *asked, Problem *problem) {
-    Import import = {0};
+    GroundMotionText import = {0};
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    const Status status = import_read(text, size, wanted, &import, fault);
+    const Status status = ground_motion_text_read(text, size, wanted, &import, fault);
     if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
         (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
                           fault->faults[0].detail);
@@ -85,17 +85,17 @@ static Status read_table(const char *text, size_t size, const ImportRequest *wan
     asked->measured.interval = import.interval;
     asked->measured.start = import.start;
     import.samples = (Reals){NULL, 0};
-    import_clear(&import);
+    ground_motion_text_clear(&import);
     return status;
 }
 
 // A table of accelerations as `impactd import` reads them, and everything else in the query.
 static Status read_text(const Request *request, MeasuredRequest *asked, Problem *problem) {
-    ImportRequest wanted = {.interval = (double)NAN, .unit = CHOICE_ABSENT};
+    GroundMotionOptions wanted = {.interval = (double)NAN, .unit = CHOICE_ABSENT};
     TRY(read_name(request, "a", &asked->a, problem));
     TRY(read_name(request, "channel", &asked->channel, problem));
     TRY(read_choice(request, "align", "/align", align_names, &asked->align, problem));
-    TRY(read_choice(request, "unit", "/unit", import_unit_names, &wanted.unit, problem));
+    TRY(read_choice(request, "unit", "/unit", acceleration_unit_names, &wanted.unit, problem));
     TRY(request_number(request, "shift", -1e9, 1e9, 0, &asked->shift, problem));
     TRY(request_number(request, "most_shift", 1e-12, 1e9, (double)NAN, &asked->most_shift,
                        problem));

@@ -49,7 +49,7 @@ Status material_evaluate(Patience *patience, const Measurement *tests, size_t co
                          Evaluation *evaluation, Reply *reply, Problem *problem) {
     const Progress watch = {patience, patience_lasts};
     Status status =
-        evaluation_make(tests, count, (Separation)separation, &watch, evaluation, problem);
+        evaluation_run(tests, count, (Separation)separation, &watch, evaluation, problem);
     if (status == STATUS_CANCELLED)
         status = patience_tell(patience, problem);
     if (status == STATUS_BUSY)
@@ -92,7 +92,7 @@ static Status read_body(const Request *request, MeasurementBody *body, Problem *
     if (status != STATUS_OK && status != STATUS_INVALID)
         return status;
     const Status all[] = {status, fields_check(measurement_body_fields, body, "", problem),
-                          drop_test_check(&body->test, "", problem)};
+                          drop_test_validate(&body->test, "", problem)};
     for (size_t i = 0; i < COUNT(all); i++)
         TRY(all[i]);
     return STATUS_OK;

@@ -65,7 +65,7 @@ static Status load(Patience *patience, const char *slug, Taken *taken, Reply *re
         TRY(stored_test_load(patience->app->store, slug, taken->tests[i].number, &taken->stored[i],
                              problem));
         // Before there are more of them in memory.
-        if (evaluation_samples(taken->tests, i + 1) > EVALUATION_SAMPLES_MAX)
+        if (evaluation_sample_count(taken->tests, i + 1) > EVALUATION_SAMPLES_MAX)
             return problem_set(problem, STATUS_LIMIT,
                                "more than %d samples in traces: take in fewer measurements at a "
                                "time, as ?measurements=1,2",
@@ -148,7 +148,7 @@ static void write_links(Bytes *bytes, const Request *request) {
 }
 
 static Status tell(App *app, const Request *request, const Taken *taken,
-                   const Evaluation *evaluation, const Proposal *proposal, Reply *reply,
+                   const Evaluation *evaluation, const MaterialProposal *proposal, Reply *reply,
                    Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     bytes_format(&bytes, "{\"slug\": \"%s\", \"measurements\": [", request->parameters[0]);
@@ -181,7 +181,7 @@ static Status propose(App *app, const Request *request, const Material *before, 
     int form;
     TRY(query_choice(request, "as", proposal_form_names, PROPOSAL_CONSTANT, &form, problem));
     Evaluation evaluation = {.separation = separation};
-    Proposal proposal = {.why = NULL};
+    MaterialProposal proposal = {.why = NULL};
     Patience patience;
     patience_begin(app, &patience);
     Status status = load(&patience, request->parameters[0], taken, reply, problem);
@@ -190,12 +190,12 @@ static Status propose(App *app, const Request *request, const Material *before, 
                                    reply, problem);
     patience_end(&patience);
     if (status == STATUS_OK)
-        status = proposal_make(&evaluation, taken->tests, taken->count, before, (ProposalForm)form,
-                               &proposal, problem);
+        status = material_proposal_run(&evaluation, taken->tests, taken->count, before,
+                                       (ProposalForm)form, &proposal, problem);
     if (status == STATUS_OK)
         status = format == 0 ? tell(app, request, taken, &evaluation, &proposal, reply, problem)
                              : tell_chart(app, request, &evaluation, reply, problem);
-    proposal_clear(&proposal);
+    material_proposal_clear(&proposal);
     evaluation_clear(&evaluation);
     return status;
 }

@@ -31,7 +31,7 @@ static const Field asked_fields[] = {
     FIELD_TEXT(Asked, station, 200, PRESENCE_OPTIONAL, 0, "where it was measured, and in which direction"),
     FIELD_TEXT(Asked, notes, 4000, PRESENCE_OPTIONAL, 0, "what else one should know"),
     FIELD_REAL(Asked, interval, "s", WITHIN(INTERVAL_MIN, INTERVAL_MAX), REQUIRED, "time between samples"),
-    FIELD_CHOICE(Asked, unit, import_unit_names, OPTIONAL, "of the samples: g, m/s^2 (if absent) or cm/s^2"),
+    FIELD_CHOICE(Asked, unit, acceleration_unit_names, OPTIONAL, "of the samples: g, m/s^2 (if absent) or cm/s^2"),
     FIELD_REALS(Asked, samples, NULL, ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "base acceleration from the start on"),
     FIELD_END
 };
@@ -57,7 +57,7 @@ static Status read_document(const Request *request, Asked *asked, RecordRow *row
     TRY(read_json(request->body, request->body_size, asked_fields, asked, problem));
     row->layout = strdup("json");
     if (asked->unit == CHOICE_ABSENT)
-        asked->unit = IMPORT_METRES;
+        asked->unit = ACCELERATION_METRES;
     return row->layout != NULL ? STATUS_OK : no_memory(problem);
 }
 
@@ -79,22 +79,22 @@ static Status read_queries(const Request *request, Asked *asked, Problem *proble
     TRY(request_number(request, "interval", INTERVAL_MIN, INTERVAL_MAX, (double)NAN,
                        &asked->interval, problem));
     const char *unit = request_query(request, "unit");
-    for (int i = 0; unit != NULL && import_unit_names[i] != NULL; i++)
-        if (strcmp(import_unit_names[i], unit) == 0)
+    for (int i = 0; unit != NULL && acceleration_unit_names[i] != NULL; i++)
+        if (strcmp(acceleration_unit_names[i], unit) == 0)
             asked->unit = i;
     return unit == NULL || asked->unit != CHOICE_ABSENT
                ? STATUS_OK
-               : texts_refuse(import_unit_names, unit, "/unit", problem);
+               : texts_refuse(acceleration_unit_names, unit, "/unit", problem);
 }
 
-static Status warn_file(const Import *import, bool is_told, Warnings *warnings) {
-    const char *unit = import_unit_names[import->unit];
+static Status warn_file(const GroundMotionText *import, bool is_told, Warnings *warnings) {
+    const char *unit = acceleration_unit_names[import->unit];
     char start[32];
     if (import->stated_unit == CHOICE_ABSENT && !is_told)
         TRY(warnings_add(warnings, "/unit", "the file tells no unit, %s is taken", unit));
     if (import->stated_unit != CHOICE_ABSENT && import->stated_unit != import->unit)
         TRY(warnings_add(warnings, "/unit", "the file tells %s, %s is taken",
-                         import_unit_names[import->stated_unit], unit));
+                         acceleration_unit_names[import->stated_unit], unit));
     if (import->start != 0)
         TRY(warnings_add(warnings, "/samples",
                          "begin at %s s in the file; the record begins at 0 s",
@@ -103,13 +103,13 @@ static Status warn_file(const Import *import, bool is_told, Warnings *warnings) 
 }
 
 // Takes out of the import what the record keeps.
-static Status keep(Import *import, Asked *asked, RecordUpload *upload, Problem *problem) {
+static Status keep(GroundMotionText *import, Asked *asked, RecordUpload *upload, Problem *problem) {
     RecordRow *row = &upload->row;
     const bool is_told = asked->unit != CHOICE_ABSENT;
     row->layout = strdup(import->layout);
     row->header = import->header[0] != '\0' ? strdup(import->header) : NULL;
     if (import->stated_unit != CHOICE_ABSENT)
-        row->stated_unit = strdup(import_unit_names[import->stated_unit]);
+        row->stated_unit = strdup(acceleration_unit_names[import->stated_unit]);
     asked->unit = import->unit;
     asked->interval = import->interval;
     upload->samples = import->samples;
@@ -125,12 +125,12 @@ static Status keep(Import *import, Asked *asked, RecordUpload *upload, Problem *
 // `text` is the caller's.
 static Status read_table(const char *text, size_t size, Asked *asked, RecordUpload *upload,
                          Problem *problem) {
-    const ImportRequest wanted = {.interval = asked->interval, .unit = asked->unit};
-    Import import = {0};
+    const GroundMotionOptions wanted = {.interval = asked->interval, .unit = asked->unit};
+    GroundMotionText import = {0};
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return no_memory(problem);
-    Status status = import_read(text, size, &wanted, &import, fault);
+    Status status = ground_motion_text_read(text, size, &wanted, &import, fault);
     if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
         (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
                           fault->faults[0].detail);
@@ -139,7 +139,7 @@ static Status read_table(const char *text, size_t size, Asked *asked, RecordUplo
     free(fault);
     if (status == STATUS_OK) {
         status = keep(&import, asked, upload, problem);
-        import_clear(&import);
+        ground_motion_text_clear(&import);
     }
     return status;
 }
@@ -225,7 +225,7 @@ static Status measure(Asked *asked, RecordUpload *upload, Problem *problem) {
     row->earthquake = take(&asked->earthquake);
     row->station = take(&asked->station);
     row->notes = take(&asked->notes);
-    row->unit = strdup(import_unit_names[asked->unit]);
+    row->unit = strdup(acceleration_unit_names[asked->unit]);
     row->digest = digest[0] != '\0' ? strdup(digest) : NULL;
     row->interval = asked->interval;
     row->count = upload->samples.count;
@@ -291,7 +291,7 @@ Status record_upload_read(const Request *request, RecordUpload *upload, Problem 
         status = status == STATUS_OK ? judged : status;
     }
     if (status == STATUS_OK && is_json)
-        status = scale(&upload->samples, import_unit_size(asked.unit), problem);
+        status = scale(&upload->samples, acceleration_unit_size(asked.unit), problem);
     else if (status == STATUS_OK)
         status = scale(&upload->samples, 1, problem);
     if (status == STATUS_OK)

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/formats/ground_motion_text.h"
 #include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/codec/write.h"
 #include "server/command/output.h"
 #include "server/command/scene_file.h"
@@ -25,30 +25,31 @@ typedef struct ImportSettings {
 // clang-format off
 static const Field import_fields[] = {
     FIELD_REAL(ImportSettings, interval, "s", ABOVE(0), OPTIONAL, "time between samples, where the file does not tell it"),
-    FIELD_CHOICE(ImportSettings, unit, import_unit_names, OPTIONAL, "g, m/s^2 or cm/s^2, over what the file tells"),
+    FIELD_CHOICE(ImportSettings, unit, acceleration_unit_names, OPTIONAL, "g, m/s^2 or cm/s^2, over what the file tells"),
     FIELD_REAL(ImportSettings, scale, NULL, ANY, 1, "factor on the samples"),
     FIELD_TEXT(ImportSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file"),
     FIELD_END,
 };
 // clang-format on
 
-static void unit_tell(const char *path, const Import *import, bool is_given) {
-    const char *unit = import_unit_names[import->unit];
+static void unit_tell(const char *path, const GroundMotionText *import, bool is_given) {
+    const char *unit = acceleration_unit_names[import->unit];
     if (import->stated_unit == CHOICE_ABSENT && !is_given)
         fprintf(stderr, "%s: warning: the file tells no unit, %s is taken\n", path, unit);
     else if (import->stated_unit != CHOICE_ABSENT && import->stated_unit != import->unit)
         fprintf(stderr, "%s: warning: the file tells %s, %s is taken\n", path,
-                import_unit_names[import->stated_unit], unit);
+                acceleration_unit_names[import->stated_unit], unit);
 }
 
-static void summary_tell(const char *path, const Import *import, const ImportSettings *settings) {
+static void summary_tell(const char *path, const GroundMotionText *import,
+                         const ImportSettings *settings) {
     const RecordLook look = record_look(&import->samples, import->interval, settings->scale);
     const double peak = fmax(look.highest, -look.lowest);
     char interval[32];
     fprintf(stderr, "%s: %s, %zu samples, one every %s s, %.6g s; unit %s\n", path, import->layout,
             import->samples.count, text_real(interval, import->interval),
             (double)(import->samples.count - 1) * import->interval,
-            import_unit_names[import->unit]);
+            acceleration_unit_names[import->unit]);
     fprintf(stderr,
             "%s: peak %.6g m/s^2 (%.6g g) at %.6g s; velocity: peak %.3g m/s, at the end %.3g "
             "m/s\n",
@@ -88,9 +89,10 @@ static Status excitation_write(const ExcitationRecord *record, const char *outpu
 
 static Status import_show(const char *path, const Bytes *text, const ImportSettings *settings,
                           Problem *problem) {
-    const ImportRequest request = {.interval = settings->interval, .unit = settings->unit};
-    Import import;
-    TRY(import_read(text->at != NULL ? text->at : "", text->count, &request, &import, problem));
+    const GroundMotionOptions request = {.interval = settings->interval, .unit = settings->unit};
+    GroundMotionText import;
+    TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, &request, &import,
+                                problem));
     char source[1000];
     const char *name = scene_file_name(path), *slash = strrchr(path, '/');
     char named[2000];
@@ -113,7 +115,7 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
         problem_clear(problem);
         doubts_tell(name, &record.excitation, problem);
     }
-    import_clear(&import);
+    ground_motion_text_clear(&import);
     return status;
 }
 

@@ -80,7 +80,7 @@ Status materials_ask(MaterialsCall *call, const char *method, Bytes *path, const
 Status materials_print(const MaterialsCall *call, const HttpAnswer *answer,
                        const OutlineTable *tables, Problem *problem) {
     static const char *const besides[] = {"links", "test", NULL};
-    const Field *const fields[] = {material_fields, derived_pair_fields, evaluation_fields,
+    const Field *const fields[] = {material_fields, pair_parameters_fields, evaluation_fields,
                                    buffer_fields, NULL};
     const OutlineWay way = {besides, tables, fields};
     Outline outline;

@@ -40,8 +40,8 @@ static Status trace_add(MaterialsCall *call, const char *path, Bytes *body, Prob
     call->about = path;
     Status status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
-        status = trace_text_read(text.at != NULL ? text.at : "", text.count,
-                                 call->settings->interval, &trace, problem);
+        status = force_trace_text_read(text.at != NULL ? text.at : "", text.count,
+                                       call->settings->interval, &trace, problem);
     if (status == STATUS_OK)
         status = trace_write(&trace, path, &json, problem);
     if (status == STATUS_OK)

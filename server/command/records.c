@@ -25,7 +25,7 @@ static const Field records_fields[] = {
     DAEMON_ROWS(RecordsSettings),
     FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: what scenes call it (the file's name without its extension)"),
     FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, where the file does not tell it"),
-    FIELD_CHOICE(RecordsSettings, unit, import_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2, over what the file tells"),
+    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2, over what the file tells"),
     FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: where the file comes from"),
     FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: what was done to it: filters, baseline"),
     FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: which one"),
@@ -126,7 +126,7 @@ static Status send(Daemon *daemon, const RecordsSettings *settings, const char *
     bytes_text(&target, "/v1/records");
     query_put(&target, "name", settings->name != NULL ? settings->name : name);
     query_put(&target, "unit",
-              settings->unit == CHOICE_ABSENT ? NULL : import_unit_names[settings->unit]);
+              settings->unit == CHOICE_ABSENT ? NULL : acceleration_unit_names[settings->unit]);
     query_put(&target, "source", settings->source);
     query_put(&target, "processing", settings->processing);
     query_put(&target, "earthquake", settings->earthquake);

@@ -195,7 +195,7 @@ static Status take_measurement(ImportMeasurement *measurement, char *slug, Excha
     made->slug = slug;
     pointer_join(test, sizeof test, mark->place, "test");
     if (!problem_concerns(problem, test))
-        (void)drop_test_check(&row->test, test, problem);
+        (void)drop_test_validate(&row->test, test, problem);
     made->measurement = number_of(row);
     made->created_unix_ms = read_time(row->created, mark->place, problem);
     mark->has_created = mark->has_created && made->created_unix_ms > 0;

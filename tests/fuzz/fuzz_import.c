@@ -1,6 +1,6 @@
-// Ground motions of every layout, mutated: whatever comes in, import_read answers with samples that
-// are finite and of the count it tells, or with one fault that has a place. Meant for the
-// instrumented build: build-debug/tests/fuzz_import SECONDS [SEED]. What breaks the rule is
+// Ground motions of every layout, mutated: whatever comes in, ground_motion_text_read answers with
+// samples that are finite and of the count it tells, or with one fault that has a place. Meant for
+// the instrumented build: build-debug/tests/fuzz_import SECONDS [SEED]. What breaks the rule is
 // printed.
 #include <math.h>
 #include <stdint.h>
@@ -115,7 +115,7 @@ static size_t mutate(char *text, size_t size) {
     }
 }
 
-static const char *judge(Status status, const Import *import, const Problem *problem) {
+static const char *judge(Status status, const GroundMotionText *import, const Problem *problem) {
     if (status != STATUS_OK) {
         if (import->samples.at != NULL || import->header != NULL)
             return "failed, but left something";
@@ -146,15 +146,16 @@ int main(int argc, char **argv) {
             memcpy(text, seed, size);
             for (size_t mutations = draw(MUTATIONS_MAX + 1); mutations > 0; mutations--)
                 size = mutate(text, size);
-            const ImportRequest request = {draw(2) == 0 ? 0.01 : (double)NAN, (int)draw(4) - 1};
+            const GroundMotionOptions request = {draw(2) == 0 ? 0.01 : (double)NAN,
+                                                 (int)draw(4) - 1};
             // Of its own size, so that a byte read behind it is seen.
             char *own = malloc(size > 0 ? size : 1);
             if (own == NULL)
                 return 1;
             memcpy(own, text, size);
-            Import import;
+            GroundMotionText import;
             problem_clear(&problem);
-            const Status status = import_read(own, size, &request, &import, &problem);
+            const Status status = ground_motion_text_read(own, size, &request, &import, &problem);
             free(own);
             const char *wrong = judge(status, &import, &problem);
             if (wrong != NULL) {
@@ -163,7 +164,7 @@ int main(int argc, char **argv) {
                 return 1;
             }
             passed += status == STATUS_OK;
-            import_clear(&import);
+            ground_motion_text_clear(&import);
         }
     printf("%llu texts, %llu of them read\n", rounds, passed);
     return 0;

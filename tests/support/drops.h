@@ -20,7 +20,7 @@ DropMade drops_simulate(double restitution, double contact_time, Separation sepa
 // A test with so many empty drops; cleared by fields_clear.
 void drops_make(DropTest *test, size_t count);
 
-// The test as JSON, judged: what drop_test_check and the reader say.
+// The test as JSON, judged: what drop_test_validate and the reader say.
 Status drops_read(const char *text, DropTest *test, Problem *problem);
 
 // A normal number of mean 0 and deviation 1, the next of that seed.

@@ -168,9 +168,9 @@ static void what_the_core_simulates_is_read_back(void **state) {
                         closeup.impact.start - interval * (10.1 + 0.23 * (double)(i + j + k));
                     for (size_t n = 0; n < force.count; n++)
                         values[n] = force_at(&closeup, start + (double)n * interval);
-                    const TraceWay way = {.separation = separation, .threshold = (double)NAN};
-                    TraceReading reading;
-                    assert_int_equal(trace_read(interval, &force, &way, "", &reading, NULL),
+                    const TraceOptions way = {.separation = separation, .threshold = (double)NAN};
+                    TraceAnalysis reading;
+                    assert_int_equal(trace_analysis_run(interval, &force, &way, "", &reading, NULL),
                                      STATUS_OK);
                     assert_int_equal(reading.contacts.count, 1);
                     const TraceContact *contact = &reading.contacts.at[0];
@@ -186,7 +186,7 @@ static void what_the_core_simulates_is_read_back(void **state) {
                                  rule(separation), restitutions[i], times[j], rates[k],
                                  closeup.impact.impulse, contact->seen.impulse);
                     worst = fmax(worst, off);
-                    trace_reading_clear(&reading);
+                    trace_analysis_clear(&reading);
                 }
                 closeup_clear(&closeup);
             }

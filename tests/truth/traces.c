@@ -76,10 +76,10 @@ TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials) {
     for (uint64_t trial = 0; trial < trials; trial++) {
         Reals force;
         force.at = traces_draw(cell, seed, trial, &force.count);
-        const TraceWay way = {.separation = cell->separation, .threshold = (double)NAN};
-        TraceReading reading;
+        const TraceOptions way = {.separation = cell->separation, .threshold = (double)NAN};
+        TraceAnalysis reading;
         if (force.at != NULL &&
-            trace_read(interval, &force, &way, "", &reading, NULL) == STATUS_OK) {
+            trace_analysis_run(interval, &force, &way, "", &reading, NULL) == STATUS_OK) {
             score.found += reading.contacts.count == 1;
             const TraceContact *contact = NULL;
             for (size_t i = 0; i < reading.contacts.count; i++)
@@ -106,7 +106,7 @@ TraceScore traces_score(const TraceCell *cell, uint64_t seed, size_t trials) {
                                                    fabs(contact->restitution - cell->restitution));
                 }
             }
-            trace_reading_clear(&reading);
+            trace_analysis_clear(&reading);
         }
         free(force.at);
     }

@@ -44,10 +44,10 @@ static void heights_and_speeds_tell_how_fast(void **state) {
     (void)state;
     accept("{\"drops\": [{\"drop_height\": 0.1, \"rebound_height\": 0.025}, "
            "{\"approach_speed\": 2, \"rebound_speed\": 1, \"contact_time\": 1e-3}]}");
-    assert_near(drop_approach(&test.drops.at[0]), sqrt(2 * 9.80665 * 0.1), 1e-15);
-    assert_near(drop_rebound(&test, &test.drops.at[0]), sqrt(2 * 9.80665 * 0.025), 1e-15);
-    assert_near(drop_approach(&test.drops.at[1]), 2, 0);
-    assert_near(drop_rebound(&test, &test.drops.at[1]), 1, 0);
+    assert_near(drop_approach_speed(&test.drops.at[0]), sqrt(2 * 9.80665 * 0.1), 1e-15);
+    assert_near(drop_rebound_speed(&test, &test.drops.at[0]), sqrt(2 * 9.80665 * 0.025), 1e-15);
+    assert_near(drop_approach_speed(&test.drops.at[1]), 2, 0);
+    assert_near(drop_rebound_speed(&test, &test.drops.at[1]), 1, 0);
     fields_clear(drop_test_fields, &test);
 }
 
@@ -57,12 +57,12 @@ static void a_free_base_takes_part_of_the_rebound(void **state) {
     accept("{\"impactor_mass\": 0.1, \"base\": \"free\", \"base_mass\": 0.9, "
            "\"drops\": [{\"approach_speed\": 2, \"rebound_height\": 0.01}]}");
     const double rise = sqrt(2 * 9.80665 * 0.01), base = (0.1 * 2 + 0.1 * rise) / 0.9;
-    assert_near(drop_rebound(&test, &test.drops.at[0]), rise + base, 1e-15);
-    assert_near(drop_test_mass(&test), effective_mass(0.1, 0.9), 0);
+    assert_near(drop_rebound_speed(&test, &test.drops.at[0]), rise + base, 1e-15);
+    assert_near(drop_test_effective_mass(&test), effective_mass(0.1, 0.9), 0);
     test.base = 0;
-    assert_near(drop_test_mass(&test), 0.1, 0);
+    assert_near(drop_test_effective_mass(&test), 0.1, 0);
     test.base = CHOICE_ABSENT;
-    assert_true(isnan(drop_test_mass(&test)));
+    assert_true(isnan(drop_test_effective_mass(&test)));
     fields_clear(drop_test_fields, &test);
     refuse("{\"base\": \"free\", \"drops\": [{\"drop_height\": 1, \"rebound_height\": 0.01}]}",
            "/drops/0/rebound_height", "needs impactor_mass and base_mass");

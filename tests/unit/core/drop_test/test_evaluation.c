@@ -25,7 +25,7 @@ static void assert_near(double is, double should, double within) {
 static void evaluate(const DropTest *test, Separation separation) {
     const Measurement one = {COUNT_ABSENT, test};
     problem_clear(&problem);
-    const Status status = evaluation_make(&one, 1, separation, NULL, &evaluation, &problem);
+    const Status status = evaluation_run(&one, 1, separation, NULL, &evaluation, &problem);
     if (status != STATUS_OK)
         fail_msg("%s", problem.detail);
 }
@@ -73,7 +73,7 @@ static void simulated_drops_give_back_e_and_contact_time(void **state) {
                         drop->rebound_speed = made.separation;
                     }
                 }
-                assert_int_equal(drop_test_check(&test, "", &problem), STATUS_OK);
+                assert_int_equal(drop_test_validate(&test, "", &problem), STATUS_OK);
                 evaluate(&test, (Separation)rule);
                 assert_near(evaluation.restitution.mean / restitutions[i], 1, 1e-6);
                 assert_near(evaluation.contact_time.mean / times[k], 1, 1e-6);
@@ -182,7 +182,7 @@ static void only_what_counts_widens_the_ranges(void **state) {
          "\"rebound_speed\": 1.9, \"excluded\": \"slipped\"}]}",
          &hot);
     const Measurement tests[] = {{1, &cold}, {2, &hot}};
-    assert_int_equal(evaluation_make(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+    assert_int_equal(evaluation_run(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
                      STATUS_OK);
     assert_near(evaluation.ranges.most_speed, 1, 0);
     assert_near(evaluation.ranges.least_temperature, 20, 0);
@@ -349,8 +349,8 @@ static void a_thousand_drops_are_evaluated(void **state) {
     uint64_t next = 0;
     for (size_t i = 0; i < DROPS_MAX; i++) {
         const double speed = 0.5 + (double)i / DROPS_MAX;
-        const Pull pull = {9.80665, speed, SEPARATION_ZERO_FORCE, false};
-        const Pulled pulled = gravity_pull(&pull, 0.7, 0.01);
+        const GravityLoad pull = {9.80665, speed, SEPARATION_ZERO_FORCE, false};
+        const GravityContact pulled = gravity_apply(&pull, 0.7, 0.01);
         test.drops.at[i].approach_speed = speed;
         test.drops.at[i].rebound_speed =
             speed * pulled.restitution * (1 + 0.01 * drops_noise(3, &next));
@@ -374,7 +374,7 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
          "[{\"contact_time\": 0.002}]}",
          &other);
     const Measurement tests[] = {{4, &one}, {7, &other}};
-    assert_int_equal(evaluation_make(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+    assert_int_equal(evaluation_run(tests, 2, SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
                      STATUS_OK);
     assert_true(is_warned("/measurements/7", "another pair of masses"));
     assert_int_equal(evaluation.rows.at[1].measurement, 7);
@@ -388,20 +388,20 @@ static void other_pairs_and_too_many_readings_are_told(void **state) {
         all[i] = (Measurement){i + 1, &many};
     problem_clear(&problem);
     assert_int_equal(
-        evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+        evaluation_run(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
         STATUS_LIMIT);
     evaluation_clear(&evaluation);
     // Two tests of the most samples go together, many do not; what is there is not looked at.
     double nothing[8] = {0};
     Trace trace = {.interval = 1e-3, .force = {nothing, TRACE_SAMPLES_MAX}};
     const DropTest large = {.traces = {&trace, 1}};
-    assert_int_equal(drop_test_samples(&large), TRACE_SAMPLES_MAX);
+    assert_int_equal(drop_test_sample_count(&large), TRACE_SAMPLES_MAX);
     for (size_t i = 0; i < COUNT(all); i++)
         all[i].test = &large;
-    assert_true(evaluation_samples(all, 2) <= EVALUATION_SAMPLES_MAX);
+    assert_true(evaluation_sample_count(all, 2) <= EVALUATION_SAMPLES_MAX);
     problem_clear(&problem);
     assert_int_equal(
-        evaluation_make(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
+        evaluation_run(all, COUNT(all), SEPARATION_ZERO_FORCE, NULL, &evaluation, &problem),
         STATUS_LIMIT);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &one);
@@ -426,7 +426,7 @@ static void gravity_is_taken_out_only_while_somebody_waits(void **state) {
     const Progress progress = {&asked, refuse_third};
     const Measurement one = {COUNT_ABSENT, &test};
     assert_int_equal(
-        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, &progress, &evaluation, &problem),
+        evaluation_run(&one, 1, SEPARATION_ZERO_PENETRATION, &progress, &evaluation, &problem),
         STATUS_CANCELLED);
     assert_int_equal(asked, 3);
     evaluation_clear(&evaluation);

@@ -27,7 +27,7 @@ static void told_at(const char *const texts[TESTS], char pointer[32]) {
         taken[i] = (Measurement){i + 4, &tests[i]};
     }
     assert_int_equal(
-        evaluation_make(taken, TESTS, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
+        evaluation_run(taken, TESTS, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
     for (size_t i = 0; i < evaluation.warnings.count; i++)
         if (strstr(evaluation.warnings.at[i].detail, "measurement 4 once more") != NULL)

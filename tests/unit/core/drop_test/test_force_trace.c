@@ -53,14 +53,15 @@ static double record_add(Record *record, double start, double e, double T_c, dou
     }
 }
 
-static TraceReading look(const Record *record, const TraceWay *way) {
-    TraceReading reading;
-    assert_int_equal(trace_read(record->interval, &record->force, way, "/force", &reading, NULL),
-                     STATUS_OK);
+static TraceAnalysis look(const Record *record, const TraceOptions *way) {
+    TraceAnalysis reading;
+    assert_int_equal(
+        trace_analysis_run(record->interval, &record->force, way, "/force", &reading, NULL),
+        STATUS_OK);
     return reading;
 }
 
-static const TraceWay usual = {.separation = SEPARATION_ZERO_PENETRATION, .threshold = NAN};
+static const TraceOptions usual = {.separation = SEPARATION_ZERO_PENETRATION, .threshold = NAN};
 
 static void several_contacts_are_found_whatever_sign_and_baseline(void **state) {
     (void)state;
@@ -76,7 +77,7 @@ static void several_contacts_are_found_whatever_sign_and_baseline(void **state) 
             const double u = (double)i / 3000;
             record.values[i] = sign * record.values[i] + 250 + 40 * u - 25 * u * u;
         }
-        TraceReading reading = look(&record, &usual);
+        TraceAnalysis reading = look(&record, &usual);
         assert_int_equal(reading.contacts.count, 4);
         assert_null(reading.why);
         v0 = 1;
@@ -94,7 +95,7 @@ static void several_contacts_are_found_whatever_sign_and_baseline(void **state) 
                         fabs(contact->seen.impulse) < 1.03 * 0.1 * v0 * 1.61);
             assert_true(contact->seen.misfit > 0.6 && contact->seen.misfit < 1.5);
         }
-        trace_reading_clear(&reading);
+        trace_analysis_clear(&reading);
     }
 }
 
@@ -108,16 +109,16 @@ static void a_threshold_reads_contact_times_short_and_by_how_much_is_told(void *
         double peak = 0;
         for (size_t n = 0; n < record.force.count; n++)
             peak = fmax(peak, record.values[n]);
-        TraceWay way = usual;
+        TraceOptions way = usual;
         way.threshold = 0.05 * peak;
-        TraceReading reading = look(&record, &way);
+        TraceAnalysis reading = look(&record, &way);
         assert_int_equal(reading.contacts.count, 1);
         const TraceContact *contact = reading.contacts.at;
         assert_true(fabs(contact->seen.crossing_shortfall - facts[i][1]) < 0.01);
         assert_true(fabs(1 - contact->seen.crossing_time / 0.004 - facts[i][1]) < 0.01);
         assert_true(fabs(contact->seen.crossing_uncertainty - 1e-5 * 0.408248) < 1e-10);
         assert_true(fabs(contact->contact_time / 0.004 - 1) < 1e-3);
-        trace_reading_clear(&reading);
+        trace_analysis_clear(&reading);
     }
 }
 
@@ -129,13 +130,13 @@ static void contacts_cut_off_by_the_trace_get_no_figure(void **state) {
     for (int end = 0; end < 2; end++) {
         Record part = record;
         part.force = (Reals){part.values + (end == 0 ? 215 : 0), end == 0 ? 185 : 215};
-        TraceReading reading = look(&part, &usual);
+        TraceAnalysis reading = look(&part, &usual);
         assert_int_equal(reading.contacts.count, 1);
         const TraceContact *contact = reading.contacts.at;
         assert_non_null(strstr(contact->why, end == 0 ? "begins during" : "ends during"));
         assert_true(isnan(contact->contact_time) && isnan(contact->most_contact_time));
         assert_true(contact->least_contact_time > 0 && contact->least_contact_time < 0.004);
-        trace_reading_clear(&reading);
+        trace_analysis_clear(&reading);
     }
 }
 
@@ -144,14 +145,14 @@ static void few_samples_get_an_interval_and_a_plain_sentence(void **state) {
     Record record;
     record_new(&record, 1e-3, 60, 0.05);
     record_add(&record, 0.0303, 0.5, 0.003, 0.1, 1, 0, SEPARATION_ZERO_PENETRATION);
-    TraceReading reading = look(&record, &usual);
+    TraceAnalysis reading = look(&record, &usual);
     assert_int_equal(reading.contacts.count, 1);
     const TraceContact *contact = reading.contacts.at;
     assert_non_null(strstr(contact->why, "samples are in contact"));
     assert_true(isnan(contact->contact_time) && isnan(contact->restitution));
     assert_true(contact->least_contact_time <= 0.003 && contact->most_contact_time >= 0.003);
     assert_true(contact->most_contact_time < 0.012);
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
 }
 
 static void the_other_rule_s_pulse_is_told_to_be_none_of_this(void **state) {
@@ -160,17 +161,17 @@ static void the_other_rule_s_pulse_is_told_to_be_none_of_this(void **state) {
         Record record;
         record_new(&record, 1e-4, 400, 0.2);
         record_add(&record, 0.02, 0.4, 0.004, 0.1, 1, 0, rule);
-        TraceWay way = usual;
+        TraceOptions way = usual;
         way.separation = rule;
-        TraceReading right = look(&record, &way);
+        TraceAnalysis right = look(&record, &way);
         way.separation = !rule;
-        TraceReading wrong = look(&record, &way);
+        TraceAnalysis wrong = look(&record, &way);
         assert_null(right.contacts.at[0].why);
         assert_non_null(wrong.contacts.at[0].why);
         assert_non_null(strstr(wrong.contacts.at[0].why, rule == 0 ? "zero_force" : "zero_pene"));
         assert_true(wrong.contacts.at[0].seen.misfit > 2);
-        trace_reading_clear(&right);
-        trace_reading_clear(&wrong);
+        trace_analysis_clear(&right);
+        trace_analysis_clear(&wrong);
     }
 }
 
@@ -180,7 +181,7 @@ static void what_is_no_pulse_gets_no_figure(void **state) {
     record_new(&record, 1e-4, 400, 0.001);
     for (size_t i = 100; i < 140; i++)
         record.values[i] += i % 8 < 4 ? 1 : 0.2;
-    TraceReading reading = look(&record, &usual);
+    TraceAnalysis reading = look(&record, &usual);
     assert_true(reading.contacts.count >= 1);
     for (size_t i = 0; i < reading.contacts.count; i++) {
         const TraceContact *contact = &reading.contacts.at[i];
@@ -189,7 +190,7 @@ static void what_is_no_pulse_gets_no_figure(void **state) {
         assert_true(isnan(contact->seen.start) && isnan(contact->seen.end));
         assert_int_equal(contact->seen.pulse.count, 0);
     }
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
 }
 
 static void no_contact_at_all_is_said(void **state) {
@@ -199,10 +200,10 @@ static void no_contact_at_all_is_said(void **state) {
         record_new(&record, 1e-4, 2000, kind == 0 ? 1 : 0);
         for (size_t i = 0; i < 2000; i++)
             record.values[i] += kind == 2 ? 0.3 * (double)i : kind == 3 ? sin(0.7 * (double)i) : 4;
-        TraceReading reading = look(&record, &usual);
+        TraceAnalysis reading = look(&record, &usual);
         assert_int_equal(reading.contacts.count, 0);
         assert_non_null(strstr(reading.why, "threshold"));
-        trace_reading_clear(&reading);
+        trace_analysis_clear(&reading);
     }
 }
 
@@ -217,14 +218,14 @@ static void gravity_is_taken_out_where_it_is_told(void **state) {
             const double lasted =
                 record_add(&record, 0.2001, 0.61, 0.025, 0.1107, speeds[i], 9.81, rule);
             assert_true(lasted > 0.026);
-            TraceWay way = usual;
+            TraceOptions way = usual;
             way.separation = rule;
             way.gravity = 9.81;
             way.approach_speeds = &speeds[i];
             way.approach_speed_count = 1;
             way.effective_mass = (double)NAN;
             for (int by_mass = 0; by_mass < 2; by_mass++) {
-                TraceReading reading = look(&record, &way);
+                TraceAnalysis reading = look(&record, &way);
                 assert_int_equal(reading.contacts.count, 1);
                 const TraceContact *contact = reading.contacts.at;
                 assert_null(contact->why);
@@ -233,15 +234,15 @@ static void gravity_is_taken_out_where_it_is_told(void **state) {
                     fail_msg("rule %d at %g m/s, %s: %g s", rule, speeds[i],
                              by_mass ? "by mass" : "by speed", contact->contact_time);
                 assert_true(fabs(contact->restitution - 0.61) < 5e-3);
-                trace_reading_clear(&reading);
+                trace_analysis_clear(&reading);
                 way.approach_speed_count = 0;
                 way.effective_mass = 0.1107;
             }
             way.effective_mass = (double)NAN;
-            TraceReading reading = look(&record, &way);
+            TraceAnalysis reading = look(&record, &way);
             assert_true(reading.contacts.at[0].contact_time > 0);
             assert_non_null(strstr(reading.contacts.at[0].why, "gravity"));
-            trace_reading_clear(&reading);
+            trace_analysis_clear(&reading);
         }
 }
 
@@ -252,13 +253,13 @@ static void a_coarse_converter_is_no_contact(void **state) {
     record_add(&record, 0.05, 0.5, 0.004, 0.1, 1, 0, SEPARATION_ZERO_FORCE);
     for (size_t i = 0; i < record.force.count; i++)
         record.values[i] = round(record.values[i]) + 512;
-    TraceWay way = usual;
+    TraceOptions way = usual;
     way.separation = SEPARATION_ZERO_FORCE;
-    TraceReading reading = look(&record, &way);
+    TraceAnalysis reading = look(&record, &way);
     assert_int_equal(reading.contacts.count, 1);
     assert_null(reading.contacts.at[0].why);
     assert_true(fabs(reading.contacts.at[0].contact_time / 0.004 - 1) < 0.05);
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
 }
 
 static void the_pulse_is_drawn_over_the_trace(void **state) {
@@ -274,10 +275,10 @@ static void the_pulse_is_drawn_over_the_trace(void **state) {
         record_add(&fine, 0.001, 0.7, 0.004, 0.1, 1, 0, rule);
         for (size_t i = 0; i < record.force.count; i++)
             record.values[i] = 17 + 0.1 * (double)i - record.values[i];
-        TraceWay way = usual;
+        TraceOptions way = usual;
         way.separation = rule;
-        TraceReading reading = look(&record, &way);
-        const TraceSeen *seen = &reading.contacts.at[0].seen;
+        TraceAnalysis reading = look(&record, &way);
+        const TraceDetection *seen = &reading.contacts.at[0].seen;
         assert_int_equal(seen->pulse.count, TRACE_PULSE);
         for (size_t i = 1; i + 1 < TRACE_PULSE; i++) {
             const double share = (double)i / (TRACE_PULSE - 1);
@@ -287,21 +288,22 @@ static void the_pulse_is_drawn_over_the_trace(void **state) {
             if (!(fabs(drawn - force) < 3e-3 * fabs(seen->peak)))
                 fail_msg("rule %d, point %zu: %g N in place of %g N", rule, i, drawn, force);
         }
-        trace_reading_clear(&reading);
+        trace_analysis_clear(&reading);
     }
 }
 
 static void assert_refused(double interval, double *values, size_t count, const char *words) {
     const Reals force = {values, count};
-    TraceReading reading;
+    TraceAnalysis reading;
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(trace_read(interval, &force, &usual, "/traces/0/force", &reading, &problem),
-                     STATUS_INVALID);
+    assert_int_equal(
+        trace_analysis_run(interval, &force, &usual, "/traces/0/force", &reading, &problem),
+        STATUS_INVALID);
     assert_string_equal(problem.faults[0].pointer, "/traces/0/force");
     if (strstr(problem.faults[0].detail, words) == NULL)
         fail_msg("\"%s\" has no \"%s\"", problem.faults[0].detail, words);
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
 }
 
 static void what_cannot_be_read_is_a_fault(void **state) {
@@ -322,10 +324,10 @@ static void many_contacts_end_at_a_limit_that_is_told(void **state) {
     record_new(&record, 1e-4, 4000, 0);
     for (size_t i = 10; i < 4000; i += 10)
         record.values[i] = 1 + 1e-6 * (double)i;
-    TraceReading reading = look(&record, &usual);
+    TraceAnalysis reading = look(&record, &usual);
     assert_int_equal(reading.contacts.count, TRACE_CONTACTS_MAX);
     assert_non_null(strstr(reading.why, "only the first"));
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
 }
 
 int main(void) {

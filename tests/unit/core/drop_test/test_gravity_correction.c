@@ -23,8 +23,8 @@ static void a_pulled_contact_is_the_solvers(void **state) {
         for (size_t i = 0; i < COUNT(restitutions); i++) {
             const DropMade made =
                 drops_simulate(restitutions[i], 0.02, (Separation)rule, 0.8, 9.80665);
-            const Pull pull = {9.80665, made.approach, (Separation)rule, false};
-            const Pulled pulled = gravity_pull(&pull, restitutions[i], 0.02);
+            const GravityLoad pull = {9.80665, made.approach, (Separation)rule, false};
+            const GravityContact pulled = gravity_apply(&pull, restitutions[i], 0.02);
             if (isnan(made.separation)) { // it stays in the buffer
                 assert_true(pulled.restitution == 0 && isinf(pulled.contact_time));
                 continue;
@@ -37,12 +37,12 @@ static void a_pulled_contact_is_the_solvers(void **state) {
 // PHYSICS.md tells the sponge's: 24 % longer and e 29 % low at 0.3 m/s, 7 % and 7 % at 1 m/s.
 static void the_sponges_contact_is_as_much_longer_as_is_known(void **state) {
     (void)state;
-    Pull pull = {9.81, 0.3, SEPARATION_ZERO_PENETRATION, false};
-    Pulled pulled = gravity_pull(&pull, 0.61, 0.025);
+    GravityLoad pull = {9.81, 0.3, SEPARATION_ZERO_PENETRATION, false};
+    GravityContact pulled = gravity_apply(&pull, 0.61, 0.025);
     assert_near(pulled.contact_time / 0.025, 1.24, 0.005);
     assert_near(1 - pulled.restitution / 0.61, 0.29, 0.005);
     pull.speed = 1;
-    pulled = gravity_pull(&pull, 0.61, 0.025);
+    pulled = gravity_apply(&pull, 0.61, 0.025);
     assert_near(pulled.contact_time / 0.025, 1.07, 0.005);
     assert_near(1 - pulled.restitution / 0.61, 0.07, 0.005);
 }
@@ -51,8 +51,8 @@ static void without_a_pull_nothing_changes(void **state) {
     (void)state;
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(restitutions); i++) {
-            const Pull pull = {0, 1, (Separation)rule, false};
-            const Pulled pulled = gravity_pull(&pull, restitutions[i], 0.01);
+            const GravityLoad pull = {0, 1, (Separation)rule, false};
+            const GravityContact pulled = gravity_apply(&pull, restitutions[i], 0.01);
             assert_near(pulled.restitution, restitutions[i], 1e-12);
             assert_near(pulled.contact_time, 0.01, 1e-14);
         }
@@ -64,48 +64,48 @@ static void gravity_is_taken_out_again(void **state) {
     for (int rule = 0; rule < 2; rule++)
         for (int height = 0; height < 2; height++)
             for (size_t i = 0; i < COUNT(restitutions); i++) {
-                const Pull pull = {9.80665, 0.7, (Separation)rule, height == 1};
-                const Pulled pulled = gravity_pull(&pull, restitutions[i], 0.02);
+                const GravityLoad pull = {9.80665, 0.7, (Separation)rule, height == 1};
+                const GravityContact pulled = gravity_apply(&pull, restitutions[i], 0.02);
                 if (!(pulled.restitution > 0)) {
                     // It parts inside the buffer, if at all, and does not rise above it.
                     assert_int_equal(rule, SEPARATION_ZERO_FORCE);
                     assert_true(++stay <= 2);
                     continue;
                 }
-                const Unpulled read = {pulled.restitution, pulled.contact_time, 0.01, 0.02};
-                Unpulled isolated;
-                assert_true(gravity_remove(&pull, &read, &isolated));
+                const GravityCorrected read = {pulled.restitution, pulled.contact_time, 0.01, 0.02};
+                GravityCorrected isolated;
+                assert_true(gravity_correct(&pull, &read, &isolated));
                 assert_near(isolated.restitution, restitutions[i], 1e-6);
                 assert_near(isolated.contact_time, 0.02, 1e-7);
                 // Errors of what was read reach what comes of it by the slopes of the way back.
-                Unpulled more = read, less = read, moved, other;
+                GravityCorrected more = read, less = read, moved, other;
                 more.restitution *= 1.0001;
                 less.contact_time *= 1.0001;
                 if (restitutions[i] < 0.9) {
-                    assert_true(gravity_remove(&pull, &more, &moved));
-                    assert_true(gravity_remove(&pull, &less, &other));
+                    assert_true(gravity_correct(&pull, &more, &moved));
+                    assert_true(gravity_correct(&pull, &less, &other));
                     const double by_e = log(moved.restitution / isolated.restitution) / 1e-4;
                     const double by_T = log(other.restitution / isolated.restitution) / 1e-4;
                     assert_near(isolated.restitution_uncertainty / hypot(by_e * 0.01, by_T * 0.02),
                                 1, 0.01);
                 }
                 double value;
-                assert_true(gravity_remove_restitution(&pull, pulled.restitution, 0.02, &value));
+                assert_true(gravity_correct_restitution(&pull, pulled.restitution, 0.02, &value));
                 assert_near(value, restitutions[i], 1e-9);
-                assert_true(gravity_remove_contact_time(&pull, pulled.contact_time, restitutions[i],
-                                                        &value));
+                assert_true(gravity_correct_contact_time(&pull, pulled.contact_time,
+                                                         restitutions[i], &value));
                 assert_near(value, 0.02, 1e-10);
             }
 }
 
 static void what_no_contact_comes_to_is_told(void **state) {
     (void)state;
-    const Pull pull = {9.80665, 0.1, SEPARATION_ZERO_PENETRATION, false};
+    const GravityLoad pull = {9.80665, 0.1, SEPARATION_ZERO_PENETRATION, false};
     double value;
-    assert_false(gravity_remove_restitution(&(Pull){9.80665, 0.3, SEPARATION_ZERO_FORCE, true}, 1.5,
-                                            0.025, &value));
+    assert_false(gravity_correct_restitution(
+        &(GravityLoad){9.80665, 0.3, SEPARATION_ZERO_FORCE, true}, 1.5, 0.025, &value));
     // The impactor stays in a soft buffer.
-    const Pulled stays = gravity_pull(&pull, 0.3, 0.1);
+    const GravityContact stays = gravity_apply(&pull, 0.3, 0.1);
     assert_true(stays.restitution == 0 && isinf(stays.contact_time));
 }
 

@@ -14,7 +14,7 @@
 
 static Problem problem;
 static Evaluation evaluation;
-static Proposal proposal;
+static MaterialProposal proposal;
 static DropTest tests_read[2];
 static Material before;
 
@@ -41,7 +41,7 @@ static int tear_down(void **state) {
     fields_clear(material_fields, &before);
     fields_clear(drop_test_fields, &tests_read[0]);
     fields_clear(drop_test_fields, &tests_read[1]);
-    proposal_clear(&proposal);
+    material_proposal_clear(&proposal);
     evaluation_clear(&evaluation);
     return 0;
 }
@@ -54,10 +54,11 @@ static void propose(const char *const *texts, size_t count, ProposalForm form) {
         tests[i] = (Measurement){10 + i, &tests_read[i]};
     }
     assert_int_equal(
-        evaluation_make(tests, count, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
+        evaluation_run(tests, count, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
-    assert_int_equal(proposal_make(&evaluation, tests, count, &before, form, &proposal, &problem),
-                     STATUS_OK);
+    assert_int_equal(
+        material_proposal_run(&evaluation, tests, count, &before, form, &proposal, &problem),
+        STATUS_OK);
     // What is proposed would be taken.
     if (proposal.why == NULL && material_check(&proposal.material, "", &problem) != STATUS_OK)
         fail_msg("%s", problem.detail);
@@ -205,7 +206,7 @@ static void readings_weigh_in_a_table_as_in_a_constant(void **state) {
     assert_true(fabs(e->mean / e->unweighted_mean - 1) > 1e-3);
     assert_near(deviation, fmax(e->scatter, e->standard_error), 0);
     assert_true(deviation < e->deviation);
-    proposal_clear(&proposal);
+    material_proposal_clear(&proposal);
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &tests_read[0]);
     propose((const char *const[]){table}, 1, PROPOSAL_TABLE);

@@ -15,7 +15,7 @@
 #include "tests/support/fields.h"
 
 static Problem problem;
-static DerivedPair pair;
+static PairParameters pair;
 static Material material;
 
 static void assert_near(double is, double should, double within) {
@@ -41,14 +41,14 @@ static int set_up(void **state) {
 static int tear_down(void **state) {
     (void)state;
     fields_clear(material_fields, &material);
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     return 0;
 }
 
 static void derive(double damper, double structure, int identified_for, int separation) {
-    assert_int_equal(
-        derived_make(&material, damper, structure, identified_for, separation, &pair, &problem),
-        STATUS_OK);
+    assert_int_equal(pair_parameters_run(&material, damper, structure, identified_for, separation,
+                                         &pair, &problem),
+                     STATUS_OK);
 }
 
 static bool is_warned(const char *pointer, const char *says) {
@@ -66,7 +66,7 @@ static void both_rules_are_told_for_the_pair(void **state) {
     for (int rule = 0; rule < 2; rule++) {
         const Identified it =
             identify_measured(effective_mass(0.1107, 1.35), 0.61, 0.025, (Separation)rule);
-        const DerivedContact *contact = &pair.contacts.at[rule];
+        const PairContact *contact = &pair.contacts.at[rule];
         assert_int_equal(contact->separation, rule);
         assert_near(contact->stiffness.value, it.stiffness, 0);
         assert_near(contact->damping.value, it.damping, 0);
@@ -84,10 +84,10 @@ static void uncertainties_are_those_of_drawn_readings(void **state) {
     for (int for_rig = 0; for_rig < 2; for_rig++)
         for (int rule = 0; rule < 2; rule++) {
             derive(0.3, 2, for_rig, rule);
-            const DerivedContact *contact = &pair.contacts.at[0];
-            const DerivedFigure *figures[] = {&contact->stiffness, &contact->damping,
-                                              &contact->damping_ratio, &contact->restitution,
-                                              &contact->contact_time};
+            const PairContact *contact = &pair.contacts.at[0];
+            const PairFigure *figures[] = {&contact->stiffness, &contact->damping,
+                                           &contact->damping_ratio, &contact->restitution,
+                                           &contact->contact_time};
             double sums[5] = {0}, squares[5] = {0};
             int inside[5] = {0};
             uint64_t next = 0;
@@ -115,7 +115,7 @@ static void uncertainties_are_those_of_drawn_readings(void **state) {
                 assert_near(figures[k]->uncertainty / deviation, 1, 0.03);
                 assert_in_range(inside[k], 0.94 * DRAWN, 0.96 * DRAWN);
             }
-            derived_pair_clear(&pair);
+            pair_parameters_clear(&pair);
         }
 }
 
@@ -130,15 +130,15 @@ static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
     assert_near(pair.contacts.at[0].contact_time.value, it.contact_time, 0);
     assert_true(is_warned("/effective_mass", "355 % above the test's 0.11 kg"));
     assert_true(is_warned("/effective_mass", "are carried over"));
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     // Of the test's own pair it is the same thing.
     derive(0.11, (double)NAN, IDENTIFIED_FOR_RIG, SEPARATION_ZERO_FORCE);
     assert_near(pair.contacts.at[0].restitution.value, 0.61, 1e-12);
     assert_int_equal(pair.warnings.count, 0);
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     material.base = CHOICE_ABSENT;
-    assert_int_equal(derived_make(&material, 0.5, (double)NAN, IDENTIFIED_FOR_RIG, CHOICE_ABSENT,
-                                  &pair, &problem),
+    assert_int_equal(pair_parameters_run(&material, 0.5, (double)NAN, IDENTIFIED_FOR_RIG,
+                                         CHOICE_ABSENT, &pair, &problem),
                      STATUS_INVALID);
     assert_non_null(strstr(detail_at(&problem, "/identified_for"), "does not state the test's"));
 }
@@ -147,11 +147,11 @@ static void another_pair_is_warned_of(void **state) {
     (void)state;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_int_equal(pair.warnings.count, 0);
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     derive(0.22, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_true(is_warned("/effective_mass", "100 % above"));
     assert_true(is_warned("/effective_mass", "e would be 0.707 in place of 0.61"));
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     material.base = CHOICE_ABSENT;
     material.least_speed = (double)NAN;
     material.separation = SEPARATION_ZERO_FORCE;
@@ -177,7 +177,7 @@ static void what_is_not_stated_has_no_uncertainty(void **state) {
     (void)state;
     material.contact_time_deviation = (double)NAN;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, SEPARATION_ZERO_FORCE);
-    const DerivedContact *contact = &pair.contacts.at[0];
+    const PairContact *contact = &pair.contacts.at[0];
     assert_true(isnan(contact->stiffness.uncertainty) && isnan(contact->stiffness.low));
     assert_true(contact->damping_ratio.uncertainty > 0);
     assert_true(is_warned("/contacts", "no standard deviation of T_c"));
@@ -192,7 +192,7 @@ static void e_of_one_and_of_none_are_borders(void **state) {
         assert_true(pair.contacts.at[rule].stiffness.value > 0);
         assert_near(pair.contacts.at[rule].restitution.high, 1, 0);
     }
-    derived_pair_clear(&pair);
+    pair_parameters_clear(&pair);
     material.restitution = 0;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_true(isnan(pair.contacts.at[0].stiffness.value));

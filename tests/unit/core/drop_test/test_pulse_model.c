@@ -14,7 +14,7 @@ static const double pulls[] = {1e-12, 1e-6, 0.05, 0.3, 1, 2, 5, 20};
 
 // y'' + 2 L y' + (turn + L^2) y = pull from y = 0, y' = 1 by Runge and Kutta's method, until y or
 // the force is back at 0; INFINITY: not within 8 T_c.
-static double last(const TraceShape *shape, int separation) {
+static double last(const PulseModel *shape, int separation) {
     const double h = 1e-4, c = 2 * shape->decay;
     const double k = shape->turn + shape->decay * shape->decay, g = shape->pull;
     double y = 0, v = 1, before = 0;
@@ -39,7 +39,7 @@ static void a_pull_lengthens_a_pulse_as_the_motion_says(void **state) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
             for (size_t j = 0; j < COUNT(pulls); j++) {
-                const TraceShape shape = trace_shape(decays[i], pulls[j], rule);
+                const PulseModel shape = pulse_model_make(decays[i], pulls[j], rule);
                 const double should = last(&shape, rule);
                 if (isinf(should)) {
                     assert_true(isinf(shape.length));
@@ -57,18 +57,18 @@ static void the_pull_is_known_by_how_long_the_pulse_lasts(void **state) {
     for (int rule = 0; rule < 2; rule++)
         for (size_t i = 0; i < COUNT(decays); i++)
             for (size_t j = 0; j < COUNT(pulls); j++) {
-                const TraceShape shape = trace_shape(decays[i], pulls[j], rule);
+                const PulseModel shape = pulse_model_make(decays[i], pulls[j], rule);
                 if (isinf(shape.length))
                     continue;
-                const TraceShape same =
-                    trace_shape_lasting(decays[i], pulls[j] * shape.length, rule);
+                const PulseModel same =
+                    pulse_model_make_lasting(decays[i], pulls[j] * shape.length, rule);
                 if (!(fabs(same.length - shape.length) < 1e-9))
                     fail_msg("rule %d, L = %g, pull %g: %.12g should be %.12g", rule, decays[i],
                              pulls[j], same.length, shape.length);
                 assert_true(fabs(same.pull / shape.pull - 1) < 1e-9);
             }
-    assert_true(isinf(trace_shape_lasting(0.7, 100, SEPARATION_ZERO_PENETRATION).length));
-    assert_true(isinf(trace_shape_lasting(0.7, 100, SEPARATION_ZERO_FORCE).length));
+    assert_true(isinf(pulse_model_make_lasting(0.7, 100, SEPARATION_ZERO_PENETRATION).length));
+    assert_true(isinf(pulse_model_make_lasting(0.7, 100, SEPARATION_ZERO_FORCE).length));
 }
 
 int main(void) {

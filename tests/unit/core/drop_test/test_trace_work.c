@@ -25,14 +25,14 @@ static const double interval = 1e-3, T_c = 0.02, m_e = 0.1, v0 = 0.5;
 static size_t work(double pull, int separation, bool by_mass) {
     double values[COUNT_MAX];
     noise_normal_pairs(5, 7, 0, COUNT_MAX / 2, values);
-    const TraceShape shape = trace_shape(0.25, pull, separation);
+    const PulseModel shape = pulse_model_make(0.25, pull, separation);
     for (size_t i = 0; i < COUNT_MAX; i++) {
         const double s = ((double)i - 290.37) * interval / T_c;
         values[i] *= 0.02;
         if (s >= 0 && s <= shape.length)
-            values[i] += m_e * v0 / T_c * trace_shape_force(&shape, s);
+            values[i] += m_e * v0 / T_c * pulse_model_force(&shape, s);
     }
-    const TraceWay way = {
+    const TraceOptions way = {
         .separation = separation,
         .threshold = (double)NAN,
         .gravity = pull * v0 / T_c,
@@ -40,16 +40,16 @@ static size_t work(double pull, int separation, bool by_mass) {
         .approach_speeds = &v0,
         .approach_speed_count = by_mass ? 0 : 1,
     };
-    TraceReading reading;
+    TraceAnalysis reading;
     const size_t before = looks;
     assert_int_equal(
-        trace_read(interval, &(Reals){values, COUNT_MAX}, &way, "/force", &reading, NULL),
+        trace_analysis_run(interval, &(Reals){values, COUNT_MAX}, &way, "/force", &reading, NULL),
         STATUS_OK);
     assert_int_equal(reading.contacts.count, 1);
     if (reading.contacts.at[0].why != NULL)
         fail_msg("%s", reading.contacts.at[0].why);
     assert_true(fabs(reading.contacts.at[0].contact_time / T_c - 1) < 0.03);
-    trace_reading_clear(&reading);
+    trace_analysis_clear(&reading);
     return looks - before;
 }
 

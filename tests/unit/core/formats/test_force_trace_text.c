@@ -20,7 +20,7 @@ static Status read_text(const char *text, double interval, Trace *trace) {
     memcpy(copy, text, size);
     *trace = (Trace){0};
     problem_clear(&problem);
-    const Status status = trace_text_read(copy, size, interval, trace, &problem);
+    const Status status = force_trace_text_read(copy, size, interval, trace, &problem);
     free(copy);
     assert_true(status == STATUS_OK || trace->force.at == NULL);
     return status;

@@ -10,40 +10,40 @@
 
 #include <cmocka.h>
 
-#include "core/formats/ground_motion_text.h"
 #include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
 
 static Problem problem;
-static const ImportRequest nothing = {NAN, CHOICE_ABSENT}, in_g = {NAN, IMPORT_G},
-                           whole = {0.02, IMPORT_METRES};
+static const GroundMotionOptions nothing = {NAN, CHOICE_ABSENT}, in_g = {NAN, ACCELERATION_G},
+                                 whole = {0.02, ACCELERATION_METRES};
 
 #define PEER                                                                                       \
     "PEER STRONG MOTION DATABASE RECORD\nSOMEWHERE 01/02/03, STATION 7, 090\n"                     \
     "ACCELERATION TIME HISTORY IN UNITS OF G\n"
 
-static Import good(const char *text, const ImportRequest *request) {
-    Import import;
+static GroundMotionText good(const char *text, const GroundMotionOptions *request) {
+    GroundMotionText import;
     problem_clear(&problem);
-    if (import_read(text, strlen(text), request, &import, &problem) != STATUS_OK)
+    if (ground_motion_text_read(text, strlen(text), request, &import, &problem) != STATUS_OK)
         fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
     return import;
 }
 
 // Bytes of their own, so that a sanitizer sees what is read behind them.
-static Status read_bytes(const char *text, size_t size, const ImportRequest *request) {
+static Status read_bytes(const char *text, size_t size, const GroundMotionOptions *request) {
     char *copy = malloc(size > 0 ? size : 1);
     memcpy(copy, text, size);
-    Import import;
+    GroundMotionText import;
     problem_clear(&problem);
-    const Status status = import_read(copy, size, request, &import, &problem);
+    const Status status = ground_motion_text_read(copy, size, request, &import, &problem);
     free(copy);
     assert_true(status == STATUS_OK || (import.samples.at == NULL && import.header == NULL));
     if (status == STATUS_OK)
-        import_clear(&import);
+        ground_motion_text_clear(&import);
     return status;
 }
 
-static void bad(const char *text, const ImportRequest *request, const char *place,
+static void bad(const char *text, const GroundMotionOptions *request, const char *place,
                 const char *detail) {
     if (read_bytes(text, strlen(text), request) == STATUS_OK)
         fail_msg("passed: %s", text);
@@ -53,12 +53,13 @@ static void bad(const char *text, const ImportRequest *request, const char *plac
         fail_msg("%s: said \"%s\", not \"%s\"", place, problem.faults[0].detail, detail);
 }
 
-static void check(Import import, const char *layout, size_t count, double interval, double last) {
+static void check(GroundMotionText import, const char *layout, size_t count, double interval,
+                  double last) {
     assert_string_equal(import.layout, layout);
     assert_int_equal(import.samples.count, count);
     assert_true(import.interval == interval);
     assert_true(fabs(import.samples.at[count - 1] - last) <= 1e-15 * fabs(last));
-    import_clear(&import);
+    ground_motion_text_clear(&import);
     assert_null(import.samples.at);
 }
 
@@ -73,9 +74,9 @@ static void peers_old_and_new_headers_are_read(void **state) {
     for (size_t i = 0; i < COUNT(headers); i++) {
         snprintf(text, sizeof text, PEER "%s  -.1E-02   .2E-02   .3E-02   .4E-02\n .5E-2 -.6E-2",
                  headers[i]);
-        Import import = good(text, &nothing);
-        assert_int_equal(import.unit, IMPORT_G);
-        assert_int_equal(import.stated_unit, IMPORT_G);
+        GroundMotionText import = good(text, &nothing);
+        assert_int_equal(import.unit, ACCELERATION_G);
+        assert_int_equal(import.stated_unit, ACCELERATION_G);
         assert_true(import.samples.at[0] == -.1e-2 * 9.80665);
         assert_non_null(strstr(import.header, "STATION 7, 090; ACCELERATION"));
         check(import, "at2", 6, 0.01, -.6e-2 * 9.80665);
@@ -93,7 +94,7 @@ static void marks_bound_the_numbers(void **state) {
                &nothing),
           "at2", 4, 0.02, 4 * 9.80665);
     check(good("The units are (g)\n1 2\n*** Begin data ***\n 3 4\n 5 6\n*** End data ***\n",
-               &(ImportRequest){0.02, CHOICE_ABSENT}),
+               &(GroundMotionOptions){0.02, CHOICE_ABSENT}),
           "columns", 4, 0.02, 6 * 9.80665);
     check(good("   0.00630   0.00364\n  -0.00128\n*** End Data ***\n\n", &whole), "columns", 3,
           0.02, -0.00128);
@@ -102,7 +103,8 @@ static void marks_bound_the_numbers(void **state) {
 
 static void a_count_and_an_interval_may_stand_before_one_column(void **state) {
     (void)state;
-    check(good("some motion\n3 0.0100\n2.42E-07\n\n1d-3\n-3", &(ImportRequest){NAN, IMPORT_METRES}),
+    check(good("some motion\n3 0.0100\n2.42E-07\n\n1d-3\n-3",
+               &(GroundMotionOptions){NAN, ACCELERATION_METRES}),
           "count_line", 3, 0.01, -3);
     bad("some motion\n4 0.0100\n1\n2\n3\n", &whole, "line 2",
         "must tell how many values follow: tells 4, but 3 follow, the last on line 5");
@@ -139,13 +141,13 @@ static void units_are_found_or_must_be_given(void **state) {
         const char *header;
         int unit;
     } units[] = {
-        {"UNITS OF G. FILTER POINTS: HP=0.2 Hz", IMPORT_G},
-        {"acceleration, m/s^2", IMPORT_METRES},
-        {"Accel (m/s/s)", IMPORT_METRES},
-        {"in m/sec2", IMPORT_METRES},
-        {"accel. in cm/sec/sec", IMPORT_CENTIMETRES},
+        {"UNITS OF G. FILTER POINTS: HP=0.2 Hz", ACCELERATION_G},
+        {"acceleration, m/s^2", ACCELERATION_METRES},
+        {"Accel (m/s/s)", ACCELERATION_METRES},
+        {"in m/sec2", ACCELERATION_METRES},
+        {"accel. in cm/sec/sec", ACCELERATION_CENTIMETRES},
         {"peak 3 m/s and 0.3 g", CHOICE_ABSENT},
-        {"unit: gal", IMPORT_CENTIMETRES},
+        {"unit: gal", ACCELERATION_CENTIMETRES},
         {"UNITS OF G/10", CHOICE_ABSENT},
         {"mm/s^2", CHOICE_ABSENT},
         {"Gallery G", CHOICE_ABSENT},
@@ -153,15 +155,18 @@ static void units_are_found_or_must_be_given(void **state) {
     char text[256];
     for (size_t i = 0; i < COUNT(units); i++) {
         snprintf(text, sizeof text, "%s\nNPTS=2, DT=1\n1 2", units[i].header);
-        Import import = good(text, &nothing);
+        GroundMotionText import = good(text, &nothing);
         if (import.stated_unit != units[i].unit)
             fail_msg("%s", units[i].header);
-        assert_int_equal(import.unit, units[i].unit == CHOICE_ABSENT ? IMPORT_G : units[i].unit);
-        import_clear(&import);
+        assert_int_equal(import.unit,
+                         units[i].unit == CHOICE_ABSENT ? ACCELERATION_G : units[i].unit);
+        ground_motion_text_clear(&import);
     }
-    check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}), "columns", 3, 1, 0.03);
-    check(good("unit: gal\n1 2\n3\n", &(ImportRequest){1, IMPORT_METRES}), "columns", 3, 1, 3);
-    bad("1\n2\n3\n", &(ImportRequest){1, CHOICE_ABSENT}, "line 1",
+    check(good("unit: gal\n1 2\n3\n", &(GroundMotionOptions){1, CHOICE_ABSENT}), "columns", 3, 1,
+          0.03);
+    check(good("unit: gal\n1 2\n3\n", &(GroundMotionOptions){1, ACCELERATION_METRES}), "columns", 3,
+          1, 3);
+    bad("1\n2\n3\n", &(GroundMotionOptions){1, CHOICE_ABSENT}, "line 1",
         "must tell the unit, or unit must be given: g, m/s^2");
     bad("units (g)\nor m/s^2\nNPTS=2, DT=1\n1 2", &nothing, "line 2",
         "tells another unit than line 1, g");
@@ -175,7 +180,7 @@ static void what_is_not_told_must_be_given(void **state) {
     (void)state;
     bad("1\n2\n3\n", &in_g, "line 1", "must tell the interval");
     bad(PEER "NPTS= 3\n1 2 3", &nothing, "line 4", "must tell the interval");
-    check(good(PEER "NPTS= 3\n1 2 3", &(ImportRequest){0.5, CHOICE_ABSENT}), "at2", 3, 0.5,
+    check(good(PEER "NPTS= 3\n1 2 3", &(GroundMotionOptions){0.5, CHOICE_ABSENT}), "at2", 3, 0.5,
           3 * 9.80665);
     bad(PEER "NPTS= 3, DT= .01\n1 2 3", &whole, "line 4",
         "tells an interval of 0.01 s, but 0.02 s is given");
@@ -224,7 +229,7 @@ static void garbage_is_told_with_line_and_column(void **state) {
         snprintf(text, sizeof text, "0 0\n%s", rows[i].row);
         bad(text, &whole, rows[i].place, rows[i].detail);
     }
-    bad("1 1e308\n", &(ImportRequest){1, IMPORT_G}, "line 1", "finite in m/s^2");
+    bad("1 1e308\n", &(GroundMotionOptions){1, ACCELERATION_G}, "line 1", "finite in m/s^2");
     // Commas throughout leave no line of numbers to begin with.
     bad("t, a\n0.00,0.5\n0.01,0.6\n", &whole, "line 2, column 1", "blanks separate them");
     bad("a motion\nof Nov 5, 1999\n", &whole, "line 2, column 8", "must be a number");
@@ -291,12 +296,12 @@ static void a_header_is_kept_to_a_thousand_plain_bytes(void **state) {
     for (int i = 0; i < 60; i++)
         strcat(text, "A header line of some length, \xc3\xa9\t\n");
     strcat(text, "units g\n1\n2\n");
-    Import import = good(text, &whole);
+    GroundMotionText import = good(text, &whole);
     assert_int_equal(strlen(import.header), 1000);
     for (const char *c = import.header; *c != '\0'; c++)
         assert_true(*c >= ' ' && *c <= '~');
-    import_clear(&import);
-    import_clear(&import);
+    ground_motion_text_clear(&import);
+    ground_motion_text_clear(&import);
 }
 
 int main(void) {

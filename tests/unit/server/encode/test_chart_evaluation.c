@@ -21,7 +21,7 @@ static char *draw(const char *text) {
     const Measurement one = {COUNT_ABSENT, &test};
     Evaluation evaluation;
     assert_int_equal(
-        evaluation_make(&one, 1, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
+        evaluation_run(&one, 1, SEPARATION_ZERO_PENETRATION, NULL, &evaluation, &problem),
         STATUS_OK);
     Bytes bytes = {.most = 1 << 20};
     chart_evaluation(&evaluation, "felt", &bytes);

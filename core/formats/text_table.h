@@ -1,7 +1,7 @@
 // Text as lines, words and numbers, with the place of each.
 // Knows nothing of layouts. Used by import.c and import_header.c.
-#ifndef CORE_FORMATS_IMPORT_TEXT_H
-#define CORE_FORMATS_IMPORT_TEXT_H
+#ifndef CORE_FORMATS_TEXT_TABLE_H
+#define CORE_FORMATS_TEXT_TABLE_H
 
 #include "core/base/status.h"
 

@@ -1,4 +1,4 @@
-#include "core/formats/import_text.h"
+#include "core/formats/text_table.h"
 
 #include <ctype.h>
 #include <math.h>
