@@ -1,6 +1,6 @@
-// A body that falls from rest arrives with sqrt(2 g h). A base that is free to move takes up part
-// of what is given back: with u the impactor's rebound speed over its approach speed v, of masses m
-// on M, momentum m v = M w - m u v gives the base's w, and the speed of parting is
+// A body that falls from rest arrives with sqrt(2 g h). A free base takes part of the momentum:
+// with u the impactor's rebound speed over its approach speed v, masses m on M and base speed w
+// after the contact, momentum m v = M w - m u v gives the separation speed
 //
 //   u v + w = v (m + (m + M) u) / M,
 //
@@ -12,12 +12,13 @@
 
 #include "core/base/rfc3339.h"
 #include "core/contact/identification.h"
+#include "core/drop_test/contact_detection.h"
 #include "core/drop_test/force_trace.h"
 #include "core/scene/material.h"
 
 enum { POINTER_SIZE = sizeof((Fault){0}.pointer), TEXT_MAX = 1000, NOTE_MAX = 10000 };
 
-// By how much a speed may differ from what its height gives: air and friction slow a fall.
+// Relative difference between a speed and that of its height: air and friction slow a fall.
 static const double height_tolerance = 0.2;
 
 // clang-format off
@@ -63,28 +64,24 @@ const Field drop_test_fields[] = {
 };
 // clang-format on
 
-static bool has(double value) {
-    return !isnan(value);
-}
-
 static double fall_speed(double height) {
     return sqrt(2 * STANDARD_GRAVITY * height);
 }
 
 double drop_test_effective_mass(const DropTest *test) {
     if (test->base == MATERIAL_BASE_FREE)
-        return has(test->impactor_mass) && has(test->base_mass)
+        return !isnan(test->impactor_mass) && !isnan(test->base_mass)
                    ? effective_mass(test->impactor_mass, test->base_mass)
                    : (double)NAN;
     return test->base == MATERIAL_BASE_FIXED ? test->impactor_mass : (double)NAN;
 }
 
 double drop_approach_speed(const Drop *drop) {
-    return has(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
+    return !isnan(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
 }
 
 double drop_rebound_speed(const DropTest *test, const Drop *drop) {
-    if (has(drop->rebound_speed))
+    if (!isnan(drop->rebound_speed))
         return drop->rebound_speed;
     const double rise = fall_speed(drop->rebound_height);
     if (test->base != MATERIAL_BASE_FREE)
@@ -93,23 +90,18 @@ double drop_rebound_speed(const DropTest *test, const Drop *drop) {
     return (m * drop_approach_speed(drop) + (m + M) * rise) / M;
 }
 
-static Status add(Problem *problem, const char *pointer, const char *name, double value,
-                  const char *unit, const char *sentence) {
+static Status drop_fault(Problem *problem, const char *pointer, const char *name, double value,
+                         const char *unit, const char *sentence) {
     char place[POINTER_SIZE];
     pointer_join(place, sizeof place, pointer, name);
-    return problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence);
+    return unit != NULL
+               ? problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence)
+               : problem_add(problem, STATUS_INVALID, place, "%s", sentence);
 }
 
-static Status missing(Problem *problem, const char *pointer, const char *name,
-                      const char *sentence) {
-    char place[POINTER_SIZE];
-    pointer_join(place, sizeof place, pointer, name);
-    return problem_add(problem, STATUS_INVALID, place, "%s", sentence);
-}
-
-// A speed that its height contradicts.
-static Status check_speed(double height, double speed, const char *name, const char *pointer,
-                          Problem *problem) {
+// Refuses a speed that its height contradicts.
+static Status drop_check_speed(double height, double speed, const char *name, const char *pointer,
+                               Problem *problem) {
     const double falls = fall_speed(height);
     if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
         return STATUS_OK;
@@ -117,25 +109,25 @@ static Status check_speed(double height, double speed, const char *name, const c
     snprintf(sentence, sizeof sentence,
              "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g m/s",
              100 * height_tolerance, falls, height, speed);
-    return add(problem, pointer, name, speed, "m/s", sentence);
+    return drop_fault(problem, pointer, name, speed, "m/s", sentence);
 }
 
-static Status check_rebound(const DropTest *test, const Drop *drop, const char *pointer,
-                            Problem *problem) {
-    const bool has_rise = has(drop->rebound_height), has_speed = has(drop->rebound_speed);
-    if (has_rise && has(drop->drop_height) && drop->rebound_height > drop->drop_height) {
+static Status drop_check_rebound(const DropTest *test, const Drop *drop, const char *pointer,
+                                 Problem *problem) {
+    const bool has_rise = !isnan(drop->rebound_height), has_speed = !isnan(drop->rebound_speed);
+    if (has_rise && !isnan(drop->drop_height) && drop->rebound_height > drop->drop_height) {
         char sentence[160];
         snprintf(sentence, sizeof sentence,
                  "must be at most the drop_height of %.6g m, is %.6g m: more than all was given "
                  "back; a drop that does not count takes \"excluded\" with the reason",
                  drop->drop_height, drop->rebound_height);
-        return add(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
+        return drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
     }
     if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE &&
-        !has(drop_test_effective_mass(test)))
-        return missing(problem, pointer, "rebound_height",
-                       "needs impactor_mass and base_mass on a free base, which takes part of "
-                       "the rebound; or rebound_speed relative to the base in its place");
+        isnan(drop_test_effective_mass(test)))
+        return drop_fault(problem, pointer, "rebound_height", 0, NULL,
+                          "needs impactor_mass and base_mass on a free base, which takes part of "
+                          "the rebound; or rebound_speed relative to the base in its place");
     const double before = drop_approach_speed(drop), after = drop_rebound_speed(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
@@ -144,38 +136,39 @@ static Status check_rebound(const DropTest *test, const Drop *drop, const char *
              "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: more than all was "
              "given back",
              before, after);
-    return has_speed ? add(problem, pointer, "rebound_speed", after, "m/s", sentence)
-                     : add(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
+    return has_speed ? drop_fault(problem, pointer, "rebound_speed", after, "m/s", sentence)
+                     : drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m",
+                                  sentence);
 }
 
-// Of a drop that counts, whose numbers are good one by one.
-static Status check_drop(const DropTest *test, const Drop *drop, const char *pointer,
+// Of a drop that counts and whose members are valid one by one.
+static Status drop_check(const DropTest *test, const Drop *drop, const char *pointer,
                          Problem *problem) {
-    const bool has_before = has(drop->drop_height) || has(drop->approach_speed);
-    const bool has_after = has(drop->rebound_height) || has(drop->rebound_speed);
-    if (!has_after && !has(drop->contact_time))
+    const bool has_before = !isnan(drop->drop_height) || !isnan(drop->approach_speed);
+    const bool has_after = !isnan(drop->rebound_height) || !isnan(drop->rebound_speed);
+    if (!has_after && isnan(drop->contact_time))
         return problem_add(problem, STATUS_INVALID, pointer,
                            "must tell a rebound (rebound_height or rebound_speed), a contact_time, "
                            "or both: without them it says nothing");
     if (has_after && !has_before)
-        return missing(problem, pointer,
-                       has(drop->rebound_height) ? "drop_height" : "approach_speed",
-                       "is required beside a rebound");
+        return drop_fault(problem, pointer,
+                          !isnan(drop->rebound_height) ? "drop_height" : "approach_speed", 0, NULL,
+                          "is required beside a rebound");
     Status status = STATUS_OK;
-    if (check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer, problem) !=
-        STATUS_OK)
+    if (drop_check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer,
+                         problem) != STATUS_OK)
         status = STATUS_INVALID;
-    // On a free base the two are not of the same body.
+    // On a free base height and speed are of different bodies.
     if (test->base != MATERIAL_BASE_FREE &&
-        check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer, problem) !=
-            STATUS_OK)
+        drop_check_speed(drop->rebound_height, drop->rebound_speed, "rebound_speed", pointer,
+                         problem) != STATUS_OK)
         status = STATUS_INVALID;
     if (status == STATUS_OK && has_after)
-        status = check_rebound(test, drop, pointer, problem);
+        status = drop_check_rebound(test, drop, pointer, problem);
     return status;
 }
 
-static Status check_drops(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_drops(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     char drops[POINTER_SIZE], place[POINTER_SIZE];
     pointer_join(drops, sizeof drops, pointer, "drops");
@@ -183,7 +176,7 @@ static Status check_drops(const DropTest *test, const char *pointer, Problem *pr
         pointer_index(place, sizeof place, drops, i);
         const Drop *drop = &test->drops.at[i];
         if (drop->excluded == NULL && !problem_concerns(problem, place) &&
-            check_drop(test, drop, place, problem) != STATUS_OK)
+            drop_check(test, drop, place, problem) != STATUS_OK)
             status = STATUS_INVALID;
     }
     return status;
@@ -196,7 +189,7 @@ size_t drop_test_sample_count(const DropTest *test) {
     return samples;
 }
 
-static Status check_traces(const DropTest *test, const char *pointer, Problem *problem) {
+static Status drop_test_check_traces(const DropTest *test, const char *pointer, Problem *problem) {
     Status status = STATUS_OK;
     char traces[POINTER_SIZE], trace[POINTER_SIZE], place[POINTER_SIZE];
     pointer_join(traces, sizeof traces, pointer, "traces");
@@ -217,12 +210,13 @@ static Status check_traces(const DropTest *test, const char *pointer, Problem *p
     return status;
 }
 
-static Status check_base(const DropTest *test, const char *pointer, Problem *problem) {
-    if (has(test->base_mass) && test->base != MATERIAL_BASE_FREE)
-        return add(problem, pointer, "base_mass", test->base_mass, "kg",
-                   test->base == MATERIAL_BASE_FIXED
-                       ? "must be absent beside \"base\": \"fixed\", which does not move"
-                       : "needs \"base\": \"free\" beside it: the mass of a base that moves");
+static Status drop_test_check_base(const DropTest *test, const char *pointer, Problem *problem) {
+    if (!isnan(test->base_mass) && test->base != MATERIAL_BASE_FREE)
+        return drop_fault(
+            problem, pointer, "base_mass", test->base_mass, "kg",
+            test->base == MATERIAL_BASE_FIXED
+                ? "must be absent beside \"base\": \"fixed\", which does not move"
+                : "needs \"base\": \"free\" beside it: the mass of a base that moves");
     return STATUS_OK;
 }
 
@@ -231,7 +225,7 @@ Status drop_test_validate(const DropTest *test, const char *pointer, Problem *pr
     char place[POINTER_SIZE], traces[POINTER_SIZE];
     pointer_join(place, sizeof place, pointer, "drops");
     pointer_join(traces, sizeof traces, pointer, "traces");
-    // Lists that could not be read are empty, too.
+    // A list that could not be read is empty too.
     if (test->drops.count == 0 && test->traces.count == 0 && !problem_concerns(problem, place) &&
         !problem_concerns(problem, traces)) {
         status = problem_add(problem, STATUS_INVALID, place,
@@ -247,9 +241,9 @@ Status drop_test_validate(const DropTest *test, const char *pointer, Problem *pr
         text_quote(fault.value, sizeof fault.value, test->date);
         status = problem_put(problem, STATUS_INVALID, &fault);
     }
-    if (check_base(test, pointer, problem) != STATUS_OK)
+    if (drop_test_check_base(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;
-    if (check_traces(test, pointer, problem) != STATUS_OK)
+    if (drop_test_check_traces(test, pointer, problem) != STATUS_OK)
         status = STATUS_INVALID;
-    return check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
+    return drop_test_check_drops(test, pointer, problem) != STATUS_OK ? STATUS_INVALID : status;
 }

@@ -1,95 +1,95 @@
 #include "core/drop_test/evaluation_warnings.h"
 
 #include <stdio.h>
-#include <string.h>
+#include <stdlib.h>
 
-#include "core/drop_test/evaluation_same.h"
+#include "core/base/canonical.h"
 #include "core/drop_test/gravity_correction.h"
-#include "core/drop_test/readings.h"
 
-enum { OUTLIERS_TOLD = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
+enum { OUTLIERS_MAX = 5, POINTER_SIZE = sizeof((Fault){0}.pointer) };
 
-static const double worth_telling = 0.01;  // an effect of gravity
-static const double pair_tolerance = 0.02; // of effective masses that are taken for the same
+static const double effect_min = 0.01;     // of gravity
+static const double pair_tolerance = 0.02; // of effective masses that are considered equal
 
-static bool has(double value) {
-    return !isnan(value);
-}
-
-static void test_pointer(const Measurement *of, char pointer[POINTER_SIZE]) {
-    pointer[0] = '\0';
+// "/measurements/3/gravity"; without a name the measurement alone.
+static void warning_pointer(const Measurement *of, const char *name, char pointer[POINTER_SIZE]) {
+    char test[40] = "";
     if (of->number != COUNT_ABSENT)
-        snprintf(pointer, POINTER_SIZE, "/measurements/%llu", (unsigned long long)of->number);
+        snprintf(test, sizeof test, "/measurements/%llu", (unsigned long long)of->number);
+    if (name != NULL)
+        pointer_join(pointer, POINTER_SIZE, test, name);
+    else
+        snprintf(pointer, POINTER_SIZE, "%s", test);
 }
 
-// The slowest drop that counts, of a test that leaves gravity alone.
-static const EvaluationRow *slowest(const Evaluation *evaluation, size_t test) {
+// The slowest row of a test that counts.
+static const EvaluationRow *warning_slowest(const EvaluationRows *rows, size_t test) {
     const EvaluationRow *found = NULL;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->test == test && row_counts(row) && has(row->approach_speed) &&
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        if (row->test == test && reading_counts(row) && !isnan(row->approach_speed) &&
             (found == NULL || row->approach_speed < found->approach_speed))
             found = row;
     }
     return found;
 }
 
-static Status warn_of_gravity(const Measurement *of, size_t test, Evaluation *evaluation) {
-    const EvaluationRow *row = has(of->test->gravity) ? NULL : slowest(evaluation, test);
+static Status warn_of_gravity(const Measurement *of, size_t test, const EvaluationResult *result,
+                              Warnings *warnings) {
+    const EvaluationRow *row =
+        isnan(of->test->gravity) ? warning_slowest(result->rows, test) : NULL;
     if (row == NULL)
         return STATUS_OK;
-    char pointer[POINTER_SIZE], place[POINTER_SIZE];
-    test_pointer(of, pointer);
-    pointer_join(place, sizeof place, pointer, "gravity");
-    const double e = row->restitution_counts ? row->restitution : evaluation->restitution.mean;
-    const double T = row->contact_time_counts ? row->contact_time : evaluation->contact_time.mean;
-    if (!has(T))
-        return warnings_add(&evaluation->warnings, place,
+    char place[POINTER_SIZE];
+    warning_pointer(of, "gravity", place);
+    const double e = row->restitution_counts ? row->restitution : result->restitution->mean;
+    const double T = row->contact_time_counts ? row->contact_time : result->contact_time->mean;
+    if (isnan(T))
+        return warnings_add(warnings, place,
                             "gravity during contact is not taken out, and without a contact time "
                             "nobody can tell how much it does; \"gravity\": 0 says that none "
                             "pulls");
     if (!(e > 0))
         return STATUS_OK;
-    const GravityLoad pull = {STANDARD_GRAVITY, row->approach_speed,
-                              (Separation)evaluation->separation,
+    const GravityLoad load = {STANDARD_GRAVITY, row->approach_speed, (Separation)result->separation,
                               row->restitution_by == RESTITUTION_BY_HEIGHTS};
-    const GravityContact pulled = gravity_apply(&pull, e, T);
+    const GravityContact with = gravity_apply(&load, e, T);
     static const char advice[] = "say \"gravity\": 9.80665 to take it out, 0 where none pulls";
-    if (!(pulled.restitution > 0))
-        return warnings_add(&evaluation->warnings, place,
+    if (!(with.restitution > 0))
+        return warnings_add(warnings, place,
                             "gravity during contact is not taken out: in a vertical drop at the "
                             "slowest %.3g m/s a contact of this e and T_c would not part at all; "
                             "%s",
                             row->approach_speed, advice);
-    const double longer = pulled.contact_time / T - 1, lower = 1 - pulled.restitution / e;
-    if (!(fmax(longer, lower) > worth_telling))
+    const double longer = with.contact_time / T - 1, lower = 1 - with.restitution / e;
+    if (!(fmax(longer, lower) > effect_min))
         return STATUS_OK;
-    return warnings_add(&evaluation->warnings, place,
+    return warnings_add(warnings, place,
                         "gravity during contact is not taken out: in a vertical drop at the "
                         "slowest %.3g m/s it lengthens a contact of this e and T_c by %.2g %% and "
                         "lowers e by %.2g %%; %s",
                         row->approach_speed, 100 * longer, 100 * lower, advice);
 }
 
-// A height is worth a speed by the gravity of the lab, which what pulls during contact need not be.
-static Status warn_of_heights(const Measurement *of, size_t test, Evaluation *evaluation) {
+// Heights give speeds by standard gravity, which need not be the gravity during contact.
+static Status warn_of_heights(const Measurement *of, size_t test, const EvaluationRows *rows,
+                              Warnings *warnings) {
     const double gravity = of->test->gravity;
-    if (!(gravity > 0) || !(fabs(gravity / STANDARD_GRAVITY - 1) > worth_telling))
+    if (!(gravity > 0) || !(fabs(gravity / STANDARD_GRAVITY - 1) > effect_min))
         return STATUS_OK;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->test != test || row->is_of_trace || !row_counts(row))
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        if (row->test != test || row->is_of_trace || !reading_counts(row))
             continue;
         const Drop *drop = &of->test->drops.at[row->place];
-        const bool is_by_height = has(drop->approach_speed)
+        const bool is_by_height = !isnan(drop->approach_speed)
                                       ? row->restitution_by == (int)RESTITUTION_BY_HEIGHTS
-                                      : has(drop->drop_height);
+                                      : !isnan(drop->drop_height);
         if (!is_by_height)
             continue;
-        char pointer[POINTER_SIZE], place[POINTER_SIZE];
-        test_pointer(of, pointer);
-        pointer_join(place, sizeof place, pointer, "gravity");
-        return warnings_add(&evaluation->warnings, place,
+        char place[POINTER_SIZE];
+        warning_pointer(of, "gravity", place);
+        return warnings_add(warnings, place,
                             "%.4g m/s^2 pull during contact, but speeds are told from heights by "
                             "%.6g m/s^2: where that is not what the impactor fell by, give "
                             "approach_speed and rebound_speed",
@@ -98,14 +98,14 @@ static Status warn_of_heights(const Measurement *of, size_t test, Evaluation *ev
     return STATUS_OK;
 }
 
-static Status warn_of_pairs(const Measurement *tests, size_t count, Evaluation *evaluation) {
+static Status warn_of_pairs(const Measurement *tests, size_t count, Warnings *warnings) {
     for (size_t i = 1; i < count; i++) {
         char pointer[POINTER_SIZE];
-        test_pointer(&tests[i], pointer);
-        const double first = drop_test_effective_mass(tests[0].test),
-                     other = drop_test_effective_mass(tests[i].test);
+        warning_pointer(&tests[i], NULL, pointer);
+        const double first = drop_test_effective_mass(tests[0].test);
+        const double other = drop_test_effective_mass(tests[i].test);
         if (fabs(other - first) > pair_tolerance * first)
-            TRY(warnings_add(&evaluation->warnings, pointer,
+            TRY(warnings_add(warnings, pointer,
                              "was made with another pair of masses: effective mass %.4g kg, the "
                              "first's is %.4g kg; e and T_c belong to a pair",
                              other, first));
@@ -113,32 +113,71 @@ static Status warn_of_pairs(const Measurement *tests, size_t count, Evaluation *
     return STATUS_OK;
 }
 
-// Pulses tell e, too, but only as far as the buffer is the model's.
-static Status warn_of_pulses(Evaluation *evaluation, bool is_left_out) {
-    if (is_left_out)
-        return warnings_add(&evaluation->warnings, "",
-                            "the restitution that pulses tell by their shape is shown but does "
-                            "not count beside heights or speeds");
-    for (size_t i = 0; i < evaluation->rows.count; i++)
-        if (evaluation->rows.at[i].restitution_counts)
-            return evaluation->rows.at[i].restitution_by != RESTITUTION_BY_PULSE
-                       ? STATUS_OK
-                       : warnings_add(&evaluation->warnings, "",
-                                      "restitution is told by the shape of force pulses alone, "
-                                      "which is right only for a buffer that is the model's; "
-                                      "heights or speeds are surer");
+// FNV-1a; two of a hundred different tests practically never have the same 64 bits.
+static void warning_digest(void *context, const void *bytes, size_t size) {
+    uint64_t *sum = context;
+    const unsigned char *at = bytes;
+    for (size_t i = 0; i < size; i++)
+        *sum = (*sum ^ at[i]) * 1099511628211u;
+}
+
+// Tests that count and equal an earlier one in every member. `sums` has room for all; 0: does not
+// count.
+static Status warn_of_copies(const Measurement *tests, size_t count, const EvaluationRows *rows,
+                             uint64_t *sums, Warnings *warnings) {
+    for (size_t i = 0; i < rows->count; i++)
+        if (reading_counts(&rows->at[i]))
+            sums[rows->at[i].test] = 14695981039346656037u;
+    for (size_t i = 0; i < count; i++) {
+        if (sums[i] == 0)
+            continue;
+        canonical_write(drop_test_fields, tests[i].test, warning_digest, &sums[i]);
+        size_t k = 0;
+        while (sums[k] != sums[i])
+            k++;
+        if (k == i)
+            continue;
+        char pointer[POINTER_SIZE], other[40] = "a test before it";
+        warning_pointer(&tests[i], NULL, pointer);
+        if (tests[k].number != COUNT_ABSENT)
+            snprintf(other, sizeof other, "measurement %llu", (unsigned long long)tests[k].number);
+        TRY(warnings_add(warnings, pointer,
+                         "is %s once more, the same in every member, and both count: if it was "
+                         "sent twice the standard errors come out too small; leave one out",
+                         other));
+    }
     return STATUS_OK;
 }
 
-static Status warn_of_interval(Evaluation *evaluation) {
-    if (evaluation->contact_time.count > 0)
-        return STATUS_OK;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
+// The shape of a pulse gives e too, but only as far as the buffer follows the model.
+static Status warn_of_pulses(const EvaluationRows *rows, Warnings *warnings) {
+    bool is_first = true, is_by_pulse = false;
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        const bool is_pulse = row->restitution_by == RESTITUTION_BY_PULSE;
+        if (is_pulse && row->excluded == NULL && !row->restitution_counts)
+            return warnings_add(warnings, "",
+                                "the restitution that pulses tell by their shape is shown but "
+                                "does not count beside heights or speeds");
+        if (row->restitution_counts && is_first)
+            is_by_pulse = is_pulse;
+        is_first = is_first && !row->restitution_counts;
+    }
+    return !is_by_pulse ? STATUS_OK
+                        : warnings_add(warnings, "",
+                                       "restitution is told by the shape of force pulses alone, "
+                                       "which is right only for a buffer that is the model's; "
+                                       "heights or speeds are surer");
+}
+
+static Status warn_of_interval(const EvaluationResult *result, Warnings *warnings) {
+    for (size_t i = 0; i < result->rows->count && result->contact_time->count == 0; i++) {
+        const EvaluationRow *row = &result->rows->at[i];
         char pointer[POINTER_SIZE];
-        row_pointer(row, pointer, sizeof pointer);
-        if (row->excluded == NULL && has(row->least_contact_time) && has(row->most_contact_time))
-            return warnings_add(&evaluation->warnings, pointer,
+        reading_pointer(row, pointer, sizeof pointer);
+        if (row->excluded == NULL && !isnan(row->least_contact_time) &&
+            !isnan(row->most_contact_time))
+            return warnings_add(warnings, pointer,
                                 "no trace gives a figure for the contact time; by %s it lies "
                                 "between %.3g and %.3g s (%s)",
                                 row->from, row->least_contact_time, row->most_contact_time,
@@ -147,12 +186,12 @@ static Status warn_of_interval(Evaluation *evaluation) {
     return STATUS_OK;
 }
 
-// Figures that a trace gives with a reservation count, but not in silence.
-static Status warn_of_doubt(Evaluation *evaluation) {
+// Contacts of traces that count although their figures are doubtful.
+static Status warn_of_doubt(const EvaluationRows *rows, Warnings *warnings) {
     const EvaluationRow *first = NULL;
     size_t count = 0;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
         if (!row->is_of_trace || !row->contact_time_counts || row->note == NULL)
             continue;
         first = first != NULL ? first : row;
@@ -161,53 +200,51 @@ static Status warn_of_doubt(Evaluation *evaluation) {
     if (first == NULL)
         return STATUS_OK;
     char pointer[POINTER_SIZE];
-    row_pointer(first, pointer, sizeof pointer);
-    return warnings_add(&evaluation->warnings, pointer,
+    reading_pointer(first, pointer, sizeof pointer);
+    return warnings_add(warnings, pointer,
                         "%zu contact%s of traces count%s though doubtful; %s: %s", count,
                         count == 1 ? "" : "s", count == 1 ? "s" : "", first->from, first->note);
 }
 
-static Status warn_of_outlier(const EvaluationRow *row, const char *name, double value,
-                              double score, const Statistic *of, Evaluation *evaluation) {
-    char pointer[POINTER_SIZE];
-    row_pointer(row, pointer, sizeof pointer);
-    return warnings_add(&evaluation->warnings, pointer,
-                        "%s %.4g of %s lies %.1f robust deviations from the middle; it counts all "
-                        "the same: the mean is %.4g with all readings and %.4g without outliers "
-                        "(%llu); one that was seen to go wrong takes \"excluded\" with the reason",
-                        name, value, row->from, fabs(score), of->mean, of->mean_without_outliers,
-                        (unsigned long long)of->outliers);
-}
-
-static Status warn_of_outliers(Evaluation *evaluation) {
-    int told[2] = {0, 0};
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row->restitution_is_outlier && told[0]++ < OUTLIERS_TOLD)
-            TRY(warn_of_outlier(row, "restitution", row->restitution, row->restitution_score,
-                                &evaluation->restitution, evaluation));
-        if (row->contact_time_is_outlier && told[1]++ < OUTLIERS_TOLD)
-            TRY(warn_of_outlier(row, "contact time", row->contact_time, row->contact_time_score,
-                                &evaluation->contact_time, evaluation));
-    }
+static Status warn_of_outliers(const EvaluationResult *result, Warnings *warnings) {
+    int warned[2] = {0, 0};
+    for (size_t i = 0; i < result->rows->count; i++)
+        for (int is_time = 0; is_time < 2; is_time++) {
+            const EvaluationRow *row = &result->rows->at[i];
+            const Statistic *of = is_time ? result->contact_time : result->restitution;
+            const bool is_outlier =
+                is_time ? row->contact_time_is_outlier : row->restitution_is_outlier;
+            if (!is_outlier || warned[is_time]++ >= OUTLIERS_MAX)
+                continue;
+            char pointer[POINTER_SIZE];
+            reading_pointer(row, pointer, sizeof pointer);
+            TRY(warnings_add(
+                warnings, pointer,
+                "%s %.4g of %s lies %.1f robust deviations from the middle; it counts all the "
+                "same: the mean is %.4g with all readings and %.4g without outliers (%llu); one "
+                "that was seen to go wrong takes \"excluded\" with the reason",
+                is_time ? "contact time" : "restitution",
+                is_time ? row->contact_time : row->restitution, row->from,
+                fabs(is_time ? row->contact_time_score : row->restitution_score), of->mean,
+                of->mean_without_outliers, (unsigned long long)of->outliers));
+        }
     return STATUS_OK;
 }
 
-Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evaluation) {
-    bool is_left_out = false;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        is_left_out = is_left_out || (row->restitution_by == RESTITUTION_BY_PULSE &&
-                                      row->excluded == NULL && !row->restitution_counts);
-    }
+Status evaluation_warnings_add(const Measurement *tests, size_t count,
+                               const EvaluationResult *result, Warnings *warnings) {
     for (size_t i = 0; i < count; i++) {
-        TRY(warn_of_gravity(&tests[i], i, evaluation));
-        TRY(warn_of_heights(&tests[i], i, evaluation));
+        TRY(warn_of_gravity(&tests[i], i, result, warnings));
+        TRY(warn_of_heights(&tests[i], i, result->rows, warnings));
     }
-    TRY(warn_of_pairs(tests, count, evaluation));
-    TRY(evaluation_warn_same(tests, count, evaluation));
-    TRY(warn_of_pulses(evaluation, is_left_out));
-    TRY(warn_of_interval(evaluation));
-    TRY(warn_of_doubt(evaluation));
-    return warn_of_outliers(evaluation);
+    TRY(warn_of_pairs(tests, count, warnings));
+    uint64_t *sums = calloc(count + 1, sizeof *sums);
+    const Status status = sums != NULL ? warn_of_copies(tests, count, result->rows, sums, warnings)
+                                       : STATUS_NO_MEMORY;
+    free(sums);
+    TRY(status);
+    TRY(warn_of_pulses(result->rows, warnings));
+    TRY(warn_of_interval(result, warnings));
+    TRY(warn_of_doubt(result->rows, warnings));
+    return warn_of_outliers(result, warnings);
 }

@@ -1,11 +1,19 @@
-// What an evaluation is to be read with. Not its numbers (evaluation.c). Used by evaluation.c.
+// Warnings about the tests and results of an evaluation.
 #ifndef CORE_DROP_TEST_EVALUATION_WARNINGS_H
 #define CORE_DROP_TEST_EVALUATION_WARNINGS_H
 
-#include "core/drop_test/evaluation.h"
+#include "core/base/report.h"
+#include "core/drop_test/readings.h"
 
-// Adds to the warnings of an evaluation whose rows and quantities are done. STATUS_OK or
-// STATUS_NO_MEMORY.
-Status evaluation_warn(const Measurement *tests, size_t count, Evaluation *evaluation);
+// What an evaluation found.
+typedef struct EvaluationResult {
+    int separation; // Separation
+    const EvaluationRows *rows;
+    const Statistic *restitution, *contact_time;
+} EvaluationResult;
+
+// Appends to `warnings`; pointers lead into the tests: "/drops/2". STATUS_OK or STATUS_NO_MEMORY.
+Status evaluation_warnings_add(const Measurement *tests, size_t count,
+                               const EvaluationResult *result, Warnings *warnings);
 
 #endif

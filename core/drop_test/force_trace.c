@@ -1,24 +1,20 @@
-// From a trace to its contacts. Each is set into a window of its own, with as much baseline on both
-// sides as there is, in which the pulse is fitted. A figure of T_c is given only where five samples
-// or more are in contact and the pulse that fits them is one of a kind; else an interval, and why.
+// Each contact is fitted in a window of its own, with as much baseline on both sides as there is.
+// T_c is stated only where at least five samples are in contact and the trace distinguishes the
+// pulse that fits from others; else an interval is stated, and the reason.
 #include "core/drop_test/force_trace.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
+#include "core/base/text_format.h"
 #include "core/drop_test/contact_detection.h"
 #include "core/drop_test/fit_confidence.h"
 
 enum { SAMPLES_MIN = 5, TRACE_MIN = 8 };
 
-// An interval this wide over T_c is no figure, nor is one that reaches to so high an L.
-static const double widest = 0.5, faintest = 4.2;
-
-// A fit that leaves so much of the peak is none.
-static const double worst = 0.15;
+// No figure is stated where the interval over T_c or the upper bound of L exceeds its limit, nor
+// where the rms residual over the peak does.
+static const double width_max = 0.5, decay_max = 4.2, misfit_max = 0.15;
 
 // clang-format off
 const Field trace_detection_fields[] = {
@@ -42,25 +38,18 @@ const Field trace_detection_fields[] = {
 };
 // clang-format on
 
-__attribute__((format(printf, 2, 3))) static Status tell(char **why, const char *format, ...) {
-    char text[TRACE_WHY_MAX];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    free(*why);
-    *why = strdup(text);
-    return *why == NULL ? STATUS_NO_MEMORY : STATUS_OK;
+static Status trace_status(bool is_made) {
+    return is_made ? STATUS_OK : STATUS_NO_MEMORY;
 }
 
-// How much longer a contact may be than what is seen of it above that share of its peak, and how
-// much of that may be before, in what is seen.
-static double hidden(double level, int separation, double *before) {
+// The largest part of a contact below `level` of its peak, and its largest part before the visible
+// one, both relative to the visible part.
+static double trace_hidden(double level, int separation, double *before) {
     double most = 0;
     *before = 0;
     for (int i = 0; i <= 4; i++) {
-        const PulseModel shape = pulse_model_make(i * 0.75, 0, separation);
-        const PulseVisible visible = pulse_model_visible(&shape, fmin(level, 0.95));
+        const PulseModel model = pulse_model_make(i * 0.75, 0, separation);
+        const PulseVisible visible = pulse_model_visible(&model, fmin(level, 0.95));
         const double seen = fmax(visible.to - visible.from, 0.02);
         most = fmax(most, (1 - seen) / seen);
         *before = fmax(*before, visible.from / seen);
@@ -68,50 +57,48 @@ static double hidden(double level, int separation, double *before) {
     return most;
 }
 
-// What of the trace one contact has for itself.
-typedef struct Stretch {
+// The part of the trace in which one contact is fitted.
+typedef struct TracePart {
     size_t from, to;             // samples from .. to - 1
     bool is_at_begin, is_at_end; // of the trace
-} Stretch;
+} TracePart;
 
-static Stretch stretch_of(const ContactDetection *found, size_t count, size_t number) {
+static TracePart trace_part(const ContactDetection *found, size_t count, size_t number) {
     const DetectedContact *run = &found->runs[number];
     const size_t length = run->last - run->first + 1;
     const double level = found->threshold / fabs(run->peak);
     double before;
-    const double after = hidden(level, SEPARATION_ZERO_PENETRATION, &before);
+    const double after = trace_hidden(level, SEPARATION_ZERO_PENETRATION, &before);
     const size_t about = (size_t)((double)length * (4 + 2 * after)) + 24;
-    Stretch stretch = {.from = run->first > about ? run->first - about : 0,
-                       .to = count - run->last > about ? run->last + about : count};
-    // Behind a contact there may be an end below the threshold.
+    TracePart part = {.from = run->first > about ? run->first - about : 0,
+                      .to = count - run->last > about ? run->last + about : count};
+    // A contact may continue below the threshold: it gets two thirds of the gap behind it.
     if (number > 0) {
         const size_t end = found->runs[number - 1].last;
         const size_t wall = run->first - (run->first - end) / 3;
-        stretch.from = stretch.from > wall ? stretch.from : wall;
+        part.from = part.from > wall ? part.from : wall;
     }
     if (number + 1 < found->count) {
         const size_t gap = found->runs[number + 1].first - run->last - 1;
         const size_t wall = run->last + 1 + gap * 2 / 3;
-        stretch.to = stretch.to < wall ? stretch.to : wall;
+        part.to = part.to < wall ? part.to : wall;
     }
-    stretch.is_at_begin = stretch.from == 0;
-    stretch.is_at_end = stretch.to == count;
-    return stretch;
+    return part;
 }
 
-static void fill_window(const ContactDetection *found, const DetectedContact *run,
-                        const Stretch *stretch, int separation, FitWindow *window) {
-    const size_t samples = stretch->to - stretch->from;
+static void trace_fill_window(const ContactDetection *found, const DetectedContact *run,
+                              const TracePart *part, int separation, FitWindow *window) {
+    const size_t samples = part->to - part->from;
     const size_t m = (samples + FIT_BLOCKS_MAX - 1) / FIT_BLOCKS_MAX;
     *window = (FitWindow){
         .blocks = samples / m,
         .per_block = m,
         .separation = separation,
-        .first = (long)(run->first - stretch->from),
-        .last = (long)(run->last - stretch->from),
+        .first = (long)(run->first - part->from),
+        .last = (long)(run->last - part->from),
     };
     for (size_t k = 0; k < window->blocks; k++) {
-        const double *force = found->force + stretch->from + k * m;
+        const double *force = found->force + part->from + k * m;
         double sum = 0;
         for (size_t i = 0; i < m; i++)
             sum += force[i] / run->peak;
@@ -124,135 +111,140 @@ static void fill_window(const ContactDetection *found, const DetectedContact *ru
     window->noise_freedom = fmax(found->noise_count - (double)samples, 0);
     window->noise_square = noise * noise * window->noise_freedom;
     double before;
-    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    const double after = trace_hidden(found->threshold / fabs(run->peak), separation, &before);
     const double length = (double)(window->last - window->first + 1);
     const long end = (long)(window->blocks * m) - 1;
     window->least_start = window->first - (long)ceil(1.5 * before * length) - 2 - (long)length / 8;
     window->most_end = window->last + (long)ceil(1.5 * after * length) + 2 + (long)length / 8;
-    // A sample on either side must be out of contact.
+    // At least one sample on each side must be out of contact.
     window->least_start = window->least_start > 1 ? window->least_start : 1;
     window->most_end = window->most_end < end - 1 ? window->most_end : end - 1;
 }
 
-// Without a fit: from what is seen above the threshold.
-static void count_samples(const ContactDetection *found, const DetectedContact *run, int separation,
-                          double interval, TraceContact *contact) {
+// The interval without a fit: from the samples above the threshold.
+static void trace_count_samples(const ContactDetection *found, const DetectedContact *run,
+                                int separation, double interval, TraceContact *contact) {
     const double seen = (double)(run->last - run->first);
     double before;
-    const double after = hidden(found->threshold / fabs(run->peak), separation, &before);
+    const double after = trace_hidden(found->threshold / fabs(run->peak), separation, &before);
     contact->least_contact_time = seen * interval;
     contact->most_contact_time = (seen + 2) * (1 + after) * interval;
 }
 
-// rms of what the fit leaves of the window's means during contact [peak], of *count of them.
-static double left_over(const FitWindow *window, const PulseFit *fit, size_t *count) {
-    PulseModel shape;
+// rms of the residuals of the *count means of the window during contact [peak].
+static double trace_misfit(const FitWindow *window, const PulseFit *fit, size_t *count) {
+    PulseModel model;
     double T, sum = 0;
-    pulse_fit_model(window, &fit->at, &shape, &T);
+    pulse_fit_model(window, &fit->at, &model, &T);
     const long m = (long)window->per_block;
     *count = 0;
     for (long k = (fit->first + m - 1) / m; (k + 1) * m - 1 <= fit->last; k++) {
         const double at = (double)(k * m) + (double)(m - 1) / 2;
-        const double force = pulse_model_force(&shape, (at - fit->at.part[0]) / T);
+        const double force = pulse_model_force(&model, (at - fit->at.part[0]) / T);
         const double left =
-            window->mean[k] - fit->residue.amplitude * force - fit->residue.baseline;
+            window->mean[k] - fit->residual.amplitude * force - fit->residual.baseline;
         sum += left * left;
         ++*count;
     }
     return sqrt(sum / fmax((double)*count - 4, 1));
 }
 
-// No figure: an interval that holds also what counting samples leaves open.
-static void withdraw(const TraceContact *counted, TraceContact *contact) {
+// Withdraws the figure and extends the interval to the one without a fit.
+static void trace_withdraw(const TraceContact *counted, TraceContact *contact) {
     contact->least_contact_time = fmin(contact->least_contact_time, counted->least_contact_time);
     contact->most_contact_time = fmax(contact->most_contact_time, counted->most_contact_time);
     contact->contact_time = contact->contact_time_uncertainty = (double)NAN;
     contact->restitution = contact->restitution_uncertainty = (double)NAN;
 }
 
-static Status judge(const FitConfidence *likely, bool is_form_sure, double noise, int separation,
-                    const TraceContact *counted, TraceContact *contact) {
+static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, double noise,
+                             int separation, const TraceContact *counted, TraceContact *contact) {
     const double width = contact->most_contact_time - contact->least_contact_time;
-    const bool is_wide = !(width < widest * contact->contact_time);
+    const bool is_wide = !(width < width_max * contact->contact_time);
     if (!is_form_sure) {
         if (is_wide)
-            withdraw(counted, contact);
-        return tell(&contact->why,
-                    "the trace is hardly a pulse of the model's under the separation rule %s: the "
-                    "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                    separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise);
+            trace_withdraw(counted, contact);
+        return trace_status(
+            sentence(&contact->why,
+                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
+                     "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
+                     separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
     }
     if (is_wide) {
-        withdraw(counted, contact);
-        return tell(&contact->why,
-                    "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-                    "more samples in contact would tell them apart",
-                    contact->least_contact_time, contact->most_contact_time);
+        trace_withdraw(counted, contact);
+        return trace_status(
+            sentence(&contact->why,
+                     "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
+                     "more samples in contact would tell them apart",
+                     contact->least_contact_time, contact->most_contact_time));
     }
-    if (likely->decay.mean + 2 * likely->decay.deviation > faintest) {
-        withdraw(counted, contact);
-        return tell(&contact->why, "the force fades away without an end that could be told: pulses "
-                                   "with a restitution of next to nothing fit the trace as well");
+    if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
+        trace_withdraw(counted, contact);
+        return trace_status(sentence(
+            &contact->why, "the force fades away without an end that could be told: pulses "
+                           "with a restitution of next to nothing fit the trace as well"));
     }
     return STATUS_OK;
 }
 
-// The best pulse on the baseline there, from where the contact is taken to begin to where it is
-// taken to end; its window begins at sample `origin`.
-static Status draw(const PulseFit *fit, const PulseModel *shape, const ContactDetection *found,
-                   const DetectedContact *run, double origin, Reals *pulse) {
+// The best pulse on the baseline, from its start to its end; the window begins at sample `origin`.
+static Status trace_draw(const PulseFit *fit, const PulseModel *model,
+                         const ContactDetection *found, const DetectedContact *run, double origin,
+                         Reals *pulse) {
     if (!reals_make(pulse, TRACE_PULSE))
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < TRACE_PULSE; i++) {
         const double share = (double)i / (TRACE_PULSE - 1), *part = fit->at.part;
         const double place = origin + part[0] + share * (part[1] - part[0]);
         const double force =
-            fit->residue.amplitude * pulse_model_force(shape, shape->length * share);
+            fit->residual.amplitude * pulse_model_force(model, model->length * share);
         pulse->at[i] =
-            contact_detection_baseline(found, place) + run->peak * (fit->residue.baseline + force);
+            contact_detection_baseline(found, place) + run->peak * (fit->residual.baseline + force);
     }
     return STATUS_OK;
 }
 
-static Status fit_contact(FitWindow *window, const ContactDetection *found,
-                          const DetectedContact *run, const Stretch *stretch, double interval,
-                          const PulseFit *fits, size_t count, TraceContact *contact) {
+static Status trace_fit_contact(FitWindow *window, const ContactDetection *found,
+                                const DetectedContact *run, const TracePart *part, double interval,
+                                const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
-        return tell(&contact->why, "no pulse of the model's fits");
+        return trace_status(sentence(&contact->why, "no pulse of the model's fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
-    const double origin = (double)stretch->from;
+    const double origin = (double)part->from;
     contact->seen.first = (origin + (double)fit->first) * interval;
     contact->seen.last = (origin + (double)fit->last) * interval;
-    PulseModel shape;
+    PulseModel model;
     double T;
-    pulse_fit_model(window, &fit->at, &shape, &T);
-    const PulseVisible visible = pulse_model_visible(&shape, found->threshold / fabs(run->peak));
+    pulse_fit_model(window, &fit->at, &model, &T);
+    const PulseVisible visible = pulse_model_visible(&model, found->threshold / fabs(run->peak));
     contact->seen.crossing_shortfall = 1 - (visible.pressed - visible.from);
     contact->seen.impulse =
-        fit->residue.amplitude * T * pulse_model_impulse(&shape) * run->peak * interval;
+        fit->residual.amplitude * T * pulse_model_impulse(&model) * run->peak * interval;
     size_t means;
-    contact->seen.misfit_share = left_over(window, fit, &means);
+    contact->seen.misfit_share = trace_misfit(window, fit, &means);
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
-        return tell(&contact->why,
-                    "only %d samples are in contact, and pulses of very different length fit so "
-                    "few: 5 are the least, 20 are better",
-                    (int)contact->seen.samples);
-    if (contact->seen.misfit_share > worst && contact->seen.misfit_share > 2 * noise)
-        return tell(&contact->why,
-                    "the trace is no pulse of the model's under the separation rule %s: the best "
-                    "one leaves %.2g %% of the peak",
-                    separation_names[window->separation], 100 * contact->seen.misfit_share);
-    // So much is seldom left by chance, of so many means and of a noise known from so many samples.
+        return trace_status(
+            sentence(&contact->why,
+                     "only %d samples are in contact, and pulses of very different length fit so "
+                     "few: 5 are the least, 20 are better",
+                     (int)contact->seen.samples));
+    if (contact->seen.misfit_share > misfit_max && contact->seen.misfit_share > 2 * noise)
+        return trace_status(
+            sentence(&contact->why,
+                     "the trace is no pulse of the model's under the separation rule %s: the best "
+                     "one leaves %.2g %% of the peak",
+                     separation_names[window->separation], 100 * contact->seen.misfit_share));
+    // Residuals rarely exceed this by chance, given the number of means and of samples of noise.
     const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
     const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
     const bool is_form_sure =
         !(contact->seen.misfit_share > 0.01 && contact->seen.misfit_share > noise * chance);
     FitConfidence likely;
     TRY(fit_confidence_run(window, fits, count, is_form_sure, &likely));
-    TRY(draw(fit, &shape, found, run, origin, &contact->seen.pulse));
+    TRY(trace_draw(fit, &model, found, run, origin, &contact->seen.pulse));
     const TraceContact counted = *contact;
     contact->seen.start = (origin + fit->at.part[0]) * interval;
     contact->seen.end = (origin + fit->at.part[1]) * interval;
@@ -262,23 +254,23 @@ static Status fit_contact(FitWindow *window, const ContactDetection *found,
     contact->most_contact_time = likely.most * interval;
     contact->restitution = fmin(exp(-likely.decay.mean), 1);
     contact->restitution_uncertainty = exp(-likely.decay.mean) * likely.decay.deviation;
-    return judge(&likely, is_form_sure, noise, window->separation, &counted, contact);
+    return trace_conclude(&likely, is_form_sure, noise, window->separation, &counted, contact);
 }
 
-// Lets a fit and the pull that follows from it come to rest together; false: they do not. The pull
-// is m_e g over the fitted m_e v0, and that hangs on the pull but little.
-static bool settle(double weight, double unit, FitWindow *window, PulseFit *fit) {
+// Iterates a fit and the pull that follows from it, m_e g over the fitted m_e v0, until they agree;
+// false: they do not. The fitted m_e v0 depends only weakly on the pull.
+static bool trace_settle_pull(double weight, double unit, FitWindow *window, PulseFit *fit) {
     double rate_before = 0, gap_before = 0;
     for (int round = 0; round < 12; round++) {
-        PulseModel shape;
+        PulseModel model;
         double T;
-        if (!isfinite(fit->residue.sum) || !pulse_fit_model(window, &fit->at, &shape, &T))
+        if (!isfinite(fit->residual.sum) || !pulse_fit_model(window, &fit->at, &model, &T))
             return false;
         const double rate = window->pull_rate;
-        const double gap = weight / (fit->residue.amplitude * T * unit) - rate;
+        const double gap = weight / (fit->residual.amplitude * T * unit) - rate;
         if (fabs(gap) < 1e-4 * rate)
             return true;
-        // Under a strong pull the gap only halves from one to the next: so by the secant.
+        // The secant method: under a strong pull plain iteration only halves the gap.
         const double slope = round > 0 ? (gap - gap_before) / (rate - rate_before) : -1;
         rate_before = rate;
         gap_before = gap;
@@ -288,21 +280,23 @@ static bool settle(double weight, double unit, FitWindow *window, PulseFit *fit)
     return false;
 }
 
-// The fits under the pull. By g / v0; without v0 from the best fit on, until it is the best under
-// the pull that follows from it; *is_settled is false where there is no such.
-static size_t fit_pulled(const TraceOptions *way, size_t number, double interval, double peak,
-                         FitWindow *window, PulseFit *fits, bool *is_settled) {
-    const bool is_known = number < way->approach_speed_count && way->approach_speeds[number] > 0;
+// The fits under gravity. The pull is g / v0; without v0 it follows from the best fit, until that
+// is the best under its own pull; *is_settled: there is such a fit.
+static size_t trace_fit_pulled(const TraceOptions *options, size_t number, double interval,
+                               double peak, FitWindow *window, PulseFit *fits, bool *is_settled) {
+    const bool is_known =
+        number < options->approach_speed_count && options->approach_speeds[number] > 0;
     *is_settled = true;
     if (is_known)
-        window->pull_rate = way->gravity / way->approach_speeds[number] * interval;
+        window->pull_rate = options->gravity / options->approach_speeds[number] * interval;
     size_t count = pulse_fit_run(window, fits);
-    if (is_known || !(way->effective_mass > 0))
+    if (is_known || !(options->effective_mass > 0))
         return count;
     for (int round = 0; round < 4 && count > 0; round++) {
         PulseFit best = fits[0];
         const double before = window->pull_rate;
-        *is_settled = settle(way->effective_mass * way->gravity, peak, window, &best);
+        *is_settled =
+            trace_settle_pull(options->effective_mass * options->gravity, peak, window, &best);
         if (*is_settled && window->pull_rate == before)
             return count;
         count = pulse_fit_run(window, fits);
@@ -311,11 +305,11 @@ static size_t fit_pulled(const TraceOptions *way, size_t number, double interval
     return count;
 }
 
-static Status read_contact(double interval, const TraceOptions *way, const ContactDetection *found,
-                           size_t samples, size_t number, FitWindow *window,
-                           TraceContact *contact) {
+static Status trace_read_contact(double interval, const TraceOptions *options,
+                                 const ContactDetection *found, size_t samples, size_t number,
+                                 FitWindow *window, TraceContact *contact) {
     const DetectedContact *run = &found->runs[number];
-    const Stretch stretch = stretch_of(found, samples, number);
+    const TracePart part = trace_part(found, samples, number);
     const double none = (double)NAN;
     *contact = (TraceContact){.contact_time = none,
                               .contact_time_uncertainty = none,
@@ -331,26 +325,28 @@ static Status read_contact(double interval, const TraceOptions *way, const Conta
     contact->seen.last = (double)run->last * interval;
     contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
     contact->seen.crossing_uncertainty = interval / sqrt(6);
-    count_samples(found, run, way->separation, interval, contact);
+    trace_count_samples(found, run, options->separation, interval, contact);
     if (run->first == 0 || run->last == samples - 1) {
         contact->most_contact_time = (double)NAN;
-        return tell(&contact->why, "the trace %s during the contact",
-                    run->first == 0 ? "begins" : "ends");
+        return trace_status(sentence(&contact->why, "the trace %s during the contact",
+                                     run->first == 0 ? "begins" : "ends"));
     }
-    fill_window(found, run, &stretch, way->separation, window);
+    trace_fill_window(found, run, &part, options->separation, window);
     PulseFit fits[FITS_MAX];
     bool is_settled = true;
-    const size_t count = way->gravity > 0 ? fit_pulled(way, number, interval, fabs(run->peak),
-                                                       window, fits, &is_settled)
-                                          : pulse_fit_run(window, fits);
-    TRY(fit_contact(window, found, run, &stretch, interval, fits, count, contact));
+    const size_t count = options->gravity > 0
+                             ? trace_fit_pulled(options, number, interval, fabs(run->peak), window,
+                                                fits, &is_settled)
+                             : pulse_fit_run(window, fits);
+    TRY(trace_fit_contact(window, found, run, &part, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return tell(&contact->why,
-                    "gravity is taken into account in part only: the masses and this "
-                    "force do not lead to one approach speed; check them, or give it");
-    if (way->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
-        return tell(&contact->why, "gravity is not taken into account: neither the approach speed "
-                                   "nor the masses are known");
+        return trace_status(sentence(
+            &contact->why, "gravity is taken into account in part only: the masses and this "
+                           "force do not lead to one approach speed; check them, or give it"));
+    if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
+        return trace_status(
+            sentence(&contact->why, "gravity is not taken into account: neither the approach speed "
+                                    "nor the masses are known"));
     return STATUS_OK;
 }
 
@@ -368,47 +364,48 @@ Status trace_validate(double interval, const Reals *force, const char *pointer, 
     return STATUS_OK;
 }
 
-Status trace_analysis_run(double interval, const Reals *force, const TraceOptions *way,
-                          const char *pointer, TraceAnalysis *reading, Problem *problem) {
-    *reading = (TraceAnalysis){.why = NULL};
+Status trace_analysis_run(double interval, const Reals *force, const TraceOptions *options,
+                          const char *pointer, TraceAnalysis *analysis, Problem *problem) {
+    *analysis = (TraceAnalysis){.why = NULL};
     TRY(trace_validate(interval, force, pointer, problem));
     ContactDetection found;
     FitWindow *window = malloc(sizeof *window);
-    Status status = contact_detection_run(force, way->threshold, &found);
+    Status status = contact_detection_run(force, options->threshold, &found);
     if (status == STATUS_OK && window != NULL && found.count > 0) {
-        reading->contacts.at = calloc(found.count, sizeof *reading->contacts.at);
-        if (reading->contacts.at == NULL)
+        analysis->contacts.at = calloc(found.count, sizeof *analysis->contacts.at);
+        if (analysis->contacts.at == NULL)
             status = STATUS_NO_MEMORY;
     }
     if (window == NULL)
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK) {
         for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
-            if (!progress_advance(way->progress, (double)i / (double)found.count)) {
+            if (!progress_advance(options->progress, (double)i / (double)found.count)) {
                 status = STATUS_CANCELLED;
                 break;
             }
-            reading->contacts.count++;
-            status = read_contact(interval, way, &found, force->count, i, window,
-                                  &reading->contacts.at[i]);
+            analysis->contacts.count++;
+            status = trace_read_contact(interval, options, &found, force->count, i, window,
+                                        &analysis->contacts.at[i]);
         }
         if (status == STATUS_OK && found.count == 0)
-            status =
-                tell(&reading->why, "nothing rises above the threshold of %.3g N", found.threshold);
+            status = trace_status(sentence(
+                &analysis->why, "nothing rises above the threshold of %.3g N", found.threshold));
         if (status == STATUS_OK && found.is_full)
-            status = tell(&reading->why, "only the first %d contacts are read", TRACE_CONTACTS_MAX);
+            status = trace_status(sentence(&analysis->why, "only the first %d contacts are read",
+                                           TRACE_CONTACTS_MAX));
     }
     contact_detection_clear(&found);
     free(window);
     return status;
 }
 
-void trace_analysis_clear(TraceAnalysis *reading) {
-    for (size_t i = 0; i < reading->contacts.count; i++) {
-        fields_clear(trace_detection_fields, &reading->contacts.at[i].seen);
-        free(reading->contacts.at[i].why);
+void trace_analysis_clear(TraceAnalysis *analysis) {
+    for (size_t i = 0; i < analysis->contacts.count; i++) {
+        fields_clear(trace_detection_fields, &analysis->contacts.at[i].seen);
+        free(analysis->contacts.at[i].why);
     }
-    free(reading->contacts.at);
-    free(reading->why);
-    *reading = (TraceAnalysis){.why = NULL};
+    free(analysis->contacts.at);
+    free(analysis->why);
+    *analysis = (TraceAnalysis){.why = NULL};
 }

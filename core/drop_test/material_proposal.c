@@ -5,19 +5,10 @@
 #include <string.h>
 
 #include "core/base/text_format.h"
-#include "core/drop_test/reading_statistics.h"
 
 const char *const proposal_form_names[] = {"constant", "table", NULL};
 
 enum { SOURCE_MAX = 1000 };
-
-static bool has(double value) {
-    return !isnan(value);
-}
-
-static Status no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the proposal");
-}
 
 void material_proposal_clear(MaterialProposal *proposal) {
     fields_clear(material_fields, &proposal->material);
@@ -25,61 +16,41 @@ void material_proposal_clear(MaterialProposal *proposal) {
     proposal->why = NULL;
 }
 
-// What the material is, without its figures and where they came from.
-static Status describe(const Material *before, Material *material) {
-    TRY(fields_copy(material_fields, before, material));
-    free(material->table.at);
-    material->table = (MaterialRows){NULL, 0};
-    free(material->measurements.at);
-    material->measurements = (Reals){NULL, 0};
-    free(material->impactor);
-    material->impactor = NULL;
-    free(material->source);
-    material->source = NULL;
-    material->restitution = material->restitution_deviation = (double)NAN;
-    material->contact_time = material->contact_time_deviation = (double)NAN;
-    material->least_speed = material->most_speed = (double)NAN;
-    material->least_temperature = material->most_temperature = (double)NAN;
-    material->impactor_mass = material->base_mass = (double)NAN;
-    material->base = material->separation = CHOICE_ABSENT;
-    return STATUS_OK;
+// The description of the material without its figures and their source.
+static Status proposal_describe(const Material *before, Material *material) {
+    Material described = {.name = NULL};
+    fields_clear(material_fields, &described);
+    described.name = before->name;
+    described.kind = before->kind;
+    described.thickness = before->thickness;
+    described.hardness = before->hardness;
+    described.supplier = before->supplier;
+    described.notes = before->notes;
+    described.tags = before->tags;
+    return fields_copy(material_fields, &described, material);
 }
 
-static bool is_same(double a, double b) {
+// The rows that a revision is based on; by rising speed for a table.
+typedef struct Basis {
+    const EvaluationRow **rows;
+    size_t count;
+    Measurement *tests; // of the rows, in order
+    size_t test_count;
+} Basis;
+
+static bool proposal_is_same(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
-// What stands behind a revision: the tests of whose readings some do, and their ranges.
-typedef struct Behind {
-    const EvaluationRow **rows;
-    size_t count;
-    Measurement *tests; // in their order
-    size_t test_count;
-    Ranges ranges;
-} Behind;
-
-// Of rows that are all set; `tests` has room for all.
-static void look_behind(const Measurement *tests, size_t count, Behind *behind) {
-    behind->ranges = ranges_unknown;
-    for (size_t i = 0; i < behind->count; i++)
-        ranges_take(&behind->ranges, behind->rows[i], tests);
-    for (size_t test = 0; test < count; test++)
-        for (size_t i = 0; i < behind->count; i++)
-            if (behind->rows[i]->test == test) {
-                behind->tests[behind->test_count++] = tests[test];
-                break;
-            }
-}
-
-// What all tests have in common of impactor and base.
-static Status take_pair(const Behind *behind, Material *material, Warnings *warnings) {
-    const DropTest *first = behind->tests[0].test;
+// Impactor and base, if all tests have the same.
+static Status proposal_set_pair(const Basis *basis, Material *material, Warnings *warnings) {
+    const DropTest *first = basis->tests[0].test;
     bool is_one = true;
-    for (size_t i = 1; i < behind->test_count; i++) {
-        const DropTest *test = behind->tests[i].test;
+    for (size_t i = 1; i < basis->test_count; i++) {
+        const DropTest *test = basis->tests[i].test;
         is_one = is_one && text_same(test->impactor, first->impactor) &&
-                 is_same(test->impactor_mass, first->impactor_mass) && test->base == first->base &&
-                 is_same(test->base_mass, first->base_mass);
+                 proposal_is_same(test->impactor_mass, first->impactor_mass) &&
+                 test->base == first->base && proposal_is_same(test->base_mass, first->base_mass);
     }
     if (!is_one)
         return warnings_add(warnings, "/revision/impactor_mass",
@@ -93,21 +64,18 @@ static Status take_pair(const Behind *behind, Material *material, Warnings *warn
                : STATUS_NO_MEMORY;
 }
 
-static bool stands_before(const Measurement *tests, size_t index) {
-    for (size_t i = 0; i < index; i++)
-        if (text_same(tests[i].test->source, tests[index].test->source))
-            return true;
-    return false;
-}
-
-// Their sources, else their numbers.
-static Status take_source(const Behind *behind, Material *material) {
+// The different sources of the tests, else their numbers.
+static Status proposal_set_source(const Basis *basis, Material *material) {
     char text[SOURCE_MAX + 1] = "", number[32];
-    const Measurement *tests = behind->tests;
-    const size_t count = behind->test_count;
-    for (size_t i = 0; i < count; i++)
-        if (tests[i].test->source != NULL && !stands_before(tests, i))
+    const Measurement *tests = basis->tests;
+    const size_t count = basis->test_count;
+    for (size_t i = 0; i < count; i++) {
+        size_t first = 0;
+        while (!text_same(tests[first].test->source, tests[i].test->source))
+            first++;
+        if (tests[i].test->source != NULL && first == i)
             text_list(text, sizeof text, tests[i].test->source);
+    }
     if (text[0] == '\0') {
         snprintf(text, sizeof text, "measurements of this material:");
         for (size_t i = 0; i < count && tests[i].number != COUNT_ABSENT; i++) {
@@ -125,16 +93,34 @@ static Status take_source(const Behind *behind, Material *material) {
     return STATUS_OK;
 }
 
-static bool is_by_pulse(const Behind *behind) {
-    for (size_t i = 0; i < behind->count; i++)
-        if (behind->rows[i]->contact_time_counts &&
-            behind->rows[i]->contact_time_by == (int)CONTACT_TIME_BY_PULSE)
-            return true;
-    return false;
+// Ranges, separation rule, pair and source. `tests` of the basis has room for all.
+static Status proposal_set_basis(Evaluation *evaluation, const Measurement *tests, size_t count,
+                                 Basis *basis, Material *material) {
+    Ranges ranges = ranges_unknown;
+    for (size_t i = 0; i < basis->count; i++) {
+        const EvaluationRow *row = basis->rows[i];
+        ranges_extend(&ranges, row, tests);
+        if (row->contact_time_counts && row->contact_time_by == (int)CONTACT_TIME_BY_PULSE)
+            material->separation = evaluation->separation;
+    }
+    for (size_t test = 0; test < count; test++)
+        for (size_t i = 0; i < basis->count; i++)
+            if (basis->rows[i]->test == test) {
+                basis->tests[basis->test_count++] = tests[test];
+                break;
+            }
+    material->least_speed = ranges.least_speed;
+    material->most_speed = ranges.most_speed;
+    material->least_temperature = ranges.least_temperature;
+    material->most_temperature = ranges.most_temperature;
+    TRY(proposal_set_pair(basis, material, &evaluation->warnings));
+    return proposal_set_source(basis, material);
 }
 
-static Status take_constant(Evaluation *evaluation, Behind *behind, MaterialProposal *proposal) {
+static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
+                                    MaterialProposal *proposal) {
     Material *material = &proposal->material;
+    Warnings *warnings = &evaluation->warnings;
     const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
         return sentence(&proposal->why,
@@ -143,49 +129,48 @@ static Status take_constant(Evaluation *evaluation, Behind *behind, MaterialProp
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
     for (size_t i = 0; i < evaluation->rows.count; i++)
-        if (row_counts(&evaluation->rows.at[i]))
-            behind->rows[behind->count++] = &evaluation->rows.at[i];
+        if (reading_counts(&evaluation->rows.at[i]))
+            basis->rows[basis->count++] = &evaluation->rows.at[i];
     material->restitution = e->mean;
     material->restitution_deviation = e->spread;
     material->contact_time = T->mean;
     material->contact_time_deviation = T->spread;
     if (e->trend.verdict == TREND_NOT_CONSTANT)
-        TRY(warnings_add(&evaluation->warnings, "/revision/restitution", "%s", e->trend.detail));
+        TRY(warnings_add(warnings, "/revision/restitution", "%s", e->trend.detail));
     if (T->trend.verdict == TREND_NOT_CONSTANT)
-        TRY(warnings_add(&evaluation->warnings, "/revision/contact_time", "%s", T->trend.detail));
-    if (T->count == 0)
-        TRY(warnings_add(&evaluation->warnings, "/revision/contact_time",
-                         "no contact time is known: the material can be used in contact models of "
-                         "impulse alone"));
-    return STATUS_OK;
+        TRY(warnings_add(warnings, "/revision/contact_time", "%s", T->trend.detail));
+    return T->count > 0 ? STATUS_OK
+                        : warnings_add(warnings, "/revision/contact_time",
+                                       "no contact time is known: the material can be used in "
+                                       "contact models of impulse alone");
 }
 
-// One row of a table to be: so many rows from `first` on, by rising speed.
+// The rows of the basis that make one row of the table.
 typedef struct Bin {
     size_t first, count;
     bool has_restitution, has_time;
 } Bin;
 
-static int by_speed(const void *a, const void *b) {
+static int proposal_compare(const void *a, const void *b) {
     const double left = (*(const EvaluationRow *const *)a)->approach_speed;
     const double right = (*(const EvaluationRow *const *)b)->approach_speed;
     return left < right ? -1 : left > right ? 1 : 0;
 }
 
-// Rows that count and have a speed, in bins; `bins` has room for all rows.
-static size_t make_bins(const Evaluation *evaluation, Behind *behind, Bin *bins) {
+// Collects the rows that count and have a speed, in bins. `bins` has room for all rows.
+static size_t proposal_make_bins(const Evaluation *evaluation, Basis *basis, Bin *bins) {
     size_t count = 0;
     for (size_t i = 0; i < evaluation->rows.count; i++) {
         const EvaluationRow *row = &evaluation->rows.at[i];
-        if (row_counts(row) && has(row->approach_speed))
-            behind->rows[behind->count++] = row;
+        if (reading_counts(row) && !isnan(row->approach_speed))
+            basis->rows[basis->count++] = row;
     }
-    if (behind->count > 0)
-        qsort(behind->rows, behind->count, sizeof(const EvaluationRow *), by_speed);
-    for (size_t i = 0; i < behind->count; i++) {
-        const EvaluationRow *row = behind->rows[i];
-        if (count == 0 || row->approach_speed >
-                              PROPOSAL_BIN * behind->rows[bins[count - 1].first]->approach_speed)
+    if (basis->count > 0)
+        qsort(basis->rows, basis->count, sizeof(const EvaluationRow *), proposal_compare);
+    for (size_t i = 0; i < basis->count; i++) {
+        const EvaluationRow *row = basis->rows[i];
+        if (count == 0 ||
+            row->approach_speed > PROPOSAL_BIN * basis->rows[bins[count - 1].first]->approach_speed)
             bins[count++] = (Bin){.first = i};
         Bin *bin = &bins[count - 1];
         bin->count++;
@@ -195,8 +180,8 @@ static size_t make_bins(const Evaluation *evaluation, Behind *behind, Bin *bins)
     return count;
 }
 
-// Every row needs e, and T_c where any has it. The rows of other bins are given up.
-static size_t keep_bins(Behind *behind, Bin *bins, size_t count, bool *has_time) {
+// Every row of a table needs e, and T_c if any has it: drops the other bins with their rows.
+static size_t proposal_keep_bins(Basis *basis, Bin *bins, size_t count, bool *has_time) {
     size_t kept = 0, rows = 0;
     *has_time = false;
     for (size_t i = 0; i < count; i++)
@@ -207,61 +192,53 @@ static size_t keep_bins(Behind *behind, Bin *bins, size_t count, bool *has_time)
         bins[kept] = bins[i];
         bins[kept].first = rows;
         for (size_t k = 0; k < bins[i].count; k++)
-            behind->rows[rows++] = behind->rows[bins[i].first + k];
+            basis->rows[rows++] = basis->rows[bins[i].first + k];
         kept++;
     }
-    behind->count = rows;
+    basis->count = rows;
     return kept;
 }
 
-// By the same rule as of all readings.
-static Status fold(const Behind *behind, const Bin *bin, bool is_time, Reading *readings,
-                   double *mean, double *deviation) {
+// Mean and deviation of T_c or e in a bin, by the same rule as over all readings.
+static Status proposal_fold(const Basis *basis, const Bin *bin, bool is_time, Reading *readings,
+                            double *mean, double *deviation) {
     size_t count = 0;
-    for (size_t i = 0; i < bin->count; i++) {
-        const EvaluationRow *row = behind->rows[bin->first + i];
-        if (is_time ? row->contact_time_counts : row->restitution_counts)
-            readings[count++] = (Reading){
-                .value = is_time ? row->contact_time : row->restitution,
-                .uncertainty =
-                    is_time ? row->contact_time_uncertainty : row->restitution_uncertainty,
-                .speed = row->approach_speed,
-            };
-    }
-    Statistic quantity;
-    const Status status = statistic_make(readings, count, "reading", "", &quantity, NULL);
-    *mean = quantity.mean;
-    *deviation = quantity.spread;
-    statistic_clear(&quantity);
+    for (size_t i = 0; i < bin->count; i++)
+        count += reading_get(basis->rows[bin->first + i], is_time, &readings[count]);
+    Statistic statistic;
+    const Status status = reading_statistics_run(readings, count, "reading", "", &statistic, NULL);
+    *mean = statistic.mean;
+    *deviation = statistic.spread;
+    fields_clear(reading_statistic_fields, &statistic);
     return status;
 }
 
-static Status fill_table(const Behind *behind, const Bin *bins, size_t count, Reading *readings,
-                         Material *material) {
-    material->table.at = calloc(count, sizeof *material->table.at);
-    if (material->table.at == NULL)
+static Status proposal_fill_table(const Basis *basis, const Bin *bins, size_t count,
+                                  Reading *readings, MaterialRows *table) {
+    table->at = calloc(count, sizeof *table->at);
+    if (table->at == NULL)
         return STATUS_NO_MEMORY;
-    material->table.count = count;
+    table->count = count;
     for (size_t i = 0; i < count; i++) {
-        MaterialRow *row = &material->table.at[i];
+        MaterialRow *row = &table->at[i];
         double sum = 0;
         for (size_t k = 0; k < bins[i].count; k++)
-            sum += behind->rows[bins[i].first + k]->approach_speed;
+            sum += basis->rows[bins[i].first + k]->approach_speed;
         row->approach_speed = sum / (double)bins[i].count;
-        TRY(fold(behind, &bins[i], false, readings, &row->restitution,
-                 &row->restitution_deviation));
-        TRY(fold(behind, &bins[i], true, readings, &row->contact_time,
-                 &row->contact_time_deviation));
+        TRY(proposal_fold(basis, &bins[i], false, readings, &row->restitution,
+                          &row->restitution_deviation));
+        TRY(proposal_fold(basis, &bins[i], true, readings, &row->contact_time,
+                          &row->contact_time_deviation));
     }
     return STATUS_OK;
 }
 
-// `bins` and `readings` have room for all rows.
-static Status take_table(Evaluation *evaluation, Behind *behind, Bin *bins, Reading *readings,
-                         MaterialProposal *proposal) {
+// `bins` and `readings` have room for all rows and one more.
+static Status proposal_set_table(Evaluation *evaluation, Basis *basis, Bin *bins, Reading *readings,
+                                 MaterialProposal *proposal) {
     bool has_time;
-    const size_t all = make_bins(evaluation, behind, bins);
-    const size_t kept = keep_bins(behind, bins, all, &has_time);
+    const size_t all = proposal_make_bins(evaluation, basis, bins);
+    const size_t kept = proposal_keep_bins(basis, bins, all, &has_time);
     if (kept < 2 || kept > MATERIAL_ROWS)
         return sentence(&proposal->why,
                         "a table needs e%s at two approach speeds at least (%g times one "
@@ -269,62 +246,42 @@ static Status take_table(Evaluation *evaluation, Behind *behind, Bin *bins, Read
                         has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
-    TRY(fill_table(behind, bins, kept, readings, &proposal->material));
+    TRY(proposal_fill_table(basis, bins, kept, readings, &proposal->material.table));
     if (kept < all)
         TRY(warnings_add(&evaluation->warnings, "/revision/table",
                          "%zu of %zu speeds are left out: e%s is not known there", all - kept, all,
                          has_time ? " or T_c" : ""));
-    if (!has_time)
-        TRY(warnings_add(&evaluation->warnings, "/revision/table",
-                         "no contact time is known at any speed: the material can be used in "
-                         "contact models of impulse alone"));
-    return STATUS_OK;
-}
-
-static Status make(Evaluation *evaluation, const Measurement *tests, size_t count,
-                   const Material *before, ProposalForm form, Behind *behind,
-                   MaterialProposal *proposal) {
-    Material *material = &proposal->material;
-    TRY(describe(before, material));
-    if (form == PROPOSAL_TABLE) {
-        const size_t most = evaluation->rows.count + 1;
-        Bin *bins = calloc(most, sizeof *bins);
-        Reading *readings = calloc(most, sizeof *readings);
-        const Status status = bins != NULL && readings != NULL
-                                  ? take_table(evaluation, behind, bins, readings, proposal)
-                                  : STATUS_NO_MEMORY;
-        free(bins);
-        free(readings);
-        TRY(status);
-    } else {
-        TRY(take_constant(evaluation, behind, proposal));
-    }
-    if (proposal->why != NULL)
-        return STATUS_OK;
-    look_behind(tests, count, behind);
-    TRY(take_pair(behind, material, &evaluation->warnings));
-    TRY(take_source(behind, material));
-    material->least_speed = behind->ranges.least_speed;
-    material->most_speed = behind->ranges.most_speed;
-    material->least_temperature = behind->ranges.least_temperature;
-    material->most_temperature = behind->ranges.most_temperature;
-    if (is_by_pulse(behind))
-        material->separation = evaluation->separation;
-    return STATUS_OK;
+    return has_time ? STATUS_OK
+                    : warnings_add(&evaluation->warnings, "/revision/table",
+                                   "no contact time is known at any speed: the material can be "
+                                   "used in contact models of impulse alone");
 }
 
 Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,
                              const Material *before, ProposalForm form, MaterialProposal *proposal,
                              Problem *problem) {
     *proposal = (MaterialProposal){.why = NULL};
-    Behind behind = {.rows = calloc(evaluation->rows.count + 1, sizeof(const EvaluationRow *)),
-                     .tests = calloc(count + 1, sizeof(Measurement))};
-    const Status status = behind.rows != NULL && behind.tests != NULL
-                              ? make(evaluation, tests, count, before, form, &behind, proposal)
-                              : STATUS_NO_MEMORY;
-    free(behind.rows);
-    free(behind.tests);
+    const size_t room = evaluation->rows.count + 1;
+    Basis basis = {.rows = calloc(room, sizeof(const EvaluationRow *)),
+                   .tests = calloc(count + 1, sizeof(Measurement))};
+    Bin *bins = calloc(room, sizeof *bins);
+    Reading *readings = calloc(room, sizeof *readings);
+    Status status = basis.rows != NULL && basis.tests != NULL && bins != NULL && readings != NULL
+                        ? proposal_describe(before, &proposal->material)
+                        : STATUS_NO_MEMORY;
+    if (status == STATUS_OK)
+        status = form == PROPOSAL_TABLE
+                     ? proposal_set_table(evaluation, &basis, bins, readings, proposal)
+                     : proposal_set_constant(evaluation, &basis, proposal);
+    if (status == STATUS_OK && proposal->why == NULL)
+        status = proposal_set_basis(evaluation, tests, count, &basis, &proposal->material);
+    free(basis.rows);
+    free(basis.tests);
+    free(bins);
+    free(readings);
     if (status != STATUS_OK || proposal->why != NULL)
         fields_clear(material_fields, &proposal->material);
-    return status == STATUS_OK ? STATUS_OK : no_memory(problem);
+    return status == STATUS_OK
+               ? STATUS_OK
+               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the proposal");
 }

@@ -1,9 +1,11 @@
-// With relative standard deviations r_e and r_T, quadrature by the slopes of propagate.h gives
+// With relative standard deviations r_e and r_T, error propagation (identification_sensitivity.h)
+// gives
 //
 //   r_k^2 = (s_ke r_e)^2 + (2 r_T)^2,  r_c^2 = (r_e / ln e)^2 + r_T^2,
 //
-// whatever the mass: both are in proportion to it. Z, and what e and T_c become where k_b and c_b
-// are carried over from the test's pair, follow by differences of the identification itself.
+// for every mass: k_b and c_b are proportional to it. The uncertainties of Z, and of e and T_c
+// where k_b and c_b are those of the test's pair, follow by differences of the identification
+// itself.
 #include "core/drop_test/pair_parameters.h"
 
 #include <stdlib.h>
@@ -48,33 +50,29 @@ const Field pair_parameters_fields[] = {
 
 enum { RULES = 2, OUTPUTS = 3 };
 
-static const double mass_tolerance = 0.02; // of effective masses that are taken for the same
-
-static bool has(double value) {
-    return !isnan(value);
-}
+static const double mass_tolerance = 0.02; // of effective masses that are considered equal
 
 void pair_parameters_clear(PairParameters *pair) {
     fields_clear(pair_parameters_fields, pair);
     warnings_clear(&pair->warnings);
 }
 
-// What is known of one row, with relative deviations.
-typedef struct Known {
+// One row of the material, with relative deviations. NAN: unknown.
+typedef struct PairRow {
     double speed, e, T, r_e, r_T;
-} Known;
+} PairRow;
 
-static Known known_of(const Material *material, size_t index) {
+static PairRow pair_row(const Material *material, size_t index) {
     const MaterialRow constant = {(double)NAN, material->restitution, material->contact_time,
                                   material->restitution_deviation,
                                   material->contact_time_deviation};
     const MaterialRow *row = material->table.count > 0 ? &material->table.at[index] : &constant;
-    return (Known){row->approach_speed, row->restitution, row->contact_time,
-                   row->restitution_deviation / row->restitution,
-                   row->contact_time_deviation / row->contact_time};
+    return (PairRow){row->approach_speed, row->restitution, row->contact_time,
+                     row->restitution_deviation / row->restitution,
+                     row->contact_time_deviation / row->contact_time};
 }
 
-static PairFigure figure(double value, double relative) {
+static PairFigure pair_figure(double value, double relative) {
     if (!isfinite(value))
         return (PairFigure){(double)NAN, (double)NAN, (double)NAN, (double)NAN};
     const double factor = exp(student_quantile(0.95, 0) * relative);
@@ -83,35 +81,37 @@ static PairFigure figure(double value, double relative) {
     return (PairFigure){value, value * relative, value / factor, value * factor};
 }
 
-// Z, e and T_c of this pair of what the test's pair had.
-typedef struct Asked {
+// The pair, and how e and T_c of the material apply to it.
+typedef struct PairCase {
     double mass, test_mass;
     int identified_for;
     Separation separation;
-} Asked;
+} PairCase;
 
-static Identified identify(const Asked *asked, double e, double T) {
-    if (asked->identified_for != IDENTIFIED_FOR_RIG)
-        return identify_measured(asked->mass, e, T, asked->separation);
-    const Identified rig = identify_measured(asked->test_mass, e, T, asked->separation);
-    return identify_given(asked->mass, rig.stiffness, rig.damping, asked->separation);
+static Identified pair_identify(const PairCase *pair_case, double e, double T) {
+    if (pair_case->identified_for != IDENTIFIED_FOR_RIG)
+        return identify_measured(pair_case->mass, e, T, pair_case->separation);
+    const Identified rig = identify_measured(pair_case->test_mass, e, T, pair_case->separation);
+    return identify_given(pair_case->mass, rig.stiffness, rig.damping, pair_case->separation);
 }
 
-static void outputs(const Asked *asked, double log_e, double log_T, double values[OUTPUTS]) {
-    const Identified it = identify(asked, exp(log_e), exp(log_T));
+static void pair_outputs(const PairCase *pair_case, double log_e, double log_T,
+                         double values[OUTPUTS]) {
+    const Identified it = pair_identify(pair_case, exp(log_e), exp(log_T));
     values[0] = log(it.damping_ratio);
     values[1] = log(it.restitution);
     values[2] = log(it.contact_time);
 }
 
-// Relative uncertainties of Z, e and T_c; what does not depend on a deviation does not need it.
-static void spread(const Asked *asked, const Known *known, double relative[OUTPUTS]) {
+// Relative uncertainties of Z, e and T_c. An unknown deviation matters only where they depend on
+// it.
+static void pair_spread(const PairCase *pair_case, const PairRow *known, double relative[OUTPUTS]) {
     const double h = 1e-5, e = log(known->e), T = log(known->T);
     double more[OUTPUTS], less[OUTPUTS], late[OUTPUTS], soon[OUTPUTS];
-    outputs(asked, e - h, T, less);
-    outputs(asked, e + h > 0 ? e : e + h, T, more);
-    outputs(asked, e, T + h, late);
-    outputs(asked, e, T - h, soon);
+    pair_outputs(pair_case, e - h, T, less);
+    pair_outputs(pair_case, e + h > 0 ? e : e + h, T, more);
+    pair_outputs(pair_case, e, T + h, late);
+    pair_outputs(pair_case, e, T - h, soon);
     const double width = e + h > 0 ? h : 2 * h;
     for (int i = 0; i < OUTPUTS; i++) {
         const double by_e = (more[i] - less[i]) / width, by_T = (late[i] - soon[i]) / (2 * h);
@@ -121,60 +121,59 @@ static void spread(const Asked *asked, const Known *known, double relative[OUTPU
     }
 }
 
-static PairContact contact_of(const Asked *asked, const Known *known) {
-    const PairFigure none = figure((double)NAN, 0);
-    PairContact contact = {.separation = (int)asked->separation,
+static PairContact pair_contact(const PairCase *pair_case, const PairRow *known) {
+    const PairFigure none = pair_figure((double)NAN, 0);
+    PairContact contact = {.separation = (int)pair_case->separation,
                            .approach_speed = known->speed,
-                           .restitution = figure(known->e, known->r_e),
+                           .restitution = pair_figure(known->e, known->r_e),
                            .contact_time = none,
                            .stiffness = none,
                            .damping = none,
                            .damping_ratio = none};
     if (!(known->e > 0))
         return contact;
-    // Without a contact time Z is still known, and the same for every mass.
-    const bool has_time = has(known->T);
-    const Known with = {known->speed, known->e, has_time ? known->T : 1, known->r_e,
-                        has_time ? known->r_T : 0};
-    const Identified it = identify(asked, with.e, with.T);
+    // Z does not depend on the contact time.
+    const bool has_time = !isnan(known->T);
+    const PairRow with = {known->speed, known->e, has_time ? known->T : 1, known->r_e,
+                          has_time ? known->r_T : 0};
+    const Identified it = pair_identify(pair_case, with.e, with.T);
     double relative[OUTPUTS];
-    spread(asked, &with, relative);
-    contact.restitution = figure(it.restitution, relative[1]);
+    pair_spread(pair_case, &with, relative);
+    contact.restitution = pair_figure(it.restitution, relative[1]);
     contact.restitution.high =
-        has(contact.restitution.high) ? fmin(contact.restitution.high, 1) : (double)NAN;
-    contact.damping_ratio = figure(it.damping_ratio, relative[0]);
+        !isnan(contact.restitution.high) ? fmin(contact.restitution.high, 1) : (double)NAN;
+    contact.damping_ratio = pair_figure(it.damping_ratio, relative[0]);
     if (!has_time)
         return contact;
-    const Propagation by = propagate(with.e, asked->separation);
-    contact.contact_time = figure(it.contact_time, relative[2]);
-    contact.stiffness = figure(it.stiffness, hypot(by.stiffness_by_restitution * with.r_e,
-                                                   by.stiffness_by_contact_time * with.r_T));
-    contact.damping = figure(it.damping, hypot(by.damping_by_restitution * with.r_e,
-                                               by.damping_by_contact_time * with.r_T));
+    const Propagation by = propagate(with.e, pair_case->separation);
+    contact.contact_time = pair_figure(it.contact_time, relative[2]);
+    contact.stiffness = pair_figure(it.stiffness, hypot(by.stiffness_by_restitution * with.r_e,
+                                                        by.stiffness_by_contact_time * with.r_T));
+    contact.damping = pair_figure(it.damping, hypot(by.damping_by_restitution * with.r_e,
+                                                    by.damping_by_contact_time * with.r_T));
     return contact;
 }
 
-static Status fill(const Material *material, int separation, PairParameters *pair) {
+static Status pair_fill(const Material *material, int separation, PairParameters *pair) {
     const size_t rows = material->table.count > 0 ? material->table.count : 1;
     pair->contacts.at = calloc(rows * RULES, sizeof *pair->contacts.at);
     if (pair->contacts.at == NULL)
         return STATUS_NO_MEMORY;
     for (size_t i = 0; i < rows; i++)
         for (int rule = 0; rule < RULES; rule++) {
-            const Known known = known_of(material, i);
-            const Asked asked = {pair->effective_mass, pair->test_mass, pair->identified_for,
-                                 (Separation)rule};
+            const PairRow known = pair_row(material, i);
+            const PairCase pair_case = {pair->effective_mass, pair->test_mass, pair->identified_for,
+                                        (Separation)rule};
             if (separation == CHOICE_ABSENT || separation == rule)
-                pair->contacts.at[pair->contacts.count++] = contact_of(&asked, &known);
+                pair->contacts.at[pair->contacts.count++] = pair_contact(&pair_case, &known);
         }
     return STATUS_OK;
 }
 
-// What e and T_c would be if the buffer's k_b and c_b were those of the test's pair.
-static Status warn_of_mass(const Material *material, PairParameters *pair) {
+static Status pair_warn_of_mass(const Material *material, PairParameters *pair) {
     const double mass = pair->effective_mass, test = pair->test_mass;
     const bool is_rig = pair->identified_for == IDENTIFIED_FOR_RIG;
-    if (!has(test))
+    if (isnan(test))
         return warnings_add(&pair->warnings, "/test_mass",
                             "the masses of the test are not known: e and T_c belong to its pair, "
                             "and nobody can tell how far this one is from it");
@@ -187,15 +186,15 @@ static Status warn_of_mass(const Material *material, PairParameters *pair) {
                             "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
                             "kg: k_b and c_b are carried over, e and T_c are those that follow",
                             mass, percent, side, test);
-    const Known known = known_of(material, 0);
+    const PairRow known = pair_row(material, 0);
     const int rule = pair->contacts.at[0].separation;
-    if (!has(known.T) || !(known.e > 0))
+    if (isnan(known.T) || !(known.e > 0))
         return warnings_add(&pair->warnings, "/effective_mass",
                             "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
                             "kg: e belongs to the test's pair",
                             mass, percent, side, test);
-    const Asked asked = {mass, test, IDENTIFIED_FOR_RIG, (Separation)rule};
-    const Identified it = identify(&asked, known.e, known.T);
+    const PairCase pair_case = {mass, test, IDENTIFIED_FOR_RIG, (Separation)rule};
+    const Identified it = pair_identify(&pair_case, known.e, known.T);
     return warnings_add(&pair->warnings, "/effective_mass",
                         "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g kg: "
                         "e and T_c belong to the test's pair; were k_b and c_b those of the test "
@@ -205,15 +204,16 @@ static Status warn_of_mass(const Material *material, PairParameters *pair) {
                         known.T);
 }
 
-static Status warn_of_material(const Material *material, int separation, PairParameters *pair) {
+static Status pair_warn_of_material(const Material *material, int separation,
+                                    PairParameters *pair) {
     const size_t rows = material->table.count > 0 ? material->table.count : 1;
     bool has_time = true, has_e = true, has_T = true, is_dead = false;
     for (size_t i = 0; i < rows; i++) {
-        const Known known = known_of(material, i);
-        has_time = has_time && has(known.T);
+        const PairRow known = pair_row(material, i);
+        has_time = has_time && !isnan(known.T);
         is_dead = is_dead || !(known.e > 0);
-        has_e = has_e && has(known.r_e);
-        has_T = has_T && has(known.r_T);
+        has_e = has_e && !isnan(known.r_e);
+        has_T = has_T && !isnan(known.r_T);
     }
     Warnings *to = &pair->warnings;
     if (!has_time)
@@ -236,17 +236,17 @@ static Status warn_of_material(const Material *material, int separation, PairPar
                          "evaluation of the same test would give differently",
                          separation_names[material->separation],
                          separation_names[1 - material->separation]));
-    if (!has(pair->least_speed) || !has(pair->most_speed))
+    if (isnan(pair->least_speed) || isnan(pair->most_speed))
         TRY(warnings_add(to, "/least_speed",
                          "the material does not state the range of approach speeds that was "
                          "measured"));
     return STATUS_OK;
 }
 
-static Status warn_of_sticking(PairParameters *pair) {
+static Status pair_warn_of_overdamping(PairParameters *pair) {
     for (size_t i = 0; i < pair->contacts.count; i++) {
         const PairContact *contact = &pair->contacts.at[i];
-        if (has(contact->stiffness.value) && !has(contact->contact_time.value))
+        if (!isnan(contact->stiffness.value) && isnan(contact->contact_time.value))
             return warnings_add(&pair->warnings, "/contacts",
                                 "with this pair the contact is overdamped (Z = %.3g) and never "
                                 "ends under %s",
@@ -264,22 +264,22 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
         .structure_mass = structure_mass,
         .identified_for = identified_for,
         .effective_mass =
-            has(structure_mass) ? effective_mass(damper_mass, structure_mass) : damper_mass,
+            !isnan(structure_mass) ? effective_mass(damper_mass, structure_mass) : damper_mass,
         .test_mass = material_test_mass(material),
     };
     material_speeds(material, &pair->least_speed, &pair->most_speed);
-    if (identified_for == IDENTIFIED_FOR_RIG && !has(pair->test_mass))
+    if (identified_for == IDENTIFIED_FOR_RIG && isnan(pair->test_mass))
         return problem_add(problem, STATUS_INVALID, "/identified_for",
                            "must be scene: the material does not state the test's masses "
                            "(impactor_mass, base, and base_mass of a free one), so that nothing "
                            "can be carried over from its rig");
-    Status status = fill(material, separation, pair);
+    Status status = pair_fill(material, separation, pair);
     if (status == STATUS_OK)
-        status = warn_of_mass(material, pair);
+        status = pair_warn_of_mass(material, pair);
     if (status == STATUS_OK)
-        status = warn_of_material(material, separation, pair);
+        status = pair_warn_of_material(material, separation, pair);
     if (status == STATUS_OK)
-        status = warn_of_sticking(pair);
+        status = pair_warn_of_overdamping(pair);
     return status == STATUS_OK ? STATUS_OK
                                : problem_set(problem, STATUS_NO_MEMORY, "no memory for it");
 }

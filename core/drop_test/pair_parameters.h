@@ -1,6 +1,5 @@
-// What a material comes to for one pair of masses: k_b, c_b and Z with what the spread of e and T_c
-// leaves of them, and how far they are to be believed. Not the identification itself
-// (contact/identify.h) and not a scene's plan. Used by whoever shows it.
+// Contact parameters of a material for one pair of masses: k_b, c_b and Z with the uncertainty that
+// follows from that of e and T_c, and warnings about their validity.
 #ifndef CORE_DROP_TEST_PAIR_PARAMETERS_H
 #define CORE_DROP_TEST_PAIR_PARAMETERS_H
 
@@ -8,10 +7,10 @@
 #include "core/scene/damper.h"
 #include "core/scene/material.h"
 
-// A figure with its standard uncertainty, from the standard deviations of e and T_c: of one
-// contact, not of a mean. low and high are the value over and times exp(1.96 u) with the relative
-// uncertainty u: 95 % of contacts lie between them if e and T_c scatter log-normally with just
-// these deviations; that they were told by few readings is not in it. NAN: not known.
+// A value with its standard uncertainty, from the standard deviations of e and T_c: of one contact,
+// not of a mean. low and high are the value over and times exp(1.96 u) with the relative
+// uncertainty u: 95 % of contacts if e and T_c are log-normal with these deviations. The number of
+// readings behind the deviations is ignored. NAN: unknown.
 typedef struct PairFigure {
     double value, uncertainty, low, high;
 } PairFigure;
@@ -31,19 +30,19 @@ typedef struct PairContacts {
 
 typedef struct PairParameters {
     double damper_mass;             // [kg]
-    double structure_mass;          // NAN: it does not move [kg]
+    double structure_mass;          // NAN: fixed [kg]
     int identified_for;             // IdentifiedFor
     double effective_mass;          // [kg]
-    double test_mass;               // of the test's pair; NAN: not known [kg]
-    double least_speed, most_speed; // for which the material was measured; NAN [m/s]
+    double test_mass;               // of the test's pair; NAN: unknown [kg]
+    double least_speed, most_speed; // measured; NAN: unknown [m/s]
     PairContacts contacts;          // by row, then by rule
     Warnings warnings;
 } PairParameters;
 
 extern const Field pair_parameters_fields[]; // without the warnings
 
-// What is asked: a good material, masses above 0 (structure_mass NAN: fixed), and a rule or
-// CHOICE_ABSENT for both. STATUS_INVALID at "/identified_for" where the rig is not known. Cleared
+// Of a valid material, masses above 0 (structure_mass NAN: fixed) and one separation rule or both
+// (CHOICE_ABSENT). STATUS_INVALID at "/identified_for": the masses of the rig are unknown. Released
 // by pair_parameters_clear in any case.
 Status pair_parameters_run(const Material *material, double damper_mass, double structure_mass,
                            int identified_for, int separation, PairParameters *pair,

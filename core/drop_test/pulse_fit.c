@@ -1,8 +1,9 @@
-// Variable projection: for a start, an end and L the model's pulse f is known but for its size A
-// and the baseline b, which are linear: what is left to minimise is the sum of squares of x - A f -
-// b over start, end and L. The force jumps where a contact begins and ends, so the sum is smooth
-// only as long as the same samples are in contact: within a box, start and end stay in their gaps
-// between samples. There Levenberg and Marquardt's method serves; from box to box the fit climbs.
+// Variable projection: for given start, end and L the pulse f is fixed but for its amplitude A and
+// the baseline b, which are linear. What remains is to minimise the sum of squares of x - A f - b
+// over start, end and L. The force jumps where a contact starts and ends, so the sum is smooth only
+// while the same samples are in contact: within a box, start and end stay in their gaps between
+// samples. Levenberg and Marquardt's method finds the minimum of a box; a search moves from box to
+// box.
 #include "core/drop_test/pulse_fit.h"
 
 #include <float.h>
@@ -11,64 +12,62 @@
 
 #include "core/base/status.h"
 
-enum { START, END, DECAY };
-
-static const double least_decay = -1,
-                    most_decay = 4.6; // e from 2.7, which only noise makes, to 0.01
+// e from 2.7, which only noise causes, to 0.01.
+static const double decay_min = -1, decay_max = 4.6;
 
 FitBox fit_box_make(long first, long last, long gaps) {
     return (FitBox){
-        .least = {(double)(first - gaps), (double)last, least_decay},
-        .most = {(double)first, (double)(last + gaps), most_decay},
+        .least = {(double)(first - gaps), (double)last, decay_min},
+        .most = {(double)first, (double)(last + gaps), decay_max},
         .first = first - gaps + 1,
         .last = last + gaps - 1,
     };
 }
 
-bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *shape,
+bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *model,
                      double *contact_time) {
-    const double length = point->part[END] - point->part[START];
-    *shape = pulse_model_make_lasting(point->part[DECAY], window->pull_rate * length,
+    const double length = point->part[FIT_END] - point->part[FIT_START];
+    *model = pulse_model_make_lasting(point->part[FIT_DECAY], window->pull_rate * length,
                                       window->separation);
-    *contact_time = length / shape->length;
-    return length > 0 && isfinite(shape->length);
+    *contact_time = length / model->length;
+    return length > 0 && isfinite(model->length);
 }
 
-// The samples in contact; false: none.
-static bool members(const FitWindow *window, const FitPoint *point, const FitBox *box, long *first,
-                    long *last) {
+// The samples in contact; false: there are none.
+static bool fit_samples(const FitWindow *window, const FitPoint *point, const FitBox *box,
+                        long *first, long *last) {
     const long end = (long)(window->blocks * window->per_block) - 1;
-    *first = (long)fmax(ceil(point->part[START]), (double)box->first);
-    *last = (long)fmin(floor(point->part[END]), (double)box->last);
+    *first = (long)fmax(ceil(point->part[FIT_START]), (double)box->first);
+    *last = (long)fmin(floor(point->part[FIT_END]), (double)box->last);
     return *first >= 0 && *last <= end && *first <= *last;
 }
 
-// The mean of so many values about s, `step` from one to the next: by the second difference over
-// their width, which is all that matters of a pulse over a block.
-static double mean_about(const PulseModel *shape, double s, double step, long count) {
-    const double middle = pulse_model_force(shape, s), half = step * (double)count / 2;
+// The mean of `count` values about s at distances `step`, by the second difference over their
+// width; higher terms do not matter for a pulse over a block.
+static double fit_mean(const PulseModel *model, double s, double step, long count) {
+    const double middle = pulse_model_force(model, s), half = step * (double)count / 2;
     if (count == 1)
         return middle;
     const double about =
-        (pulse_model_force(shape, s - half) + pulse_model_force(shape, s + half)) / 2;
+        (pulse_model_force(model, s - half) + pulse_model_force(model, s + half)) / 2;
     return middle + (about - middle) * (1 - 1 / ((double)count * (double)count)) / 3;
 }
 
-// The pulse of size 1 over blocks; those from *from to *to are other than 0.
-static bool pulse(const FitWindow *window, const FitPoint *point, long first, long last, double *f,
-                  size_t *from, size_t *to) {
-    PulseModel shape;
+// The pulse of unit amplitude over blocks; it is not 0 in those from *from to *to.
+static bool fit_pulse(const FitWindow *window, const FitPoint *point, long first, long last,
+                      double *f, size_t *from, size_t *to) {
+    PulseModel model;
     double T;
-    if (!pulse_fit_model(window, point, &shape, &T))
+    if (!pulse_fit_model(window, point, &model, &T))
         return false;
     const long m = (long)window->per_block;
     const long begin = first / m, end = last / m;
     *from = (size_t)begin;
     *to = (size_t)end;
-    // In whole blocks the pulse's oscillation follows from the two blocks before.
-    const double step = (double)m / T, x = sqrt(fabs(shape.turn)) * step;
-    const double fall = exp(-shape.decay * step), back = fall * fall;
-    const double turn = 2 * fall * (shape.turn > 0 ? cos(x) : cosh(x));
+    // In whole blocks the oscillation follows from the two blocks before.
+    const double step = (double)m / T, x = sqrt(fabs(model.turn)) * step;
+    const double fall = exp(-model.decay * step), back = fall * fall;
+    const double turn = 2 * fall * (model.turn > 0 ? cos(x) : cosh(x));
     double before = 0, here = 0;
     for (long k = begin; k <= end; k++) {
         const long lowest = k * m > first ? k * m : first;
@@ -76,20 +75,21 @@ static bool pulse(const FitWindow *window, const FitPoint *point, long first, lo
         const bool is_whole = highest - lowest + 1 == m;
         double value;
         if (is_whole && k >= begin + 3) {
-            value = turn * here - back * before + shape.pull;
+            value = turn * here - back * before + model.pull;
         } else {
             const double centre = (double)lowest + (double)(highest - lowest) / 2;
-            value =
-                mean_about(&shape, (centre - point->part[START]) / T, 1 / T, highest - lowest + 1);
+            value = fit_mean(&model, (centre - point->part[FIT_START]) / T, 1 / T,
+                             highest - lowest + 1);
         }
         before = here;
-        here = value - shape.pull;
+        here = value - model.pull;
         f[k] = is_whole ? value : value * (double)(highest - lowest + 1) / (double)m;
     }
     return true;
 }
 
-static FitResidual residue(const FitWindow *window, const double *f, size_t from, size_t to) {
+static FitResidual fit_residual_of(const FitWindow *window, const double *f, size_t from,
+                                   size_t to) {
     const double n = (double)window->blocks, m = (double)window->per_block;
     double sum = 0, square = 0, product = 0;
     for (size_t k = from; k <= to; k++) {
@@ -101,7 +101,7 @@ static FitResidual residue(const FitWindow *window, const double *f, size_t from
     const double A = fx / ff, b = (window->sum - A * sum) / n;
     if (!(ff > 0) || !(A > 0))
         return (FitResidual){.sum = (double)INFINITY};
-    // In full where it matters: a difference of sums would lose small residues.
+    // A difference of sums loses the digits of small residuals: those are summed directly.
     double left = 0;
     for (size_t k = from; k <= to; k++) {
         const double r = window->mean[k] - A * f[k] - b;
@@ -121,42 +121,42 @@ static FitResidual residue(const FitWindow *window, const double *f, size_t from
     return (FitResidual){.sum = m * left, .amplitude = A, .baseline = b, .model_square = m * ff};
 }
 
-// INFINITY as sum where there is no such contact, or one of the other sign.
-static FitResidual residue_at(const FitWindow *window, const FitPoint *point, const FitBox *box) {
+static FitResidual fit_residual_at(const FitWindow *window, const FitPoint *point,
+                                   const FitBox *box) {
     double f[FIT_BLOCKS_MAX];
     long first, last;
     size_t from, to;
-    if (!members(window, point, box, &first, &last) ||
-        !pulse(window, point, first, last, f, &from, &to))
+    if (!fit_samples(window, point, box, &first, &last) ||
+        !fit_pulse(window, point, first, last, f, &from, &to))
         return (FitResidual){.sum = (double)INFINITY};
-    return residue(window, f, from, to);
+    return fit_residual_of(window, f, from, to);
 }
 
 // Slope and curvature of half the sum of squares, by differences of the pulse with the same samples
-// in contact; what size and baseline take up is projected out.
-static bool derive(const FitWindow *window, const FitBox *box, PulseFit *fit) {
+// in contact; amplitude and baseline are projected out.
+static bool fit_derive(const FitWindow *window, const FitBox *box, PulseFit *fit) {
     double f[FIT_BLOCKS_MAX], above[FIT_BLOCKS_MAX], d[FIT_PARTS][FIT_BLOCKS_MAX];
     long first, last;
     size_t from, to;
-    if (!members(window, &fit->at, box, &first, &last) ||
-        !pulse(window, &fit->at, first, last, f, &from, &to))
+    if (!fit_samples(window, &fit->at, box, &first, &last) ||
+        !fit_pulse(window, &fit->at, first, last, f, &from, &to))
         return false;
     const double n = (double)window->blocks, m = (double)window->per_block;
-    const double A = fit->residue.amplitude, b = fit->residue.baseline;
-    const double length = fit->at.part[END] - fit->at.part[START];
+    const double A = fit->residual.amplitude, b = fit->residual.baseline;
+    const double length = fit->at.part[FIT_END] - fit->at.part[FIT_START];
     double f_sum = 0, ff = 0, d_sum[FIT_PARTS] = {0}, df[FIT_PARTS] = {0};
     for (size_t k = from; k <= to; k++) {
         f_sum += f[k];
         ff += f[k] * f[k];
     }
     for (int p = 0; p < FIT_PARTS; p++) {
-        const double step = 1e-5 * (p == DECAY ? 1 : length);
+        const double step = 1e-5 * (p == FIT_DECAY ? 1 : length);
         FitPoint point = fit->at;
         point.part[p] += step;
-        if (!pulse(window, &point, first, last, above, &from, &to))
+        if (!fit_pulse(window, &point, first, last, above, &from, &to))
             return false;
         point.part[p] -= 2 * step;
-        if (!pulse(window, &point, first, last, d[p], &from, &to))
+        if (!fit_pulse(window, &point, first, last, d[p], &from, &to))
             return false;
         for (size_t k = from; k <= to; k++) {
             d[p][k] = A * (above[k] - d[p][k]) / (2 * step);
@@ -182,7 +182,7 @@ static bool derive(const FitWindow *window, const FitBox *box, PulseFit *fit) {
 }
 
 // (curvature + damping diagonal) step = -slope over the free parts, by elimination.
-static bool solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
+static bool fit_solve(const PulseFit *fit, const bool *is_free, double damping, double *step) {
     double a[FIT_PARTS][FIT_PARTS + 1];
     int at[FIT_PARTS], n = 0;
     for (int p = 0; p < FIT_PARTS; p++) {
@@ -216,20 +216,20 @@ static bool solve(const PulseFit *fit, const bool *is_free, double damping, doub
 void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit) {
     for (int p = 0; p < FIT_PARTS; p++)
         fit->at.part[p] = fmin(fmax(fit->at.part[p], box->least[p]), box->most[p]);
-    fit->residue = residue_at(window, &fit->at, box);
+    fit->residual = fit_residual_at(window, &fit->at, box);
     double damping = 1e-3;
     bool is_derived = false;
-    for (int round = 0; round < 60 && isfinite(fit->residue.sum); round++) {
-        if (!is_derived && !derive(window, box, fit))
+    for (int round = 0; round < 60 && isfinite(fit->residual.sum); round++) {
+        if (!is_derived && !fit_derive(window, box, fit))
             return;
         is_derived = true;
-        // What stands at a wall and wants through it stays there.
+        // A part at a bound whose slope points outward is fixed there.
         bool is_free[FIT_PARTS];
         for (int p = 0; p < FIT_PARTS; p++)
             is_free[p] = !(fit->at.part[p] <= box->least[p] && fit->slope[p] > 0) &&
                          !(fit->at.part[p] >= box->most[p] && fit->slope[p] < 0);
         double step[FIT_PARTS];
-        if (!solve(fit, is_free, damping, step)) {
+        if (!fit_solve(fit, is_free, damping, step)) {
             damping = 10 * damping + 1e-9;
             if (damping > 1e9)
                 return;
@@ -242,10 +242,10 @@ void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit)
             gain -= step[p] * fit->slope[p];
             size = fmax(size, fabs(next.at.part[p] - fit->at.part[p]));
         }
-        next.residue = residue_at(window, &next.at, box);
-        if (next.residue.sum < fit->residue.sum) {
-            const bool is_done = fit->residue.sum - next.residue.sum <
-                                 1e-7 * pulse_fit_variance(window, next.residue.sum);
+        next.residual = fit_residual_at(window, &next.at, box);
+        if (next.residual.sum < fit->residual.sum) {
+            const bool is_done = fit->residual.sum - next.residual.sum <
+                                 1e-7 * pulse_fit_variance(window, next.residual.sum);
             *fit = next;
             is_derived = false;
             damping /= 10;
@@ -254,18 +254,18 @@ void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit)
         } else {
             damping = 10 * damping + 1e-9;
             if (damping > 1e9 || size < 1e-12 ||
-                gain < 1e-9 * pulse_fit_variance(window, fit->residue.sum))
+                gain < 1e-9 * pulse_fit_variance(window, fit->residual.sum))
                 break;
         }
     }
     if (!is_derived)
-        derive(window, box, fit);
-    members(window, &fit->at, box, &fit->first, &fit->last);
+        fit_derive(window, box, fit);
+    fit_samples(window, &fit->at, box, &fit->first, &fit->last);
 }
 
 double pulse_fit_variance(const FitWindow *window, double sum) {
     const double n = (double)window->blocks + window->noise_freedom;
-    // Rounding of the data and of the model is noise as well.
+    // 1e-16: rounding of data and model is noise as well.
     return (sum + window->noise_square) / fmax(n - 5, 1) + 1e-16;
 }
 
@@ -274,64 +274,64 @@ double pulse_fit_log_likelihood(const FitWindow *window, double sum) {
     return -fmax(n - 5, 1) / 2 * log((sum + window->noise_square) + fmax(n - 5, 1) * 1e-16);
 }
 
-// Coarsely over starts and ends, for one L.
-static bool seek(const FitWindow *window, double decay, PulseFit *fit) {
+// The best of a coarse grid of starts and ends, for one L.
+static bool fit_search_grid(const FitWindow *window, double decay, PulseFit *fit) {
     enum { PLACES = 7 };
     const long lead = window->first - window->least_start, tail = window->most_end - window->last;
     const long lead_step = lead / PLACES + 1, tail_step = tail / PLACES + 1;
-    fit->residue.sum = (double)INFINITY;
+    fit->residual.sum = (double)INFINITY;
     for (long first = window->first; first >= window->least_start; first -= lead_step)
         for (long last = window->last; last <= window->most_end; last += tail_step) {
             const FitBox box = fit_box_make(first, last, 1);
             const FitPoint point = {{(double)first - 0.5, (double)last + 0.5, decay}};
-            const FitResidual left = residue_at(window, &point, &box);
-            if (left.sum < fit->residue.sum) {
+            const FitResidual left = fit_residual_at(window, &point, &box);
+            if (left.sum < fit->residual.sum) {
                 fit->at = point;
-                fit->residue = left;
+                fit->residual = left;
             }
         }
-    return isfinite(fit->residue.sum);
+    return isfinite(fit->residual.sum);
 }
 
-// From gap to gap as long as it gets better.
-static void climb(const FitWindow *window, PulseFit *fit) {
+// Moves from gap to gap while the fit improves.
+static void fit_climb(const FitWindow *window, PulseFit *fit) {
     static const int moves[8][2] = {{0, 1}, {0, -1},  {1, 0},  {-1, 0},
                                     {1, 1}, {-1, -1}, {-1, 1}, {1, -1}};
     long stride = 1;
-    for (int way = 0, failed = 0; failed < 8; way = (way + 1) % 8) {
-        const long from = fit->first + stride * moves[way][0];
-        const long to = fit->last + stride * moves[way][1];
+    for (int move = 0, failed = 0; failed < 8; move = (move + 1) % 8) {
+        const long from = fit->first + stride * moves[move][0];
+        const long to = fit->last + stride * moves[move][1];
         PulseFit other = *fit;
-        other.residue.sum = (double)INFINITY;
+        other.residual.sum = (double)INFINITY;
         if (from >= window->least_start && from <= window->first && to >= window->last &&
             to <= window->most_end) {
             const FitBox box = fit_box_make(from, to, 1);
             pulse_fit_in_box(window, &box, &other);
         }
-        if (other.residue.sum < fit->residue.sum * (1 - 1e-9)) {
+        if (other.residual.sum < fit->residual.sum * (1 - 1e-9)) {
             *fit = other;
             failed = 0;
-            way--; // once more the same way, twice as far
+            move--; // once more in this direction, twice as far
             stride *= 2;
         } else if (stride > 1) {
             stride = 1;
-            way--;
+            move--;
         } else {
             failed++;
         }
     }
 }
 
-static bool is_known(const PulseFit *fits, size_t count, const PulseFit *fit) {
+static bool fit_is_found(const PulseFit *fits, size_t count, const PulseFit *fit) {
     for (size_t i = 0; i < count; i++)
         if (fit->first == fits[i].first && fit->last == fits[i].last)
             return true;
     return false;
 }
 
-static size_t insert(PulseFit *fits, size_t count, const PulseFit *fit) {
+static size_t fit_insert(PulseFit *fits, size_t count, const PulseFit *fit) {
     size_t at = count;
-    for (; at > 0 && fits[at - 1].residue.sum > fit->residue.sum; at--)
+    for (; at > 0 && fits[at - 1].residual.sum > fit->residual.sum; at--)
         fits[at] = fits[at - 1];
     fits[at] = *fit;
     return count + 1;
@@ -340,8 +340,8 @@ static size_t insert(PulseFit *fits, size_t count, const PulseFit *fit) {
 size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]) {
     static const double decays[FITS_MAX] = {0.02, 0.3, 0.7, 1.3, 2, 3};
     const FitBox wide = {
-        .least = {(double)window->least_start - 1, (double)window->last, least_decay},
-        .most = {(double)window->first, (double)window->most_end + 1, most_decay},
+        .least = {(double)window->least_start - 1, (double)window->last, decay_min},
+        .most = {(double)window->first, (double)window->most_end + 1, decay_max},
         .first = window->least_start,
         .last = window->most_end,
     };
@@ -349,23 +349,23 @@ size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]) {
     size_t seeded = 0, count = 0;
     for (size_t i = 0; i < FITS_MAX; i++) {
         PulseFit fit;
-        if (!seek(window, decays[i], &fit))
+        if (!fit_search_grid(window, decays[i], &fit))
             continue;
-        // As if there were no jumps.
+        // First as if there were no jumps.
         pulse_fit_in_box(window, &wide, &fit);
         const FitBox box = fit_box_make(fit.first, fit.last, 1);
         pulse_fit_in_box(window, &box, &fit);
-        if (isfinite(fit.residue.sum) && !is_known(seeds, seeded, &fit))
-            seeded = insert(seeds, seeded, &fit);
+        if (isfinite(fit.residual.sum) && !fit_is_found(seeds, seeded, &fit))
+            seeded = fit_insert(seeds, seeded, &fit);
     }
     for (size_t i = 0; i < seeded; i++) {
-        // Hopelessly worse than the best: no climbing mends that.
-        if (i > 0 && pulse_fit_log_likelihood(window, seeds[i].residue.sum) <
-                         pulse_fit_log_likelihood(window, fits[0].residue.sum) - 40)
+        // Too much worse than the best: a search from here cannot reach it.
+        if (i > 0 && pulse_fit_log_likelihood(window, seeds[i].residual.sum) <
+                         pulse_fit_log_likelihood(window, fits[0].residual.sum) - 40)
             break;
-        climb(window, &seeds[i]);
-        if (!is_known(fits, count, &seeds[i]))
-            count = insert(fits, count, &seeds[i]);
+        fit_climb(window, &seeds[i]);
+        if (!fit_is_found(fits, count, &seeds[i]))
+            count = fit_insert(fits, count, &seeds[i]);
     }
     return count;
 }
@@ -373,6 +373,6 @@ size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]) {
 void pulse_fit_continue(const FitWindow *window, PulseFit *fit) {
     const FitBox box = fit_box_make(fit->first, fit->last, 1);
     pulse_fit_in_box(window, &box, fit);
-    if (isfinite(fit->residue.sum))
-        climb(window, fit);
+    if (isfinite(fit->residual.sum))
+        fit_climb(window, fit);
 }

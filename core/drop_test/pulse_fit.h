@@ -1,6 +1,5 @@
-// The model's pulse fitted to one stretch of a force trace: least squares over its start, its end
-// and e, with size and baseline. Not finding the stretch (contact_detection_run.h) and not how sure
-// the figures are (fit_confidence_run.h). Used by trace.c and fit_confidence_run.c.
+// Least-squares fit of the model's pulse to one window of a force trace: start, end, decay,
+// amplitude and baseline.
 #ifndef CORE_DROP_TEST_PULSE_FIT_H
 #define CORE_DROP_TEST_PULSE_FIT_H
 
@@ -9,33 +8,35 @@
 #include <stddef.h>
 
 enum { FIT_BLOCKS_MAX = 512, FIT_PARTS = 3, FITS_MAX = 6 };
+enum { FIT_START, FIT_END, FIT_DECAY }; // of FIT_PARTS
 
-// The stretch, in means of so many samples each; samples count from its beginning.
+// The window, as means of per_block samples each. Samples count from its beginning; forces are in
+// units of the peak.
 typedef struct FitWindow {
-    double mean[FIT_BLOCKS_MAX]; // [peak]
+    double mean[FIT_BLOCKS_MAX];
     size_t blocks, per_block;
     double sum, square; // of the means, and of their squares
-    // What the rest of the trace says of the noise: sum of squares and degrees of freedom.
+    // Noise of the rest of the trace: sum of squares and degrees of freedom.
     double noise_square, noise_freedom;
     int separation;
-    double pull_rate;           // g / v0 [1/sample interval]; 0: none
-    long first, last;           // samples that are surely above the threshold
-    long least_start, most_end; // samples beyond which the contact does not reach
+    double pull_rate;           // g / v0 [1/sample interval]; 0: no gravity
+    long first, last;           // samples that are certainly above the threshold
+    long least_start, most_end; // samples beyond which the contact does not extend
 } FitWindow;
 
-// What is fitted, in samples; the samples in contact are those from ceil(start) to floor(end).
+// Start, end [samples] and L. Samples ceil(start) to floor(end) are in contact.
 typedef struct FitPoint {
-    double part[FIT_PARTS]; // start, end, L
+    double part[FIT_PARTS];
 } FitPoint;
 
 typedef struct FitResidual {
-    double sum;       // of squares that the fit leaves, of as many samples as there are means
+    double sum;       // of squared residuals, scaled to single samples; INFINITY: no such contact
     double amplitude; // m_e v0 / T_c
     double baseline;
-    double model_square; // of the model about its mean, for unit amplitude
+    double model_square; // of the model about its mean, at unit amplitude
 } FitResidual;
 
-// Where start and end may lie, in gaps between samples.
+// Bounds of start, end and L. The same samples are in contact all over a box of one gap.
 typedef struct FitBox {
     double least[FIT_PARTS], most[FIT_PARTS];
     long first, last; // first sample in contact at least, last one at most
@@ -44,7 +45,7 @@ typedef struct FitBox {
 typedef struct PulseFit {
     FitPoint at;
     long first, last; // samples in contact
-    FitResidual residue;
+    FitResidual residual;
     double slope[FIT_PARTS];                // of half the sum of squares
     double curvature[FIT_PARTS][FIT_PARTS]; // Gauss-Newton
 } PulseFit;
@@ -52,22 +53,22 @@ typedef struct PulseFit {
 // `start` in (first - gaps, first], `end` in [last, last + gaps).
 FitBox fit_box_make(long first, long last, long gaps);
 
-// T_c [sample intervals] and shape at a point; false where there is no such contact.
-bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *shape,
+// The pulse at a point and its T_c [sample intervals]; false: no such contact exists.
+bool pulse_fit_model(const FitWindow *window, const FitPoint *point, PulseModel *model,
                      double *contact_time);
 
-// The least within a box from `fit->at` on.
+// The minimum within a box, from `fit->at`.
 void pulse_fit_in_box(const FitWindow *window, const FitBox *box, PulseFit *fit);
 
-// From pulses of every form, the best first; how many there are.
+// Local minima from pulses of six decays, the best first. Returns their number.
 size_t pulse_fit_run(const FitWindow *window, PulseFit fits[FITS_MAX]);
 
-// From a fit on that was made under another pull.
+// Improves a fit that was made with another pull_rate.
 void pulse_fit_continue(const FitWindow *window, PulseFit *fit);
 
-// log of the likelihood under noise of unknown size, but for a constant.
+// Logarithm of the likelihood of a sum of squares under noise of unknown variance, up to a
+// constant; and that variance.
 double pulse_fit_log_likelihood(const FitWindow *window, double sum);
-// sigma^2 of the noise.
 double pulse_fit_variance(const FitWindow *window, double sum);
 
 #endif

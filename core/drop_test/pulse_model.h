@@ -1,9 +1,6 @@
-// The force of one contact of the model's over the time since it began, whatever its size and
-// length. Not a contact law (contact/) and not a fit (pulse_fit_run.h). Used by trace*.c.
+// The force of one linear contact with damping over the time since it began, without dimensions.
 #ifndef CORE_DROP_TEST_PULSE_MODEL_H
 #define CORE_DROP_TEST_PULSE_MODEL_H
-
-#include <stdbool.h>
 
 #include "core/contact/contact.h"
 
@@ -13,29 +10,30 @@
 //
 // C and S are cos(sqrt(turn) s) and sin(sqrt(turn) s) / sqrt(turn), hyperbolic where turn < 0.
 typedef struct PulseModel {
-    double decay;        // L; below 0 a contact that gains energy, which noise can look like
-    double turn;         // the square of the damped frequency times T_c
+    double decay;        // L; below 0 the contact gains energy, which noise can imitate
+    double turn;         // square of the damped angular frequency times T_c
     double pull;         // g T_c / v0
-    double sine, cosine; // as above
-    double length; // of the contact under that pull, in T_c; 1 without, INFINITY: it never ends
+    double sine, cosine; // coefficients, as above
+    double length;       // of the contact with gravity [T_c]; 1 without, INFINITY: it does not end
 } PulseModel;
 
-// `pull` is g T_c / v0 of what pulls the pair together during contact, 0: nothing.
+// `pull` is g T_c / v0 of the gravity that acts during contact; 0: none.
 PulseModel pulse_model_make(double decay, double pull, int separation);
 
-// `pull` is g / v0 times the time that the contact lasts, as a trace shows it.
+// The same with `pull` as g / v0 times the duration of the contact, length * T_c.
 PulseModel pulse_model_make_lasting(double decay, double pull, int separation);
 
-double pulse_model_force(const PulseModel *shape, double s);
+// F at s [m_e v0 / T_c].
+double pulse_model_force(const PulseModel *model, double s);
 
 // The integral of the force over the contact [m_e v0].
-double pulse_model_impulse(const PulseModel *shape);
+double pulse_model_impulse(const PulseModel *model);
 
-// From when to when in T_c the size of the force is above `level` of its largest; pressed: until
-// when without the tensile end.
+// The interval in which the magnitude of the force exceeds `level` of its maximum [T_c]; `pressed`
+// is its end without the tensile part.
 typedef struct PulseVisible {
     double from, pressed, to;
 } PulseVisible;
-PulseVisible pulse_model_visible(const PulseModel *shape, double level);
+PulseVisible pulse_model_visible(const PulseModel *model, double level);
 
 #endif

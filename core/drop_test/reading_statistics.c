@@ -1,24 +1,72 @@
-// Where all readings state their uncertainty u and at least four do, each weighs 1 / (u^2 + tau^2).
-// tau is the scatter that the uncertainties do not explain: with it the weighted squares of the
-// distances from the mean come to n - 1 (Paule and Mandel 1982); 0 where they come to less. The
-// error of the mean is then scaled by those squares and takes Student's t (Hartung and Knapp 2001),
-// so that uncertainties that are wrong in size, or beside the point, do little harm. Without that a
-// ruler's reading of a low drop, ten times as uncertain as that of a high one, would count as much.
+// Where all readings state their uncertainty u and at least four do, each has the weight
+// 1 / (u^2 + tau^2). tau is the scatter beyond the uncertainties: with it the weighted sum of
+// squared distances from the mean is n - 1 (Paule and Mandel 1982); 0 where the sum is less without
+// it. The error of the mean is scaled by that sum and has Student's t (Hartung and Knapp 2001), so
+// that wrong uncertainties do little harm. Unweighted, a ruler's reading of a low drop would count
+// as much as that of a high one with a tenth of its uncertainty.
 //
-// Outliers are told by the distance from the median over the median of all such distances, which a
-// few wild readings do not move, in units that are standard deviations of normal readings (Iglewicz
-// and Hoaglin 1993). Their common cut of 3.5 would mark every fifth sample of three to ten good
-// readings, hence the table. Where a trend over speed is shown they are told from its line.
+// The score of an outlier is its distance from the median over the median distance, in standard
+// deviations of normal readings (Iglewicz and Hoaglin 1993). The usual limit of 3.5 would mark
+// every fifth sample of three to ten good readings, hence the table. Where a trend over speed is
+// significant, distances are from its line.
+//
+// The line of a trend has the weights of the mean. Its slope over its standard error is Student's
+// t.
 #include "core/drop_test/reading_statistics.h"
 
 #include <stdlib.h>
 
 #include "core/base/text_format.h"
-#include "core/drop_test/evaluation_trend.h"
 #include "core/math/student_t.h"
 
+static const char *const trend_verdict_names[] = {"constant", "not_constant", "undecided", NULL};
+
+// clang-format off
+static const Field trend_fields[] = {
+    FIELD_COUNT(Trend, count, NULL, AT_MIN(0), OPTIONAL, "readings with a speed"),
+    FIELD_REAL(Trend, least_speed, "m/s", ANY, OPTIONAL, "the slowest of them"),
+    FIELD_REAL(Trend, most_speed, "m/s", ANY, OPTIONAL, "the fastest"),
+    FIELD_REAL(Trend, mean_speed, "m/s", ANY, OPTIONAL, "which the line goes through"),
+    FIELD_REAL(Trend, mean_value, NULL, ANY, OPTIONAL, "there"),
+    FIELD_REAL(Trend, slope, NULL, ANY, OPTIONAL, "per m/s, by least squares"),
+    FIELD_REAL(Trend, standard_error, NULL, ANY, OPTIONAL, "of the slope"),
+    FIELD_REAL(Trend, low, NULL, ANY, OPTIONAL, "95 % interval of the slope"),
+    FIELD_REAL(Trend, high, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(Trend, t, NULL, ANY, OPTIONAL, "slope over standard error"),
+    FIELD_REAL(Trend, p, NULL, ANY, OPTIONAL, "chance of at least such a slope where there is none"),
+    FIELD_REAL(Trend, change, NULL, ANY, OPTIONAL, "that the line makes from the slowest to the fastest"),
+    FIELD_REAL(Trend, missed_change, NULL, ANY, OPTIONAL, "the largest such change that the data do not rule out, 95 %"),
+    FIELD_CHOICE(Trend, verdict, trend_verdict_names, OPTIONAL, "not_constant: a slope is shown, p < 0.05; constant: none is, and a change of 20 % would have been seen; undecided: it would not; null: no test can be made"),
+    FIELD_TEXT(Trend, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
+    FIELD_END
+};
+
+const Field reading_statistic_fields[] = {
+    FIELD_COUNT(Statistic, count, NULL, AT_MIN(0), OPTIONAL, "readings that count"),
+    FIELD_REAL(Statistic, mean, NULL, ANY, OPTIONAL, "of all that count; where at least four do and all state their uncertainty, weighted by that and scatter"),
+    FIELD_REAL(Statistic, unweighted_mean, NULL, ANY, OPTIONAL, "of the readings as they are"),
+    FIELD_REAL(Statistic, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
+    FIELD_REAL(Statistic, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
+    FIELD_REAL(Statistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
+    FIELD_REAL(Statistic, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
+    FIELD_REAL(Statistic, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
+    FIELD_REAL(Statistic, high, NULL, ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
+    FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "the middle one"),
+    FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "the largest one"),
+    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "readings that lie far off; they are in the mean"),
+    FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
+    FIELD_TEXT(Statistic, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
+    FIELD_ITEM(Statistic, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
+    FIELD_END
+};
+// clang-format on
+
 static const double rounding = 1e-12;    // of a mean: no spread at all
-static const double implausible = 0.001; // the chance of so little spread
+static const double resolved = 1e-6;     // of a value: less is neither an outlier nor a trend
+static const double implausible = 0.001; // probability of so little spread
+static const double significance = 0.05;
+static const double span_min = 0.1; // of the mean speed, for a trend
 enum { WEIGHTED_MIN = 4, HALVINGS = 100 };
 
 // 95 % quantiles of the largest score among so many normal readings, of 30,000 to 400,000 samples.
@@ -29,9 +77,8 @@ static const struct {
             {9, 5.1},   {10, 4.6},   {12, 4.4},  {15, 4.3},  {20, 4.0},   {30, 3.85},
             {50, 3.75}, {100, 3.75}, {200, 3.8}, {300, 3.9}, {1000, 4.1}, {3000, 4.3}};
 
-// How many robust deviations from the middle a reading may be among so many: one sample of normal
-// readings in twenty has one beyond it.
-static double outlier_cut(size_t count) {
+// The score beyond which one of `count` normal readings is in one sample of twenty.
+static double statistic_cut(size_t count) {
     size_t i = 0;
     while (i < COUNT(cuts) && cuts[i].count < count)
         i++;
@@ -44,18 +91,18 @@ static double outlier_cut(size_t count) {
     return cuts[i - 1].cut + share * (cuts[i].cut - cuts[i - 1].cut);
 }
 
-static int by_size(const void *a, const void *b) {
+static int statistic_compare(const void *a, const void *b) {
     const double left = *(const double *)a, right = *(const double *)b;
     return left < right ? -1 : left > right ? 1 : 0;
 }
 
-// Sorts them.
-static double median_of(double *values, size_t count) {
-    qsort(values, count, sizeof *values, by_size);
+// Sorts the values.
+static double statistic_median(double *values, size_t count) {
+    qsort(values, count, sizeof *values, statistic_compare);
     return count % 2 == 1 ? values[count / 2] : values[count / 2 - 1] / 2 + values[count / 2] / 2;
 }
 
-static double mean_of(const Reading *readings, size_t count, bool with_outliers) {
+static double statistic_mean(const Reading *readings, size_t count, bool with_outliers) {
     double sum = 0, rest = 0, n = 0;
     for (size_t i = 0; i < count; i++)
         if (with_outliers || !readings[i].is_outlier) {
@@ -68,233 +115,277 @@ static double mean_of(const Reading *readings, size_t count, bool with_outliers)
     return sum / n + rest / n;
 }
 
-// The weighted squares of the distances from the mean.
-static double squares_of(const Reading *readings, size_t count, double mean) {
+// The weighted sum of squared distances from the mean.
+static double statistic_squares(const Reading *readings, size_t count, double mean) {
     double squares = 0;
     for (size_t i = 0; i < count; i++)
         squares += readings[i].weight * (readings[i].value - mean) * (readings[i].value - mean);
     return squares;
 }
 
-static double weigh(Reading *readings, size_t count, double scatter) {
+static double statistic_weigh(Reading *readings, size_t count, double scatter) {
     for (size_t i = 0; i < count; i++)
         readings[i].weight =
             1 / (readings[i].uncertainty * readings[i].uncertainty + scatter * scatter);
-    return squares_of(readings, count, mean_of(readings, count, true));
+    return statistic_squares(readings, count, statistic_mean(readings, count, true));
 }
 
-// Fills the weights where there are any.
-static void make_weights(Reading *readings, size_t count, Statistic *quantity) {
+// Sets weights and scatter where all readings state their uncertainty.
+static void statistic_set_weights(Reading *readings, size_t count, Statistic *statistic) {
     bool is_weighted = count >= WEIGHTED_MIN;
     for (size_t i = 0; i < count; i++)
         is_weighted = is_weighted && readings[i].uncertainty > 0;
     if (!is_weighted)
         return;
-    double least = 0, most = 2 * sqrt((double)count) * quantity->deviation;
+    double least = 0, most = 2 * sqrt((double)count) * statistic->deviation;
     const double freedom = (double)(count - 1);
-    if (weigh(readings, count, 0) <= freedom)
+    if (statistic_weigh(readings, count, 0) <= freedom)
         most = 0;
     for (int i = 0; i < HALVINGS && most > 0; i++) {
         const double middle = (least + most) / 2;
-        if (weigh(readings, count, middle) > freedom)
-            least = middle;
-        else
-            most = middle;
+        *(statistic_weigh(readings, count, middle) > freedom ? &least : &most) = middle;
     }
-    quantity->scatter = most;
-    (void)weigh(readings, count, most);
+    statistic->scatter = most;
+    (void)statistic_weigh(readings, count, most);
 }
 
-// The squares that are left over those that the stated uncertainties would leave; NAN unless all
-// are stated.
-static double excess(const Reading *readings, size_t count, double mean) {
-    double squares = 0;
+// Whether normal readings with the stated uncertainties have so little spread at most once in a
+// thousand samples, by Chernoff's bound of chi square: P(s^2 <= x u^2) <= (x exp(1 - x))^(n / 2).
+static bool statistic_is_too_close(const Reading *readings, size_t count, double mean) {
+    double x = 0;
     for (size_t i = 0; i < count; i++) {
-        if (!(readings[i].uncertainty > 0))
-            return (double)NAN;
         const double off = (readings[i].value - mean) / readings[i].uncertainty;
-        squares += off * off;
+        x += off * off;
     }
-    return squares / (double)(count - 1);
+    x /= (double)(count - 1);
+    return x < 1 && (double)(count - 1) / 2 * (log(x) + 1 - x) < log(implausible);
 }
 
-// Whether normal readings have so little spread at most once in a thousand times, by Chernoff's
-// bound of chi square: P(s^2 <= x u^2) <= (x exp(1 - x))^(n / 2).
-static bool is_too_small(double x, size_t freedom) {
-    return x < 1 && (double)freedom / 2 * (log(x) + 1 - x) < log(implausible);
-}
-
-// Of the mean, by the stated uncertainties alone; NAN unless all are stated.
-static double stated_error(const Reading *readings, size_t count) {
-    double squares = 0, sum = 0;
+static bool statistic_set_interval(const Reading *readings, size_t count, Statistic *statistic) {
+    const double mean = statistic->mean;
+    double t = student_quantile(EVALUATION_CONFIDENCE, 0), weights = 0, squares = 0;
     for (size_t i = 0; i < count; i++) {
         const double part = readings[i].weight * readings[i].uncertainty;
         squares += part * part;
-        sum += readings[i].weight;
+        weights += readings[i].weight;
     }
-    return sqrt(squares) / sum > 0 ? sqrt(squares) / sum : (double)NAN;
-}
-
-static bool make_interval(const Reading *readings, size_t count, Statistic *quantity) {
-    const double stated = stated_error(readings, count);
-    const double mean = quantity->mean;
-    double t = student_quantile(EVALUATION_CONFIDENCE, 0), sum = 0;
-    bool has_spread = count > 1 && quantity->deviation > rounding * fabs(mean);
-    if (has_spread && stated > 0)
-        has_spread = !is_too_small(excess(readings, count, mean), count - 1);
-    bool is_said;
-    if (has_spread) {
+    const double stated = sqrt(squares) / weights; // NAN unless all are stated
+    bool is_made;
+    if (count > 1 && statistic->deviation > rounding * fabs(mean) &&
+        !(stated > 0 && statistic_is_too_close(readings, count, mean))) {
         t = student_quantile(EVALUATION_CONFIDENCE, count - 1);
-        for (size_t i = 0; i < count; i++)
-            sum += readings[i].weight;
-        quantity->standard_error =
-            sqrt(squares_of(readings, count, mean) / (double)(count - 1) / sum);
-        is_said =
-            isnan(quantity->scatter)
-                ? sentence(&quantity->why,
+        statistic->standard_error =
+            sqrt(statistic_squares(readings, count, mean) / (double)(count - 1) / weights);
+        is_made =
+            isnan(statistic->scatter)
+                ? sentence(&statistic->why,
                            "mean +- %.4g standard errors, Student's t for %zu readings", t, count)
-                : sentence(&quantity->why,
+                : sentence(&statistic->why,
                            "mean weighted by the stated uncertainties and a scatter of %.3g "
                            "beyond them, +- %.4g standard errors, Student's t for %zu "
                            "readings",
-                           quantity->scatter, t, count);
+                           statistic->scatter, t, count);
     } else if (stated > 0) {
-        quantity->standard_error = stated;
-        is_said =
-            count == 1
-                ? sentence(&quantity->why,
-                           "one reading: the interval is what its uncertainty alone leaves, "
-                           "nothing is known of the spread")
-                : sentence(&quantity->why,
-                           "the %zu readings lie closer together than their stated uncertainty "
-                           "would have it: the interval is made of that",
-                           count);
+        statistic->standard_error = stated;
+        is_made = count == 1 ? sentence(&statistic->why,
+                                        "one reading: the interval is what its uncertainty alone "
+                                        "leaves, nothing is known of the spread")
+                             : sentence(&statistic->why,
+                                        "the %zu readings lie closer together than their stated "
+                                        "uncertainty would have it: the interval is made of that",
+                                        count);
     } else {
-        return sentence(&quantity->why,
+        return sentence(&statistic->why,
                         count == 1 ? "one reading without a stated uncertainty: no interval"
                                    : "all readings are the same, to what the instrument resolves, "
                                      "whose uncertainty is not stated: no interval");
     }
-    quantity->low = mean - t * quantity->standard_error;
-    quantity->high = mean + t * quantity->standard_error;
-    return is_said;
+    statistic->low = mean - t * statistic->standard_error;
+    statistic->high = mean + t * statistic->standard_error;
+    return is_made;
 }
 
-// Distances from the median, or where a trend is shown from its line.
-static bool find_outliers(Reading *readings, size_t count, Statistic *quantity) {
-    double *values = calloc(2 * count, sizeof *values);
-    if (values == NULL)
-        return false;
-    const bool has_line = quantity->trend.verdict == TREND_NOT_CONSTANT;
-    const Line line = line_fit(readings, count);
+// The line through those readings that have a speed.
+typedef struct Line {
+    size_t count;
+    double speed, value; // means
+    double squares;      // of speeds about their mean
+    double slope, left;  // left: sum of squares of the residuals
+    double least, most;  // speeds
+} Line;
+
+static Line line_fit(const Reading *readings, size_t count) {
+    Line line = {.least = (double)INFINITY, .most = -(double)INFINITY};
+    double weights = 0, products = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        line.count++;
+        weights += readings[i].weight;
+        line.speed += readings[i].weight * readings[i].speed;
+        line.value += readings[i].weight * readings[i].value;
+        line.least = fmin(line.least, readings[i].speed);
+        line.most = fmax(line.most, readings[i].speed);
+    }
+    line.speed /= weights;
+    line.value /= weights;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off = readings[i].speed - line.speed;
+        line.squares += readings[i].weight * off * off;
+        products += readings[i].weight * off * (readings[i].value - line.value);
+    }
+    line.slope = line.squares > 0 ? products / line.squares : 0;
+    for (size_t i = 0; i < count; i++) {
+        if (isnan(readings[i].speed))
+            continue;
+        const double off =
+            readings[i].value - line.value - line.slope * (readings[i].speed - line.speed);
+        line.left += readings[i].weight * off * off;
+    }
+    // In units of an average weight.
+    line.left *= (double)line.count / weights;
+    line.squares *= (double)line.count / weights;
+    return line;
+}
+
+static bool trend_describe(const char *name, const char *unit, double mean, Trend *trend) {
+    const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
+    if (trend->verdict == TREND_NOT_CONSTANT)
+        return sentence(&trend->detail,
+                        "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
+                        "constant over speed, and a table over speed says more than a mean",
+                        name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
+                        fabs(trend->change) * percent, trend->least_speed, trend->most_speed,
+                        trend->p);
+    return sentence(&trend->detail,
+                    "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
+                    "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
+                    "been seen",
+                    name, trend->least_speed, trend->most_speed, trend->slope,
+                    trend->standard_error, unit, trend->p,
+                    trend->verdict == TREND_CONSTANT
+                        ? " and may be taken as constant there;"
+                        : ", but the readings are too few or too scattered to tell:",
+                    trend->missed_change, unit, missed);
+}
+
+static bool trend_set(const Line *line, const char *name, const char *unit, Statistic *statistic) {
+    Trend *trend = &statistic->trend;
+    trend->count = line->count;
+    if (line->count > 0) {
+        trend->least_speed = line->least;
+        trend->most_speed = line->most;
+    }
+    if (line->count < 3)
+        return sentence(&trend->detail,
+                        "whether %s is constant over speed cannot be told: %zu reading%s with a "
+                        "speed, at least three are needed",
+                        name, line->count, line->count == 1 ? "" : "s");
+    const double span = line->most - line->least;
+    if (!(span > span_min * line->speed))
+        return sentence(&trend->detail,
+                        "whether %s is constant over speed cannot be told: all readings were made "
+                        "at about %.3g m/s",
+                        name, line->speed);
+    const double least = resolved * fabs(statistic->mean);
+    const size_t freedom = line->count - 2;
+    const double t = student_quantile(EVALUATION_CONFIDENCE, freedom);
+    trend->mean_speed = line->speed;
+    trend->mean_value = line->value;
+    trend->slope = line->slope;
+    trend->standard_error = sqrt(fmax(line->left / (double)freedom, least * least) / line->squares);
+    trend->low = line->slope - t * trend->standard_error;
+    trend->high = line->slope + t * trend->standard_error;
+    trend->t = line->slope / trend->standard_error;
+    trend->p = fmax(1 - student_share(fabs(trend->t), freedom), 0);
+    trend->change = line->slope * span;
+    trend->missed_change = fmax(fabs(trend->low), fabs(trend->high)) * span;
+    trend->verdict = trend->p < significance ? TREND_NOT_CONSTANT
+                     : trend->missed_change <= TREND_CHANGE_MAX * fabs(statistic->mean)
+                         ? TREND_CONSTANT
+                         : TREND_UNDECIDED;
+    return trend_describe(name, unit, statistic->mean, trend);
+}
+
+// `scratch` has room for two numbers a reading.
+static void statistic_set_outliers(Reading *readings, size_t count, const Line *line,
+                                   double *scratch, Statistic *statistic) {
+    double *values = scratch, *sorted = values + count, mean = 0;
     for (size_t i = 0; i < count; i++) {
         values[i] = readings[i].value;
-        if (has_line && !isnan(readings[i].speed))
-            values[i] -= line.slope * (readings[i].speed - line.speed);
-    }
-    double *sorted = values + count, mean = 0;
-    for (size_t i = 0; i < count; i++)
+        if (statistic->trend.verdict == TREND_NOT_CONSTANT && !isnan(readings[i].speed))
+            values[i] -= line->slope * (readings[i].speed - line->speed);
         sorted[i] = values[i];
-    const double middle = median_of(sorted, count);
+    }
+    const double middle = statistic_median(sorted, count);
     for (size_t i = 0; i < count; i++) {
         sorted[i] = fabs(values[i] - middle);
         mean += sorted[i] / (double)count;
     }
-    // Where most are the same, their mean distance stands for the median one.
-    const double median = median_of(sorted, count);
+    // Where most readings are equal, the mean distance replaces the median distance.
+    const double median = statistic_median(sorted, count);
     const double spread = median > rounding * fabs(middle) ? 1.482602 * median : 1.253314 * mean;
     for (size_t i = 0; i < count; i++) {
         const double own = readings[i].uncertainty > 0 ? readings[i].uncertainty : 0;
-        const double scale = fmax(fmax(spread, own), EVALUATION_RESOLVED * fabs(middle));
+        const double scale = fmax(fmax(spread, own), resolved * fabs(middle));
         readings[i].score = scale > 0 ? (values[i] - middle) / scale : 0;
-        readings[i].is_outlier = fabs(readings[i].score) > outlier_cut(count);
-        quantity->outliers += readings[i].is_outlier ? 1 : 0;
+        readings[i].is_outlier = fabs(readings[i].score) > statistic_cut(count);
+        statistic->outliers += readings[i].is_outlier ? 1 : 0;
     }
-    if (quantity->outliers > 0 && quantity->outliers < count)
-        quantity->mean_without_outliers = mean_of(readings, count, false);
-    free(values);
-    return true;
+    if (statistic->outliers > 0 && statistic->outliers < count)
+        statistic->mean_without_outliers = statistic_mean(readings, count, false);
 }
 
-static bool make_spread(const Reading *readings, size_t count, Statistic *quantity) {
-    double *sorted = calloc(count, sizeof *sorted), squares = 0;
-    if (sorted == NULL)
-        return false;
+static void statistic_set_spread(const Reading *readings, size_t count, double *scratch,
+                                 Statistic *statistic) {
+    double squares = 0;
     for (size_t i = 0; i < count; i++) {
-        sorted[i] = readings[i].value;
-        squares +=
-            (sorted[i] - quantity->unweighted_mean) * (sorted[i] - quantity->unweighted_mean);
+        const double off = readings[i].value - statistic->unweighted_mean;
+        scratch[i] = readings[i].value;
+        squares += off * off;
     }
-    quantity->median = median_of(sorted, count);
-    quantity->minimum = sorted[0];
-    quantity->maximum = sorted[count - 1];
+    statistic->median = statistic_median(scratch, count);
+    statistic->minimum = scratch[0];
+    statistic->maximum = scratch[count - 1];
     if (count > 1)
-        quantity->deviation = sqrt(squares / (double)(count - 1));
-    free(sorted);
-    return true;
+        statistic->deviation = sqrt(squares / (double)(count - 1));
 }
 
-void statistic_clear(Statistic *quantity) {
-    free(quantity->why);
-    free(quantity->trend.detail);
-    *quantity = (Statistic){.why = NULL};
-}
-
-Status statistic_make(Reading *readings, size_t count, const char *name, const char *unit,
-                      Statistic *quantity, Problem *problem) {
-    const double none = (double)NAN;
-    *quantity = (Statistic){
-        .count = count,
-        .mean = none,
-        .unweighted_mean = none,
-        .deviation = none,
-        .scatter = none,
-        .standard_error = none,
-        .spread = none,
-        .low = none,
-        .high = none,
-        .minimum = none,
-        .median = none,
-        .maximum = none,
-        .mean_without_outliers = none,
-        .trend = {.least_speed = none,
-                  .most_speed = none,
-                  .mean_speed = none,
-                  .mean_value = none,
-                  .slope = none,
-                  .standard_error = none,
-                  .low = none,
-                  .high = none,
-                  .t = none,
-                  .p = none,
-                  .change = none,
-                  .missed_change = none,
-                  .verdict = CHOICE_ABSENT},
-    };
+Status reading_statistics_run(Reading *readings, size_t count, const char *name, const char *unit,
+                              Statistic *statistic, Problem *problem) {
+    *statistic = (Statistic){.why = NULL};
+    fields_clear(reading_statistic_fields, statistic);
+    statistic->count = count;
+    statistic->outliers = 0;
     for (size_t i = 0; i < count; i++) {
         Reading *reading = &readings[i];
         reading->weight = 1;
-        reading->score = none;
+        reading->score = (double)NAN;
         if (!(reading->uncertainty > rounding * fabs(reading->value)))
-            reading->uncertainty = none;
+            reading->uncertainty = (double)NAN;
     }
-    bool is_made = true;
-    if (count == 0) {
-        is_made = sentence(&quantity->why, "no reading that counts tells the %s", name);
-    } else {
-        quantity->unweighted_mean = mean_of(readings, count, true);
-        is_made = make_spread(readings, count, quantity);
-        make_weights(readings, count, quantity);
-        quantity->mean = mean_of(readings, count, true);
-        is_made = is_made && make_interval(readings, count, quantity);
+    double *scratch = calloc(2 * count + 1, sizeof *scratch);
+    bool is_made = scratch != NULL;
+    if (is_made && count == 0) {
+        is_made = sentence(&statistic->why, "no reading that counts tells the %s", name);
+    } else if (is_made) {
+        statistic->unweighted_mean = statistic_mean(readings, count, true);
+        statistic_set_spread(readings, count, scratch, statistic);
+        statistic_set_weights(readings, count, statistic);
+        statistic->mean = statistic_mean(readings, count, true);
+        is_made = statistic_set_interval(readings, count, statistic);
     }
-    quantity->spread = fmax(isnan(quantity->scatter) ? quantity->deviation : quantity->scatter,
-                            quantity->standard_error);
-    if (!(quantity->spread > rounding * fabs(quantity->mean)))
-        quantity->spread = none;
-    is_made = is_made && trend_make(readings, count, name, unit, quantity);
+    statistic->spread = fmax(isnan(statistic->scatter) ? statistic->deviation : statistic->scatter,
+                             statistic->standard_error);
+    if (!(statistic->spread > rounding * fabs(statistic->mean)))
+        statistic->spread = (double)NAN;
+    const Line line = line_fit(readings, count);
+    is_made = is_made && trend_set(&line, name, unit, statistic);
     if (is_made && count > 2)
-        is_made = find_outliers(readings, count, quantity);
+        statistic_set_outliers(readings, count, &line, scratch, statistic);
+    free(scratch);
     return is_made ? STATUS_OK
                    : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
 }

@@ -1,5 +1,5 @@
-// Standard uncertainties go by the rule of small errors: with e = sqrt(h_r / h_d) and v =
-// sqrt(2 g h) a relative error of a height counts by half.
+// Uncertainties by the rule of small errors: with e = sqrt(h_r / h_d) and v = sqrt(2 g h) a
+// relative error of a height counts half.
 #include "core/drop_test/readings.h"
 
 #include <stdio.h>
@@ -10,134 +10,154 @@
 #include "core/drop_test/gravity_correction.h"
 #include "core/scene/material.h"
 
-static bool has(double value) {
-    return !isnan(value);
+static const char *const restitution_by_names[] = {"heights", "speeds", "pulse", NULL};
+static const char *const contact_time_by_names[] = {"duration", "pulse", NULL};
+
+// clang-format off
+const Field evaluation_row_fields[] = {
+    FIELD_COUNT(EvaluationRow, measurement, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
+    FIELD_TEXT(EvaluationRow, from, 0, PRESENCE_OPTIONAL, 0, "which drop, or which contact of which trace, from 1"),
+    FIELD_COUNT(EvaluationRow, trace, NULL, AT_MIN(1), OPTIONAL, "which trace of its measurement, from 1; null: a drop"),
+    FIELD_REAL(EvaluationRow, approach_speed, "m/s", ANY, OPTIONAL, "as read, else sqrt(2 g h)"),
+    FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
+    FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from the instrument's or the fit's"),
+    FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "what told it"),
+    FIELD_REAL(EvaluationRow, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair"),
+    FIELD_REAL(EvaluationRow, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
+    FIELD_CHOICE(EvaluationRow, contact_time_by, contact_time_by_names, OPTIONAL, "what told it"),
+    FIELD_REAL(EvaluationRow, least_contact_time, "s", ANY, OPTIONAL, "of a trace: within which T_c lies, 95 %, also where there is no figure"),
+    FIELD_REAL(EvaluationRow, most_contact_time, "s", ANY, OPTIONAL, "likewise"),
+    FIELD_REAL(EvaluationRow, read_restitution, NULL, ANY, OPTIONAL, "e before gravity was taken out; null: it was not"),
+    FIELD_REAL(EvaluationRow, read_contact_time, "s", ANY, OPTIONAL, "T_c before gravity was taken out; null: it was not"),
+    FIELD_FLAG(EvaluationRow, restitution_counts, 0, "e is in the mean"),
+    FIELD_FLAG(EvaluationRow, contact_time_counts, 0, "T_c is in the mean"),
+    FIELD_REAL(EvaluationRow, restitution_score, NULL, ANY, OPTIONAL, "robust deviations of e from the median, or from the line where a trend is shown"),
+    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "so far away that one good sample in twenty has such a reading; it counts all the same"),
+    FIELD_REAL(EvaluationRow, contact_time_score, NULL, ANY, OPTIONAL, "the same of T_c"),
+    FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
+    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, in the words of who measured"),
+    FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "what else there is to know of it"),
+    FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as it was detected in its trace; null: none was, or a drop"),
+    FIELD_END
+};
+// clang-format on
+
+static Status reading_status(bool is_made, Problem *problem) {
+    return is_made ? STATUS_OK
+                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
 }
 
-static Status no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the evaluation");
-}
-
-void row_pointer(const EvaluationRow *row, char *pointer, size_t size) {
+void reading_pointer(const EvaluationRow *row, char *pointer, size_t size) {
     char of[40] = "";
     if (row->measurement != COUNT_ABSENT)
         snprintf(of, sizeof of, "/measurements/%llu", (unsigned long long)row->measurement);
     snprintf(pointer, size, "%s/%s/%zu", of, row->is_of_trace ? "traces" : "drops", row->place);
 }
 
-// An empty row at the end.
-static Status row_new(const Measurement *of, size_t index, Evaluation *evaluation,
-                      EvaluationRow **row, Problem *problem) {
-    EvaluationRows *rows = &evaluation->rows;
+bool reading_counts(const EvaluationRow *row) {
+    return row->restitution_counts || row->contact_time_counts;
+}
+
+bool reading_get(const EvaluationRow *row, bool is_time, Reading *reading) {
+    *reading = (Reading){
+        .value = is_time ? row->contact_time : row->restitution,
+        .uncertainty = is_time ? row->contact_time_uncertainty : row->restitution_uncertainty,
+        .speed = row->approach_speed,
+    };
+    return is_time ? row->contact_time_counts : row->restitution_counts;
+}
+
+// Appends an empty row.
+static Status reading_new(const Measurement *tests, size_t index, size_t place, bool is_of_trace,
+                          EvaluationRows *rows, EvaluationRow **row, Problem *problem) {
     const size_t count = rows->count;
     if (count == EVALUATION_ROWS_MAX)
         return problem_set(problem, STATUS_LIMIT,
                            "more than %d readings: evaluate fewer measurements at a time",
                            EVALUATION_ROWS_MAX);
     if (count == 0 || (count >= 16 && (count & (count - 1)) == 0)) {
-        const size_t room = count == 0 ? 16 : 2 * count;
-        EvaluationRow *at = realloc(rows->at, room * sizeof *at);
-        if (at == NULL)
-            return no_memory(problem);
+        EvaluationRow *at = realloc(rows->at, (count == 0 ? 16 : 2 * count) * sizeof *at);
+        TRY(reading_status(at != NULL, problem));
         rows->at = at;
     }
-    const double none = (double)NAN;
-    rows->at[count] = (EvaluationRow){
-        .measurement = of->number,
-        .trace = COUNT_ABSENT,
-        .approach_speed = none,
-        .approach_speed_uncertainty = none,
-        .restitution = none,
-        .restitution_uncertainty = none,
-        .restitution_by = CHOICE_ABSENT,
-        .contact_time = none,
-        .contact_time_uncertainty = none,
-        .contact_time_by = CHOICE_ABSENT,
-        .least_contact_time = none,
-        .most_contact_time = none,
-        .read_restitution = none,
-        .read_contact_time = none,
-        .restitution_score = none,
-        .contact_time_score = none,
-        .test = index,
-    };
     *row = &rows->at[rows->count++];
-    fields_clear(trace_detection_fields, &(*row)->contact);
+    **row = (EvaluationRow){.is_of_trace = is_of_trace, .place = place, .test = index};
+    fields_clear(evaluation_row_fields, *row);
+    (*row)->measurement = tests[index].number;
+    if (is_of_trace)
+        (*row)->trace = place + 1;
     return STATUS_OK;
 }
 
-// Adds to what is said of a row.
-static Status say(EvaluationRow *row, const char *text, Problem *problem) {
-    return sentence(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
-                    row->note != NULL ? "; " : "", text)
-               ? STATUS_OK
-               : no_memory(problem);
+static Status reading_add_note(EvaluationRow *row, const char *text, Problem *problem) {
+    return reading_status(sentence(&row->note, "%s%s%s", row->note != NULL ? row->note : "",
+                                   row->note != NULL ? "; " : "", text),
+                          problem);
 }
 
-static bool copy(const char *text, char **target) {
+static bool reading_copy(const char *text, char **target) {
     return text == NULL || (*target = strdup(text)) != NULL;
 }
 
-// Relative, of a speed that was read or comes of a height.
-static double speed_error(const DropTest *test, double speed, double height) {
-    return has(speed) ? test->speed_uncertainty / speed : test->height_uncertainty / (2 * height);
+// The relative uncertainty of a speed that was read, or that follows from a height.
+static double reading_speed_error(const DropTest *test, double speed, double height) {
+    return !isnan(speed) ? test->speed_uncertainty / speed
+                         : test->height_uncertainty / (2 * height);
 }
 
-static void read_restitution(const DropTest *test, const Drop *drop, EvaluationRow *row) {
+static void reading_set_restitution(const DropTest *test, const Drop *drop, EvaluationRow *row) {
     const double before = row->approach_speed, after = drop_rebound_speed(test, drop);
-    if (!has(before) || !has(after))
+    if (isnan(before) || isnan(after))
         return;
-    const bool is_by_height = !has(drop->rebound_speed);
+    const bool is_by_height = isnan(drop->rebound_speed);
     row->restitution = fmin(after / before, 1);
     row->restitution_by = is_by_height ? RESTITUTION_BY_HEIGHTS : RESTITUTION_BY_SPEEDS;
-    // The impactor's own share of the speed of parting, which on a fixed base is all of it.
+    // The impactor's part of the separation speed, which on a fixed base is the whole.
     double share = row->restitution;
     if (is_by_height && test->base == MATERIAL_BASE_FREE)
         share -= test->impactor_mass / test->base_mass;
     const double error =
-        fabs(share) * hypot(speed_error(test, drop->approach_speed, drop->drop_height),
-                            speed_error(test, drop->rebound_speed, drop->rebound_height));
+        fabs(share) * hypot(reading_speed_error(test, drop->approach_speed, drop->drop_height),
+                            reading_speed_error(test, drop->rebound_speed, drop->rebound_height));
     if (isfinite(error))
         row->restitution_uncertainty = error;
 }
 
-static Status add_drop(const Measurement *of, size_t index, size_t i, Evaluation *evaluation,
-                       Problem *problem) {
-    const DropTest *test = of->test;
+static Status reading_add_drop(const Measurement *tests, size_t index, size_t i,
+                               EvaluationRows *rows, Problem *problem) {
+    const DropTest *test = tests[index].test;
     const Drop *drop = &test->drops.at[i];
     EvaluationRow *row = NULL;
-    TRY(row_new(of, index, evaluation, &row, problem));
-    row->place = i;
+    TRY(reading_new(tests, index, i, false, rows, &row, problem));
     row->approach_speed = drop_approach_speed(drop);
     row->approach_speed_uncertainty =
-        row->approach_speed * speed_error(test, drop->approach_speed, drop->drop_height);
-    read_restitution(test, drop, row);
-    if (has(drop->contact_time)) {
+        row->approach_speed * reading_speed_error(test, drop->approach_speed, drop->drop_height);
+    reading_set_restitution(test, drop, row);
+    if (!isnan(drop->contact_time)) {
         row->contact_time = drop->contact_time;
         row->contact_time_uncertainty = test->time_uncertainty;
         row->contact_time_by = CONTACT_TIME_BY_DURATION;
     }
-    row->restitution_counts = drop->excluded == NULL && has(row->restitution);
-    row->contact_time_counts = drop->excluded == NULL && has(row->contact_time);
-    return sentence(&row->from, "drop %zu", i + 1) && copy(drop->excluded, &row->excluded) &&
-                   copy(drop->note, &row->note)
-               ? STATUS_OK
-               : no_memory(problem);
+    row->restitution_counts = drop->excluded == NULL && !isnan(row->restitution);
+    row->contact_time_counts = drop->excluded == NULL && !isnan(row->contact_time);
+    return reading_status(sentence(&row->from, "drop %zu", i + 1) &&
+                              reading_copy(drop->excluded, &row->excluded) &&
+                              reading_copy(drop->note, &row->note),
+                          problem);
 }
 
-static Status add_contact(const Measurement *of, size_t index, size_t i, size_t number,
-                          TraceContact *contact, Evaluation *evaluation, Problem *problem) {
-    const Trace *trace = &of->test->traces.at[i];
+static Status reading_add_contact(const Measurement *tests, size_t index, size_t i, size_t number,
+                                  TraceContact *contact, EvaluationRows *rows, Problem *problem) {
+    const DropTest *test = tests[index].test;
+    const Trace *trace = &test->traces.at[i];
     EvaluationRow *row = NULL;
-    TRY(row_new(of, index, evaluation, &row, problem));
-    row->is_of_trace = true;
-    row->place = i;
-    row->trace = i + 1;
+    TRY(reading_new(tests, index, i, true, rows, &row, problem));
     row->contact = contact->seen;
     contact->seen.pulse = (Reals){NULL, 0};
     if (number < trace->approach_speed.count) {
         row->approach_speed = trace->approach_speed.at[number];
-        row->approach_speed_uncertainty = of->test->speed_uncertainty;
+        row->approach_speed_uncertainty = test->speed_uncertainty;
     }
     row->contact_time = contact->contact_time;
     row->contact_time_uncertainty = contact->contact_time_uncertainty;
@@ -145,37 +165,36 @@ static Status add_contact(const Measurement *of, size_t index, size_t i, size_t 
     row->most_contact_time = contact->most_contact_time;
     row->restitution = contact->restitution;
     row->restitution_uncertainty = contact->restitution_uncertainty;
-    row->contact_time_by = has(row->contact_time) ? CONTACT_TIME_BY_PULSE : CHOICE_ABSENT;
-    row->restitution_by = has(row->restitution) ? RESTITUTION_BY_PULSE : CHOICE_ABSENT;
-    row->restitution_counts = trace->excluded == NULL && has(row->restitution);
-    row->contact_time_counts = trace->excluded == NULL && has(row->contact_time);
-    return sentence(&row->from, "trace %zu, contact %zu", i + 1, number + 1) &&
-                   copy(trace->excluded, &row->excluded) && copy(contact->why, &row->note)
-               ? STATUS_OK
-               : no_memory(problem);
+    if (!isnan(row->contact_time))
+        row->contact_time_by = CONTACT_TIME_BY_PULSE;
+    if (!isnan(row->restitution))
+        row->restitution_by = RESTITUTION_BY_PULSE;
+    row->restitution_counts = trace->excluded == NULL && !isnan(row->restitution);
+    row->contact_time_counts = trace->excluded == NULL && !isnan(row->contact_time);
+    return reading_status(sentence(&row->from, "trace %zu, contact %zu", i + 1, number + 1) &&
+                              reading_copy(trace->excluded, &row->excluded) &&
+                              reading_copy(contact->why, &row->note),
+                          problem);
 }
 
-// A trace that tells nothing is a row, too.
-static Status add_silent(const Measurement *of, size_t index, size_t i, const char *why,
-                         Evaluation *evaluation, Problem *problem) {
+// A trace without a contact is a row too.
+static Status reading_add_empty(const Measurement *tests, size_t index, size_t i, const char *why,
+                                EvaluationRows *rows, Problem *problem) {
     EvaluationRow *row = NULL;
-    TRY(row_new(of, index, evaluation, &row, problem));
-    row->is_of_trace = true;
-    row->place = i;
-    row->trace = i + 1;
-    return sentence(&row->from, "trace %zu", i + 1) &&
-                   copy(of->test->traces.at[i].excluded, &row->excluded) &&
-                   sentence(&row->note, "%s", why != NULL ? why : "no contact is seen in it")
-               ? STATUS_OK
-               : no_memory(problem);
+    TRY(reading_new(tests, index, i, true, rows, &row, problem));
+    return reading_status(
+        sentence(&row->from, "trace %zu", i + 1) &&
+            reading_copy(tests[index].test->traces.at[i].excluded, &row->excluded) &&
+            sentence(&row->note, "%s", why != NULL ? why : "no contact is seen in it"),
+        problem);
 }
 
-static Status add_trace(const Measurement *of, size_t index, size_t i, const Progress *progress,
-                        Evaluation *evaluation, Problem *problem) {
-    const DropTest *test = of->test;
+static Status reading_add_trace(const Measurement *tests, size_t index, size_t i, int separation,
+                                const Progress *progress, EvaluationRows *rows, Problem *problem) {
+    const DropTest *test = tests[index].test;
     const Trace *trace = &test->traces.at[i];
-    const TraceOptions way = {
-        .separation = evaluation->separation,
+    const TraceOptions options = {
+        .separation = separation,
         .threshold = (double)NAN,
         .effective_mass = drop_test_effective_mass(test),
         .gravity = test->gravity > 0 ? test->gravity : 0,
@@ -184,52 +203,42 @@ static Status add_trace(const Measurement *of, size_t index, size_t i, const Pro
         .progress = progress,
     };
     char place[sizeof((Fault){0}.pointer)], pointer[sizeof((Fault){0}.pointer)];
-    row_pointer(&(EvaluationRow){.measurement = of->number, .is_of_trace = true, .place = i}, place,
-                sizeof place);
+    const EvaluationRow at = {.measurement = tests[index].number, .is_of_trace = true, .place = i};
+    reading_pointer(&at, place, sizeof place);
     pointer_join(pointer, sizeof pointer, place, "force");
-    TraceAnalysis reading = {0};
-    // What cannot be read at all may be why it is excluded.
-    Status status = trace_analysis_run(trace->interval, &trace->force, &way, pointer, &reading,
+    TraceAnalysis analysis = {0};
+    // An unreadable trace may be excluded for that reason.
+    Status status = trace_analysis_run(trace->interval, &trace->force, &options, pointer, &analysis,
                                        trace->excluded == NULL ? problem : NULL);
     if (status == STATUS_INVALID && trace->excluded != NULL)
-        status = add_silent(of, index, i, "it cannot be read", evaluation, problem);
-    else if (status == STATUS_OK && reading.contacts.count == 0)
-        status = add_silent(of, index, i, reading.why, evaluation, problem);
-    for (size_t k = 0; status == STATUS_OK && k < reading.contacts.count; k++)
-        status = add_contact(of, index, i, k, &reading.contacts.at[k], evaluation, problem);
-    trace_analysis_clear(&reading);
+        status = reading_add_empty(tests, index, i, "it cannot be read", rows, problem);
+    else if (status == STATUS_OK && analysis.contacts.count == 0)
+        status = reading_add_empty(tests, index, i, analysis.why, rows, problem);
+    for (size_t k = 0; status == STATUS_OK && k < analysis.contacts.count; k++)
+        status = reading_add_contact(tests, index, i, k, &analysis.contacts.at[k], rows, problem);
+    trace_analysis_clear(&analysis);
     return status;
 }
 
-Status rows_add(const Measurement *of, size_t index, const Progress *progress,
-                Evaluation *evaluation, Problem *problem) {
-    for (size_t i = 0; i < of->test->drops.count; i++)
-        TRY(add_drop(of, index, i, evaluation, problem));
-    for (size_t i = 0; i < of->test->traces.count; i++)
-        TRY(add_trace(of, index, i, progress, evaluation, problem));
+Status readings_add(const Measurement *tests, size_t index, int separation,
+                    const Progress *progress, EvaluationRows *rows, Problem *problem) {
+    for (size_t i = 0; i < tests[index].test->drops.count; i++)
+        TRY(reading_add_drop(tests, index, i, rows, problem));
+    for (size_t i = 0; i < tests[index].test->traces.count; i++)
+        TRY(reading_add_trace(tests, index, i, separation, progress, rows, problem));
     return STATUS_OK;
 }
 
-static GravityLoad pull_of(const Measurement *tests, const EvaluationRow *row, int separation) {
-    return (GravityLoad){tests[row->test].test->gravity, row->approach_speed,
-                         (Separation)separation, row->restitution_by == RESTITUTION_BY_HEIGHTS};
-}
-
-static bool is_pulled(const Measurement *tests, const EvaluationRow *row) {
-    return !row->is_of_trace && tests[row->test].test->gravity > 0 &&
-           (has(row->restitution) || has(row->contact_time));
-}
-
-// Of a drop that tells both.
-static Status unpull(const GravityLoad *pull, EvaluationRow *row, Problem *problem) {
+// Of a drop with both e and T_c.
+static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, Problem *problem) {
     const GravityCorrected read = {row->restitution, row->contact_time,
                                    row->restitution_uncertainty / row->restitution,
                                    row->contact_time_uncertainty / row->contact_time};
     GravityCorrected isolated;
-    if (!(row->restitution > 0) || !gravity_correct(pull, &read, &isolated)) {
+    if (!(row->restitution > 0) || !gravity_correct(load, &read, &isolated)) {
         row->restitution_counts = row->contact_time_counts = false;
-        return say(row, "does not count: no contact comes to this e and T_c under that gravity",
-                   problem);
+        return reading_add_note(
+            row, "does not count: no contact comes to this e and T_c under that gravity", problem);
     }
     row->read_restitution = row->restitution;
     row->read_contact_time = row->contact_time;
@@ -240,82 +249,65 @@ static Status unpull(const GravityLoad *pull, EvaluationRow *row, Problem *probl
     return STATUS_OK;
 }
 
-// The means of a test's readings that are free of gravity.
-static void means_of(const Evaluation *evaluation, size_t test, double *restitution,
-                     double *contact_time) {
-    double e = 0, T = 0, of_e = 0, of_T = 0;
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        const EvaluationRow *row = &evaluation->rows.at[i];
-        const bool is_free = row->is_of_trace || has(row->read_contact_time);
-        if (row->test != test || !is_free)
-            continue;
-        if (row->restitution_counts) {
-            e += row->restitution;
-            of_e++;
-        }
-        if (row->contact_time_counts) {
-            T += row->contact_time;
-            of_T++;
-        }
-    }
-    *restitution = e / of_e; // NAN of none
-    *contact_time = T / of_T;
-}
-
-// Of a drop that tells one of the two.
-static Status unpull_one(const GravityLoad *pull, double restitution, double contact_time,
-                         EvaluationRow *row, Problem *problem) {
-    const bool wants_e = has(row->restitution);
-    const double known = wants_e ? contact_time : restitution;
-    const bool can_tell = has(known) && has(pull->speed);
-    double value = (double)NAN;
-    const bool is_found =
-        can_tell &&
-        (wants_e ? gravity_correct_restitution(pull, row->restitution, known, &value)
-                 : gravity_correct_contact_time(pull, row->contact_time, known, &value));
-    if (!is_found)
-        return say(row,
-                   can_tell  ? "gravity is not taken out: no contact comes to this under it"
-                   : wants_e ? "gravity is not taken out: this needs a contact time"
-                             : "gravity is not taken out: this needs a speed and a restitution",
-                   problem);
-    // Errors grow with what is taken out.
-    if (wants_e) {
-        row->restitution_uncertainty *= value / row->restitution;
-        row->read_restitution = row->restitution;
-        row->restitution = value;
-    } else {
-        row->contact_time_uncertainty *= value / row->contact_time;
-        row->read_contact_time = row->contact_time;
-        row->contact_time = value;
-    }
+// Of a drop with one of e and T_c; `other` is the mean of the other one, NAN: unknown.
+static Status reading_correct_one(const GravityLoad *load, double other, EvaluationRow *row,
+                                  Problem *problem) {
+    const bool is_time = isnan(row->restitution), is_known = !isnan(other) && !isnan(load->speed);
+    double *value = is_time ? &row->contact_time : &row->restitution;
+    double *read = is_time ? &row->read_contact_time : &row->read_restitution;
+    double isolated;
+    if (!is_known || !gravity_correct_one(load, is_time, *value, other, &isolated))
+        return reading_add_note(
+            row,
+            is_known  ? "gravity is not taken out: no contact comes to this under it"
+            : is_time ? "gravity is not taken out: this needs a speed and a restitution"
+                      : "gravity is not taken out: this needs a contact time",
+            problem);
+    // Errors grow with the correction.
+    *(is_time ? &row->contact_time_uncertainty : &row->restitution_uncertainty) *=
+        isolated / *value;
+    *read = *value;
+    *value = isolated;
     return STATUS_OK;
 }
 
-Status rows_unpull(const Measurement *tests, size_t count, const Progress *progress,
-                   Evaluation *evaluation, Problem *problem) {
-    for (size_t i = 0; i < evaluation->rows.count; i++) {
-        EvaluationRow *row = &evaluation->rows.at[i];
-        if (!is_pulled(tests, row) || !has(row->restitution) || !has(row->contact_time))
-            continue;
-        if (!progress_advance(progress, 1))
-            return STATUS_CANCELLED;
-        const GravityLoad pull = pull_of(tests, row, evaluation->separation);
-        TRY(unpull(&pull, row, problem));
-    }
-    for (size_t test = 0; test < count; test++) {
-        double restitution, contact_time;
-        means_of(evaluation, test, &restitution, &contact_time);
-        for (size_t i = 0; i < evaluation->rows.count; i++) {
-            EvaluationRow *row = &evaluation->rows.at[i];
-            if (row->test != test || !is_pulled(tests, row) ||
-                (has(row->restitution) && has(row->contact_time)))
-                continue;
-            if (!progress_advance(progress, 1))
-                return STATUS_CANCELLED;
-            const GravityLoad pull = pull_of(tests, row, evaluation->separation);
-            TRY(unpull_one(&pull, restitution, contact_time, row, problem));
+// The mean T_c or e of a test's readings without gravity; NAN: there are none.
+static double reading_mean(const EvaluationRows *rows, size_t test, bool is_time) {
+    double sum = 0, count = 0;
+    for (size_t i = 0; i < rows->count; i++) {
+        const EvaluationRow *row = &rows->at[i];
+        Reading reading;
+        if (row->test == test && (row->is_of_trace || !isnan(row->read_contact_time)) &&
+            reading_get(row, is_time, &reading)) {
+            sum += reading.value;
+            count++;
         }
     }
+    return sum / count;
+}
+
+Status readings_correct_gravity(const Measurement *tests, size_t count, int separation,
+                                const Progress *progress, EvaluationRows *rows, Problem *problem) {
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t test = 0; test < count; test++) {
+            // First drops with both, from which the others borrow.
+            const double e = pass > 0 ? reading_mean(rows, test, false) : 0;
+            const double T = pass > 0 ? reading_mean(rows, test, true) : 0;
+            for (size_t i = 0; i < rows->count; i++) {
+                EvaluationRow *row = &rows->at[i];
+                const int known = !isnan(row->restitution) + !isnan(row->contact_time);
+                if (row->test != test || row->is_of_trace || !(tests[test].test->gravity > 0) ||
+                    known != 2 - pass)
+                    continue;
+                if (!progress_advance(progress, 1))
+                    return STATUS_CANCELLED;
+                const GravityLoad load = {tests[test].test->gravity, row->approach_speed,
+                                          (Separation)separation,
+                                          row->restitution_by == RESTITUTION_BY_HEIGHTS};
+                TRY(pass == 0 ? reading_correct_both(&load, row, problem)
+                              : reading_correct_one(&load, isnan(row->restitution) ? e : T, row,
+                                                    problem));
+            }
+        }
     return STATUS_OK;
 }

@@ -1,17 +1,15 @@
-// A force trace as loggers write it: columns of text, a time and its force or the force alone. Not
-// its evaluation (trace.h), nor a ground motion (excite/import.h). Used by whoever takes a file of
-// one.
+// Force traces in the text files of data loggers: columns of times and forces, or of forces alone.
 #ifndef CORE_FORMATS_FORCE_TRACE_TEXT_H
 #define CORE_FORMATS_FORCE_TRACE_TEXT_H
 
-#include "core/drop_test/drop_test.h"
+#include "core/base/field.h"
 
-// Reads lines of two numbers, or of one where `interval` is given (NAN: it is not) [s], with
-// commas, semicolons or blanks between them; lines above the first number are its header, and what
-// stands there in brackets must be [s] and [N]. Sets interval and force of `trace`, which is all
-// zero before; force.at is freed by free. Faults stand at "line 12". STATUS_UNREADABLE,
-// STATUS_TOO_LARGE, STATUS_NO_MEMORY.
-Status force_trace_text_read(const char *text, size_t size, double interval, Trace *trace,
-                             Problem *problem);
+// Reads lines of two numbers, time [s] and force [N], or of the force alone; commas, semicolons or
+// blanks separate them. Lines above the first number are the header; units in brackets there must
+// be [s] and [N]. *interval: the known interval of the samples [s], or NAN, which a force alone
+// does not allow; replaced by that of the times. `force` is released by free(force->at). Faults are
+// at "line 12". STATUS_UNREADABLE, STATUS_TOO_LARGE beyond samples_max, STATUS_NO_MEMORY.
+Status force_trace_text_read(const char *text, size_t size, size_t samples_max, double *interval,
+                             Reals *force, Problem *problem);
 
 #endif

@@ -1,16 +1,17 @@
-// Header, then all numbers in reading order; what their rows look like tells the rest of the
-// layout. Every word is looked at a fixed number of times, so the time is linear in the size.
+// The header ends with the last line that names NPTS or is "*** Begin data ***"; without such a
+// line, above the first line that has only numbers. All numbers below are read in reading order;
+// the shape of their rows decides between the layouts that the header leaves open.
 #include "core/formats/ground_motion_text.h"
 
+#include <ctype.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/excitation/recorded_motion.h"
-#include "core/formats/import_header.h"
 #include "core/formats/text_table.h"
 
-enum { VALUES_MAX = 2 * RECORD_SAMPLES };
+enum { HEADER_LINES = 64, LINE_MAX = 512 };
 
 const char *const acceleration_unit_names[] = {[ACCELERATION_G] = "g",
                                                [ACCELERATION_METRES] = "m/s^2",
@@ -24,264 +25,409 @@ double acceleration_unit_size(int unit) {
     return unit_sizes[unit];
 }
 
-// The numbers of a file as its rows hold them.
-typedef struct Numbers {
-    double *at;
-    size_t count, room;
-    size_t rows, columns; // columns of the first row
-    size_t last_line;     // with numbers
-    size_t uneven_line;   // the first row but the last with another number of columns; 0: none
-    size_t uneven_count;  // its columns
-    size_t last_columns;  // of the last row
-} Numbers;
+typedef struct MotionHeader {
+    const char *layout;   // of the line with the number of samples; NULL: there is none
+    size_t count_line;    // that line
+    double count;         // samples; NAN: not stated
+    double interval;      // [s]; NAN: not stated
+    int unit;             // AccelerationUnit; CHOICE_ABSENT: not stated
+    size_t unit_line;     // line that states the unit
+    size_t conflict_line; // first line that states another unit; 0: none
+    bool is_time;         // its last line starts with "time"
+    char text[1001];      // lines joined by "; ", cut
+    TextReader data;      // starts at the numbers
+} MotionHeader;
 
-static Status numbers_add(Numbers *numbers, double value, size_t line, Problem *problem) {
-    if (numbers->count == VALUES_MAX) {
-        char place[64];
-        return problem_add(problem, STATUS_TOO_LARGE, text_place(place, line, 0),
-                           "must hold at most %d numbers up to here", VALUES_MAX);
-    }
-    if (numbers->count == numbers->room) {
-        const size_t room = numbers->room > 0 ? 2 * numbers->room : 4096;
-        double *at = realloc(numbers->at, room * sizeof *at);
-        if (at == NULL)
-            return problem_set(problem, STATUS_NO_MEMORY, "no memory for %zu samples", room);
-        numbers->at = at;
-        numbers->room = room;
-    }
-    numbers->at[numbers->count++] = value;
-    return STATUS_OK;
+static bool motion_is_word_edge(char c) {
+    return !isalnum((unsigned char)c) && c != '_';
 }
 
-static Status read_row(Numbers *numbers, const TextLine *line, Problem *problem) {
-    const char *at = line->at;
-    const size_t before = numbers->count;
-    TextWord word;
+// The first occurrence of the word at or after `from` in a line in upper case; NULL: none.
+static const char *motion_find_word(const char *line, const char *from, const char *word) {
+    const size_t length = strlen(word);
+    for (const char *at = from; (at = strstr(at, word)) != NULL; at++)
+        if ((at == line || motion_is_word_edge(at[-1])) && motion_is_word_edge(at[length]))
+            return at;
+    return NULL;
+}
+
+// The number after `at`, blanks, equals signs and colons; NAN: none.
+static double motion_number_at(const char *at) {
+    while (*at == ' ' || *at == '\t' || *at == '=' || *at == ':')
+        at++;
+    TextWord word = {at, at};
     double value;
-    while (text_word(line, &at, &word)) {
-        if (!text_number(&word, &value))
-            return text_refuse_word(line, &word, problem);
-        TRY(numbers_add(numbers, value, line->number, problem));
+    while (*word.end != '\0' && strchr(" \t,;", *word.end) == NULL)
+        word.end++;
+    return word.end > word.at && text_table_number(&word, &value) ? value : (double)NAN;
+}
+
+// "NPTS=  4000, DT= .01000 SEC" or "4096    0.0100    NPTS, DT".
+static void motion_read_count(const char *line, MotionHeader *header) {
+    const char *dt = motion_find_word(line, line, "DT");
+    header->count = motion_number_at(line);
+    header->interval = NAN;
+    header->layout = "at2_value_first";
+    if (!isnan(header->count)) {
+        const char *at = line + strspn(line, " \t");
+        at += strcspn(at, " \t,;");
+        header->interval = motion_number_at(at + strspn(at, " \t,;"));
+        return;
     }
-    const size_t columns = numbers->count - before;
-    if (columns == 0)
-        return STATUS_OK;
-    // The row before was not the last one.
-    if (numbers->rows > 0 && numbers->last_columns != numbers->columns &&
-        numbers->uneven_line == 0) {
-        numbers->uneven_line = numbers->last_line;
-        numbers->uneven_count = numbers->last_columns;
-    }
-    if (numbers->rows++ == 0)
-        numbers->columns = columns;
-    numbers->last_columns = columns;
-    numbers->last_line = line->number;
+    header->layout = "at2";
+    header->count = motion_number_at(motion_find_word(line, line, "NPTS") + strlen("NPTS"));
+    if (dt != NULL)
+        header->interval = motion_number_at(dt + strlen("DT"));
+}
+
+static Status motion_check_count(const MotionHeader *header, Problem *problem) {
+    char place[64], is[32];
+    (void)text_table_place(place, header->count_line, 0);
+    if (isnan(header->count))
+        return problem_add(problem, STATUS_UNREADABLE, place,
+                           "must tell the number of values behind NPTS, or before it");
+    if (header->count < 1 || header->count != floor(header->count))
+        return problem_add(problem, STATUS_UNREADABLE, place,
+                           "must tell a whole number of values of at least 1, tells %s",
+                           text_real(is, header->count));
+    if (!isnan(header->interval) && !(header->interval > 0))
+        return problem_add(problem, STATUS_UNREADABLE, place,
+                           "must tell an interval above 0 s, tells %s",
+                           text_real(is, header->interval));
     return STATUS_OK;
 }
 
-static Status read_numbers(TextReader reader, Numbers *numbers, Problem *problem) {
+// Whether "M/S" or "M/SEC" continues as an acceleration: ^2, 2, **2, /S or /SEC.
+static bool motion_is_squared(const char *at) {
+    if (strncmp(at, "EC", 2) == 0)
+        at += 2;
+    return strncmp(at, "^2", 2) == 0 || *at == '2' || strncmp(at, "**2", 3) == 0 ||
+           strncmp(at, "/S", 2) == 0;
+}
+
+// Whether a line about units or acceleration has G as a word outside a formula.
+static bool motion_names_g(const char *line) {
+    if (strstr(line, "UNIT") == NULL && strstr(line, "ACC") == NULL &&
+        strstr(line, "(G)") == NULL && strstr(line, "[G]") == NULL)
+        return false;
+    for (const char *at = line; (at = motion_find_word(line, at, "G")) != NULL; at++)
+        if ((at == line || strchr("/*^%", at[-1]) == NULL) &&
+            (at[1] == '\0' || strchr("/*^%", at[1]) == NULL))
+            return true;
+    return false;
+}
+
+static void motion_add_unit(MotionHeader *header, AccelerationUnit unit, size_t line) {
+    if (header->unit == CHOICE_ABSENT) {
+        header->unit = (int)unit;
+        header->unit_line = line;
+    } else if (header->unit != (int)unit && header->conflict_line == 0) {
+        header->conflict_line = line;
+    }
+}
+
+static void motion_find_units(MotionHeader *header, const char *line, size_t number) {
+    if (motion_names_g(line))
+        motion_add_unit(header, ACCELERATION_G, number);
+    if (motion_find_word(line, line, "GAL") != NULL)
+        motion_add_unit(header, ACCELERATION_CENTIMETRES, number);
+    for (const char *at = line; (at = strstr(at, "M/S")) != NULL; at++) {
+        const bool is_centi = at > line && at[-1] == 'C';
+        const char *first = is_centi ? at - 1 : at;
+        if ((first == line || motion_is_word_edge(first[-1])) && motion_is_squared(at + 3))
+            motion_add_unit(header, is_centi ? ACCELERATION_CENTIMETRES : ACCELERATION_METRES,
+                            number);
+    }
+}
+
+// Velocities and displacements are published in the same layouts.
+static Status motion_check_quantity(const char *line, size_t number, Problem *problem) {
+    const bool is_velocity = motion_find_word(line, line, "VELOCITY") != NULL;
+    if ((!is_velocity && motion_find_word(line, line, "DISPLACEMENT") == NULL) ||
+        strstr(line, "ACC") != NULL ||
+        (strstr(line, "UNITS") == NULL && strstr(line, "TIME") == NULL))
+        return STATUS_OK;
+    char place[64];
+    return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, number, 0),
+                       "must be of an acceleration, is of a %s",
+                       is_velocity ? "velocity" : "displacement");
+}
+
+// Printable ASCII only: the text is copied into others whose limits are in bytes.
+static void motion_keep_text(MotionHeader *header, const TextLine *line) {
+    const char *at = line->at;
+    while (at < line->end && isspace((unsigned char)*at))
+        at++;
+    size_t used = strlen(header->text);
+    if (at < line->end && used > 0 && used + 3 < sizeof header->text) {
+        memcpy(header->text + used, "; ", 3);
+        used += 2;
+    }
+    for (; at < line->end && used + 1 < sizeof header->text; at++)
+        header->text[used++] = *at == '\t' ? ' ' : isprint((unsigned char)*at) ? *at : '?';
+}
+
+// Refuses a file without a line of numbers; a decimal comma is the usual reason.
+static Status motion_refuse_text(TextReader reader, size_t lines, Problem *problem) {
+    TextLine line;
+    TextWord word;
+    char place[64];
+    while (reader.line < HEADER_LINES && text_table_next_line(&reader, &line)) {
+        const char *at = line.at;
+        while (text_table_next_word(&line, &at, &word))
+            if (strchr("+-.0123456789", *word.at) != NULL &&
+                memchr(word.at, ',', (size_t)(word.end - word.at)) != NULL)
+                return text_table_refuse(&line, &word, problem);
+    }
+    return problem_add(
+        problem, STATUS_UNREADABLE, text_table_place(place, lines > 0 ? lines : 1, 0),
+        lines < HEADER_LINES ? "must hold a line of numbers up to here, the end of the file"
+                             : "must hold a line of numbers up to here");
+}
+
+// The number of lines above the numbers, and the one that names NPTS (0: none).
+static Status motion_find_data(TextReader reader, size_t *lines, size_t *count_line,
+                               Problem *problem) {
+    TextLine line;
+    char seen[LINE_MAX];
+    size_t first_numbers = 0, text_lines = 0;
+    const TextReader start = reader;
+    *lines = *count_line = 0;
+    while (reader.line < HEADER_LINES && text_table_next_line(&reader, &line)) {
+        text_table_upper(&line, seen, sizeof seen);
+        if (motion_find_word(seen, seen, "NPTS") != NULL)
+            *lines = *count_line = line.number;
+        else if (text_table_is_marker(&line) && strstr(seen, "BEGIN") != NULL)
+            *lines = line.number;
+        if (first_numbers == 0 && text_table_count(&line) > 0)
+            first_numbers = line.number;
+        text_lines = line.number;
+    }
+    if (*lines > 0)
+        return STATUS_OK;
+    if (first_numbers == 0)
+        return motion_refuse_text(start, text_lines, problem);
+    *lines = first_numbers - 1;
+    return STATUS_OK;
+}
+
+// A line "4684 0.0100" above a single column: number of samples and interval.
+static void motion_read_count_line(MotionHeader *header) {
+    TextReader reader = header->data;
+    TextLine line, next = {0};
+    TextWord word;
+    if (!text_table_next_line(&reader, &line) || text_table_count(&line) != 2)
+        return;
+    const TextReader behind = reader;
+    const char *at = line.at;
+    double count = 0, interval = 0;
+    (void)(text_table_next_word(&line, &at, &word) && text_table_number(&word, &count));
+    (void)(text_table_next_word(&line, &at, &word) && text_table_number(&word, &interval));
+    while (text_table_next_line(&reader, &next) && next.at == next.end)
+        ;
+    if (text_table_count(&next) != 1 || count < 2 || count != floor(count) || !(interval > 0))
+        return;
+    header->layout = "count_line";
+    header->count_line = line.number;
+    header->count = count;
+    header->interval = interval;
+    header->data = behind;
+}
+
+static Status motion_read_header(TextReader reader, MotionHeader *header, Problem *problem) {
+    *header = (MotionHeader){.count = NAN, .interval = NAN, .unit = CHOICE_ABSENT};
+    size_t lines, count_line;
+    char seen[LINE_MAX];
+    TextLine line;
+    TRY(motion_find_data(reader, &lines, &count_line, problem));
+    header->count_line = count_line;
+    while (reader.line < lines && text_table_next_line(&reader, &line)) {
+        text_table_upper(&line, seen, sizeof seen);
+        TRY(motion_check_quantity(seen, line.number, problem));
+        motion_find_units(header, seen, line.number);
+        motion_keep_text(header, &line);
+        const char *first = seen + strspn(seen, " \t#%\"");
+        header->is_time = strncmp(first, "TIME", 4) == 0 && motion_is_word_edge(first[4]);
+        if (line.number == count_line) {
+            motion_read_count(seen, header);
+            TRY(motion_check_count(header, problem));
+        }
+    }
+    header->data = reader;
+    if (header->layout == NULL)
+        motion_read_count_line(header);
+    return STATUS_OK;
+}
+
+static Status motion_read_numbers(TextReader reader, NumberTable *table, Problem *problem) {
     TextLine line;
     bool is_ended = false;
     char place[64], seen[64];
-    while (text_line(&reader, &line)) {
-        text_capitals(&line, seen, sizeof seen);
+    while (text_table_next_line(&reader, &line)) {
+        text_table_upper(&line, seen, sizeof seen);
         if (is_ended && line.at < line.end)
-            return problem_add(problem, STATUS_UNREADABLE, text_place(place, line.number, 0),
+            return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line.number, 0),
                                "must be empty, as the line that ends the numbers is above");
-        if (text_is_mark(&line) && strstr(seen, "END") != NULL)
+        if (text_table_is_marker(&line) && strstr(seen, "END") != NULL)
             is_ended = true;
         else if (!is_ended)
-            TRY(read_row(numbers, &line, problem));
+            TRY(text_table_add_row(table, &line, problem));
     }
     return STATUS_OK;
 }
 
-// The line of row `row` of the numbers.
-static size_t row_line(TextReader reader, size_t row) {
-    TextLine line = {0};
-    while (text_line(&reader, &line))
-        if (text_numbers(&line) > 0 && row-- == 0)
-            break;
-    return line.number;
-}
-
-// Whether the first column is a time: most of its steps are as its first one.
-static bool has_times(const Numbers *numbers) {
-    const size_t columns = numbers->columns;
-    if (numbers->rows < 3 || columns < 2 || numbers->uneven_line != 0 ||
-        numbers->last_columns != columns)
+// Whether the first column is a time: more than half of its steps equal its first one.
+static bool motion_has_times(const NumberTable *table) {
+    const size_t columns = table->columns;
+    if (table->rows < 3 || columns < 2 || table->uneven_line != 0 || table->last_columns != columns)
         return false;
-    const double *at = numbers->at, step = at[columns] - at[0];
+    const double *at = table->at, step = at[columns] - at[0];
     size_t alike = 0;
-    for (size_t i = 1; i < numbers->rows; i++)
+    for (size_t i = 1; i < table->rows; i++)
         alike += fabs(at[i * columns] - at[(i - 1) * columns] - step) <= 0.3 * step;
-    return step > 0 && alike > numbers->rows / 2;
+    return step > 0 && alike > table->rows / 2;
 }
 
-// Leaves the accelerations in numbers->at; the first one's time, and their interval.
-static Status take_times(Numbers *numbers, const ImportHeader *header, double *start,
-                         double *interval, Problem *problem) {
-    const size_t rows = numbers->rows;
-    double *at = numbers->at;
-    char place[64], now[32], then[32], step[32];
-    if (numbers->columns != 2 || numbers->uneven_line != 0 || numbers->last_columns != 2 ||
-        rows < 2) {
-        const size_t line = numbers->uneven_line != 0 ? numbers->uneven_line : numbers->last_line;
-        return problem_add(problem, STATUS_UNREADABLE, text_place(place, line, 0),
-                           "must hold two columns, a time and its acceleration, as every row; has "
-                           "%zu",
-                           numbers->uneven_line != 0 ? numbers->uneven_count
-                                                     : numbers->last_columns);
-    }
-    const double mean = (at[2 * rows - 2] - at[0]) / (double)(rows - 1);
-    // Printed times are rounded, and a time that is missing shifts all later ones by an interval.
-    for (size_t i = 1; i < rows; i++) {
-        const double gained = at[2 * i] - at[2 * i - 2];
-        if (gained > 0 && fabs(gained - mean) <= 0.6 * mean &&
-            fabs(at[2 * i] - at[0] - (double)i * mean) <= 0.3 * mean)
-            continue;
-        // What is wrong bends the mean, and with it what is behind; itself it is furthest from it.
-        size_t row = 1;
-        for (size_t j = 2; j < rows; j++)
-            if (fabs(at[2 * j] - at[2 * j - 2] - mean) > fabs(at[2 * row] - at[2 * row - 2] - mean))
-                row = j;
-        return problem_add(problem, STATUS_UNREADABLE,
-                           text_place(place, row_line(header->data, row), 0),
-                           "times must rise evenly: is %s s after %s s, where steps are %s s",
-                           text_real(now, at[2 * row]), text_real(then, at[2 * row - 2]),
-                           text_real(step, row > 1 ? at[2] - at[0] : mean));
-    }
-    // Differences of printed decimals: twelve digits are all they have.
-    const double scale = pow(10, 11 - floor(log10(mean)));
-    *interval = isfinite(scale) && scale > 0 ? nearbyint(mean * scale) / scale : mean;
-    *start = at[0];
-    for (size_t i = 0; i < rows; i++)
-        at[i] = at[2 * i + 1];
-    numbers->count = rows;
-    return STATUS_OK;
+static Status motion_take_times(NumberTable *table, const MotionHeader *header,
+                                GroundMotionText *motion, Problem *problem) {
+    if (table->columns == 2 && table->uneven_line == 0 && table->last_columns == 2 &&
+        table->rows >= 2)
+        return text_table_split_times(table, header->data, &motion->start, &motion->interval,
+                                      problem);
+    const bool is_uneven = table->uneven_line != 0;
+    char place[64];
+    return problem_add(
+        problem, STATUS_UNREADABLE,
+        text_table_place(place, is_uneven ? table->uneven_line : table->last_line, 0),
+        "must hold two columns, a time and its acceleration, as every row; has %zu",
+        is_uneven ? table->uneven_columns : table->last_columns);
 }
 
-static Status check_rows(const Numbers *numbers, const ImportHeader *header, Problem *problem) {
+static Status motion_check_rows(const NumberTable *table, const MotionHeader *header,
+                                Problem *problem) {
     char place[64], count[32];
     if (!isnan(header->count)) {
-        if (header->count == (double)numbers->count)
+        if (header->count == (double)table->count)
             return STATUS_OK;
-        return problem_add(problem, STATUS_UNREADABLE, text_place(place, header->count_line, 0),
+        return problem_add(problem, STATUS_UNREADABLE,
+                           text_table_place(place, header->count_line, 0),
                            "must tell how many values follow: tells %s, but %zu follow, the last "
                            "on line %zu",
-                           text_real(count, header->count), numbers->count, numbers->last_line);
+                           text_real(count, header->count), table->count, table->last_line);
     }
-    if (numbers->uneven_line != 0 || numbers->last_columns > numbers->columns)
-        return problem_add(
-            problem, STATUS_UNREADABLE,
-            text_place(place, numbers->uneven_line != 0 ? numbers->uneven_line : numbers->last_line,
-                       0),
-            "must have %zu numbers, as the rows before, has %zu", numbers->columns,
-            numbers->uneven_line != 0 ? numbers->uneven_count : numbers->last_columns);
-    return STATUS_OK;
+    const bool is_uneven = table->uneven_line != 0;
+    if (!is_uneven && table->last_columns <= table->columns)
+        return STATUS_OK;
+    return problem_add(
+        problem, STATUS_UNREADABLE,
+        text_table_place(place, is_uneven ? table->uneven_line : table->last_line, 0),
+        "must have %zu numbers, as the rows before, has %zu", table->columns,
+        is_uneven ? table->uneven_columns : table->last_columns);
 }
 
-static Status choose_interval(const GroundMotionOptions *request, const ImportHeader *header,
-                              GroundMotionText *import, Problem *problem) {
-    const double told = !isnan(import->interval) ? import->interval : header->interval;
+static Status motion_choose_interval(const GroundMotionOptions *options, const MotionHeader *header,
+                                     GroundMotionText *motion, Problem *problem) {
+    const double told = !isnan(motion->interval) ? motion->interval : header->interval;
     char place[64], is[32], asked[32];
-    (void)text_place(place, header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
-    if (isnan(told) && isnan(request->interval))
+    (void)text_table_place(place,
+                           header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
+    if (isnan(told) && isnan(options->interval))
         return problem_add(problem, STATUS_UNREADABLE, place,
                            "must tell the interval of the samples, or interval must be given");
-    if (!isnan(told) && !isnan(request->interval) &&
-        !(fabs(told - request->interval) <= 1e-6 * told))
+    if (!isnan(told) && !isnan(options->interval) &&
+        !(fabs(told - options->interval) <= 1e-6 * told))
         return problem_add(problem, STATUS_UNREADABLE, place,
                            "tells an interval of %s s, but %s s is given", text_real(is, told),
-                           text_real(asked, request->interval));
-    import->interval = isnan(told) ? request->interval : told;
+                           text_real(asked, options->interval));
+    motion->interval = isnan(told) ? options->interval : told;
     return STATUS_OK;
 }
 
-static Status choose_unit(const GroundMotionOptions *request, const ImportHeader *header,
-                          GroundMotionText *import, Problem *problem) {
+static Status motion_choose_unit(const GroundMotionOptions *options, const MotionHeader *header,
+                                 GroundMotionText *motion, Problem *problem) {
     char place[64];
-    import->stated_unit = header->unit;
-    import->unit = request->unit;
-    if (request->unit != CHOICE_ABSENT)
+    motion->stated_unit = header->unit;
+    motion->unit = options->unit;
+    if (options->unit != CHOICE_ABSENT)
         return STATUS_OK;
-    import->unit = header->unit;
+    motion->unit = header->unit;
     if (header->conflict_line != 0)
-        return problem_add(problem, STATUS_UNREADABLE, text_place(place, header->conflict_line, 0),
+        return problem_add(problem, STATUS_UNREADABLE,
+                           text_table_place(place, header->conflict_line, 0),
                            "tells another unit than line %zu, %s: unit must be given",
                            header->unit_line, acceleration_unit_names[header->unit]);
     if (header->unit != CHOICE_ABSENT)
         return STATUS_OK;
     // PEER's files are in g.
-    import->unit = ACCELERATION_G;
-    if (strncmp(import->layout, "at2", 3) == 0)
+    motion->unit = ACCELERATION_G;
+    if (strncmp(motion->layout, "at2", 3) == 0)
         return STATUS_OK;
-    return problem_add(problem, STATUS_UNREADABLE, text_place(place, 1, 0),
+    return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, 1, 0),
                        "must tell the unit, or unit must be given: g, m/s^2 or cm/s^2");
 }
 
-static Status convert(Numbers *numbers, const ImportHeader *header, GroundMotionText *import,
-                      Problem *problem) {
+static Status motion_convert(NumberTable *table, const MotionHeader *header, size_t samples_max,
+                             GroundMotionText *motion, Problem *problem) {
     char place[64], is[32];
-    if (numbers->count < 2 || numbers->count > RECORD_SAMPLES)
+    if (table->count < 2 || table->count > samples_max)
         return problem_add(
-            problem, numbers->count < 2 ? STATUS_UNREADABLE : STATUS_TOO_LARGE,
-            text_place(place, numbers->count < 2 ? header->data.line + 1 : numbers->last_line, 0),
-            "must hold 2 to %d samples from here on, holds %zu", RECORD_SAMPLES, numbers->count);
-    for (size_t i = 0; i < numbers->count; i++) {
-        const double value = numbers->at[i];
-        numbers->at[i] *= unit_sizes[import->unit];
-        if (!isfinite(numbers->at[i]))
-            return problem_add(problem, STATUS_UNREADABLE, text_place(place, numbers->last_line, 0),
+            problem, table->count < 2 ? STATUS_UNREADABLE : STATUS_TOO_LARGE,
+            text_table_place(place, table->count < 2 ? header->data.line + 1 : table->last_line, 0),
+            "must hold 2 to %zu samples from here on, holds %zu", samples_max, table->count);
+    for (size_t i = 0; i < table->count; i++) {
+        const double value = table->at[i];
+        table->at[i] *= unit_sizes[motion->unit];
+        if (!isfinite(table->at[i]))
+            return problem_add(problem, STATUS_UNREADABLE,
+                               text_table_place(place, table->last_line, 0),
                                "sample %zu, %s, must be finite in m/s^2", i, text_real(is, value));
     }
-    import->samples = (Reals){numbers->at, numbers->count};
-    numbers->at = NULL;
-    import->header = strdup(header->text);
-    return import->header != NULL
+    motion->samples = (Reals){table->at, table->count};
+    table->at = NULL;
+    motion->header = strdup(header->text);
+    return motion->header != NULL
                ? STATUS_OK
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for a header");
 }
 
-static Status read_all(TextReader reader, const GroundMotionOptions *request, Numbers *numbers,
-                       GroundMotionText *import, Problem *problem) {
-    ImportHeader header;
-    TRY(import_header_read(reader, &header, problem));
-    TRY(read_numbers(header.data, numbers, problem));
-    import->interval = NAN;
-    import->layout = header.layout != NULL   ? header.layout
-                     : numbers->columns == 1 ? "one_column"
-                                             : "columns";
-    // A count that fits tells columns of a rising acceleration from times.
-    if (numbers->rows > 0 && header.count != (double)numbers->count &&
-        (header.is_time || has_times(numbers))) {
-        import->layout = "time_acceleration";
-        TRY(take_times(numbers, &header, &import->start, &import->interval, problem));
+static Status motion_read(TextReader reader, const GroundMotionOptions *options, NumberTable *table,
+                          GroundMotionText *motion, Problem *problem) {
+    MotionHeader header;
+    TRY(motion_read_header(reader, &header, problem));
+    TRY(motion_read_numbers(header.data, table, problem));
+    motion->interval = NAN;
+    motion->layout = header.layout != NULL ? header.layout
+                     : table->columns == 1 ? "one_column"
+                                           : "columns";
+    // A number of samples that fits rules out times: the first column only happens to rise.
+    if (table->rows > 0 && header.count != (double)table->count &&
+        (header.is_time || motion_has_times(table))) {
+        motion->layout = "time_acceleration";
+        TRY(motion_take_times(table, &header, motion, problem));
     }
-    TRY(check_rows(numbers, &header, problem));
-    TRY(choose_interval(request, &header, import, problem));
-    TRY(choose_unit(request, &header, import, problem));
-    return convert(numbers, &header, import, problem);
+    TRY(motion_check_rows(table, &header, problem));
+    TRY(motion_choose_interval(options, &header, motion, problem));
+    TRY(motion_choose_unit(options, &header, motion, problem));
+    return motion_convert(table, &header, table->count_max / 2, motion, problem);
 }
 
-Status ground_motion_text_read(const char *text, size_t size, const GroundMotionOptions *request,
-                               GroundMotionText *import, Problem *problem) {
-    *import = (GroundMotionText){0};
-    Numbers numbers = {0};
-    // A byte order mark of UTF-8.
-    const size_t skipped = size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
-    Status status = text_check(text + skipped, size - skipped, problem);
+Status ground_motion_text_read(const char *text, size_t size, size_t samples_max,
+                               const GroundMotionOptions *options, GroundMotionText *motion,
+                               Problem *problem) {
+    *motion = (GroundMotionText){0};
+    NumberTable table = {.count_max = 2 * samples_max};
+    TextReader reader;
+    Status status = text_table_open(text, size, &reader, problem);
     if (status == STATUS_OK)
-        status = read_all((TextReader){text + skipped, text + size, 0}, request, &numbers, import,
-                          problem);
-    free(numbers.at);
+        status = motion_read(reader, options, &table, motion, problem);
+    free(table.at);
     if (status != STATUS_OK)
-        ground_motion_text_clear(import);
+        ground_motion_text_clear(motion);
     return status;
 }
 
-void ground_motion_text_clear(GroundMotionText *import) {
-    free(import->header);
-    free(import->samples.at);
-    *import = (GroundMotionText){0};
+void ground_motion_text_clear(GroundMotionText *motion) {
+    free(motion->header);
+    free(motion->samples.at);
+    *motion = (GroundMotionText){0};
 }

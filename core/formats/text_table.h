@@ -1,18 +1,18 @@
-// Text as lines, words and numbers, with the place of each.
-// Knows nothing of layouts. Used by import.c and import_header.c.
+// Tables of numbers in text files: lines, words, numbers, rows, evenly rising times. A position in
+// a fault is "line 12, column 3", both from 1.
 #ifndef CORE_FORMATS_TEXT_TABLE_H
 #define CORE_FORMATS_TEXT_TABLE_H
 
 #include "core/base/status.h"
 
-// What is left to read. A copy of it goes on from the same place.
+// The unread part of a text. A copy continues from the same position.
 typedef struct TextReader {
     const char *at, *end;
-    size_t line; // number of the last one read
+    size_t line; // number of the last line read
 } TextReader;
 
 typedef struct TextLine {
-    const char *at, *end; // without its end and the blanks before that
+    const char *at, *end; // without line end and trailing blanks
     size_t number;        // from 1
 } TextLine;
 
@@ -20,31 +20,52 @@ typedef struct TextWord {
     const char *at, *end;
 } TextWord;
 
+// All numbers of a file in reading order, and the shape of its rows. Released by free(at).
+typedef struct NumberTable {
+    double *at;
+    size_t count, room, count_max;
+    size_t rows, columns; // columns: of the first row
+    size_t last_line;     // of the last row
+    size_t last_columns;  // of the last row
+    size_t uneven_line;   // first row, except the last, with another number of columns; 0: none
+    size_t uneven_columns;
+} NumberTable;
+
+// Skips a byte order mark of UTF-8 and refuses bytes that no text has: STATUS_UNREADABLE.
+Status text_table_open(const char *text, size_t size, TextReader *reader, Problem *problem);
+
 // The next line; false at the end of the text.
-bool text_line(TextReader *reader, TextLine *line);
+bool text_table_next_line(TextReader *reader, TextLine *line);
 
-// The next word from *at on, which is moved behind it; false at the end of the line.
-bool text_word(const TextLine *line, const char **at, TextWord *word);
+// The next word from *at, which moves behind it; false at the end of the line.
+bool text_table_next_word(const TextLine *line, const char **at, TextWord *word);
 
-// A whole word as a number, decimal, with an exponent of E or D. False: it is none, or not finite.
-bool text_number(const TextWord *word, double *value);
+// The whole word as a decimal number, exponent E or D. False: not a number, or not finite.
+bool text_table_number(const TextWord *word, double *value);
 
-// Whether the line is made of numbers; how many. 0: no, or it is empty.
-size_t text_numbers(const TextLine *line);
+// How many numbers the line has; 0 if any word of it is not a number.
+size_t text_table_count(const TextLine *line);
 
-// The line in capitals, cut at `size`.
-void text_capitals(const TextLine *line, char *target, size_t size);
+// The line in upper case, cut to `size`.
+void text_table_upper(const TextLine *line, char *target, size_t size);
 
-// Whether it begins with "***".
-bool text_is_mark(const TextLine *line);
+// Whether the line starts with "***".
+bool text_table_is_marker(const TextLine *line);
 
-// Adds the fault at the word's line and column; says what kind of garbage it is.
-Status text_refuse_word(const TextLine *line, const TextWord *word, Problem *problem);
+// Adds a fault that describes why the word is not a number.
+Status text_table_refuse(const TextLine *line, const TextWord *word, Problem *problem);
 
 // "line 12, column 3"; column 0 is left out.
-const char *text_place(char target[64], size_t line, size_t column);
+const char *text_table_place(char target[64], size_t line, size_t column);
 
-// Refuses bytes that no text has.
-Status text_check(const char *text, size_t size, Problem *problem);
+// Appends the numbers of a line; an empty line is not a row. STATUS_UNREADABLE, STATUS_TOO_LARGE
+// beyond count_max numbers, STATUS_NO_MEMORY.
+Status text_table_add_row(NumberTable *table, const TextLine *line, Problem *problem);
+
+// Splits a table of two columns, times and values, at least two rows: leaves the values in `table`
+// and sets the first time and the interval. `reader` starts at or above the first row.
+// STATUS_UNREADABLE: the times do not rise evenly.
+Status text_table_split_times(NumberTable *table, TextReader reader, double *start,
+                              double *interval, Problem *problem);
 
 #endif

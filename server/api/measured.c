@@ -74,7 +74,8 @@ static Status read_table(const char *text, size_t size, const GroundMotionOption
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    const Status status = ground_motion_text_read(text, size, wanted, &import, fault);
+    const Status status =
+        ground_motion_text_read(text, size, RECORD_SAMPLES, wanted, &import, fault);
     if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
         (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
                           fault->faults[0].detail);

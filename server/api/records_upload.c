@@ -130,7 +130,7 @@ static Status read_table(const char *text, size_t size, Asked *asked, RecordUplo
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return no_memory(problem);
-    Status status = ground_motion_text_read(text, size, &wanted, &import, fault);
+    Status status = ground_motion_text_read(text, size, RECORD_SAMPLES, &wanted, &import, fault);
     if (status != STATUS_OK && fault->count > 0) // its places are lines, no pointers
         (void)problem_add(problem, status, "", "%s: %s", fault->faults[0].pointer,
                           fault->faults[0].detail);

@@ -91,8 +91,8 @@ static Status import_show(const char *path, const Bytes *text, const ImportSetti
                           Problem *problem) {
     const GroundMotionOptions request = {.interval = settings->interval, .unit = settings->unit};
     GroundMotionText import;
-    TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, &request, &import,
-                                problem));
+    TRY(ground_motion_text_read(text->at != NULL ? text->at : "", text->count, RECORD_SAMPLES,
+                                &request, &import, problem));
     char source[1000];
     const char *name = scene_file_name(path), *slash = strrchr(path, '/');
     char named[2000];

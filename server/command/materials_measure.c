@@ -36,12 +36,12 @@ static Status trace_write(const Trace *trace, const char *path, Bytes *json, Pro
 
 static Status trace_add(MaterialsCall *call, const char *path, Bytes *body, Problem *problem) {
     Bytes text = {0}, json = {0};
-    Trace trace = {0};
+    Trace trace = {.interval = call->settings->interval};
     call->about = path;
     Status status = scene_file_read(path, &text, problem);
     if (status == STATUS_OK)
         status = force_trace_text_read(text.at != NULL ? text.at : "", text.count,
-                                       call->settings->interval, &trace, problem);
+                                       TRACE_SAMPLES_MAX, &trace.interval, &trace.force, problem);
     if (status == STATUS_OK)
         status = trace_write(&trace, path, &json, problem);
     if (status == STATUS_OK)

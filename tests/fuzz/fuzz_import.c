@@ -9,6 +9,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/excitation/recorded_motion.h"
 #include "core/formats/ground_motion_text.h"
 
 enum { TEXT_MAX = 4096, MUTATIONS_MAX = 6, ROUNDS_TIMED = 256 };
@@ -155,7 +156,8 @@ int main(int argc, char **argv) {
             memcpy(own, text, size);
             GroundMotionText import;
             problem_clear(&problem);
-            const Status status = ground_motion_text_read(own, size, &request, &import, &problem);
+            const Status status =
+                ground_motion_text_read(own, size, RECORD_SAMPLES, &request, &import, &problem);
             free(own);
             const char *wrong = judge(status, &import, &problem);
             if (wrong != NULL) {

@@ -90,10 +90,10 @@ static void gravity_is_taken_out_again(void **state) {
                                 1, 0.01);
                 }
                 double value;
-                assert_true(gravity_correct_restitution(&pull, pulled.restitution, 0.02, &value));
+                assert_true(gravity_correct_one(&pull, false, pulled.restitution, 0.02, &value));
                 assert_near(value, restitutions[i], 1e-9);
-                assert_true(gravity_correct_contact_time(&pull, pulled.contact_time,
-                                                         restitutions[i], &value));
+                assert_true(
+                    gravity_correct_one(&pull, true, pulled.contact_time, restitutions[i], &value));
                 assert_near(value, 0.02, 1e-10);
             }
 }
@@ -102,8 +102,8 @@ static void what_no_contact_comes_to_is_told(void **state) {
     (void)state;
     const GravityLoad pull = {9.80665, 0.1, SEPARATION_ZERO_PENETRATION, false};
     double value;
-    assert_false(gravity_correct_restitution(
-        &(GravityLoad){9.80665, 0.3, SEPARATION_ZERO_FORCE, true}, 1.5, 0.025, &value));
+    assert_false(gravity_correct_one(&(GravityLoad){9.80665, 0.3, SEPARATION_ZERO_FORCE, true},
+                                     false, 1.5, 0.025, &value));
     // The impactor stays in a soft buffer.
     const GravityContact stays = gravity_apply(&pull, 0.3, 0.1);
     assert_true(stays.restitution == 0 && isinf(stays.contact_time));

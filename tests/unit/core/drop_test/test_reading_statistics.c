@@ -27,8 +27,8 @@ static void make(const double *values, const double *speeds, size_t count) {
     for (size_t i = 0; i < count; i++)
         readings[i] = (Reading){
             .value = values[i], .uncertainty = none, .speed = speeds != NULL ? speeds[i] : none};
-    assert_int_equal(statistic_make(readings, count, "restitution", "", &quantity, &problem),
-                     STATUS_OK);
+    assert_int_equal(
+        reading_statistics_run(readings, count, "restitution", "", &quantity, &problem), STATUS_OK);
 }
 
 static void mean_and_interval_are_those_of_the_t_test(void **state) {
@@ -45,7 +45,7 @@ static void mean_and_interval_are_those_of_the_t_test(void **state) {
     assert_near(quantity.maximum, 0.65, 0);
     assert_int_equal(quantity.outliers, 0);
     assert_true(isnan(quantity.mean_without_outliers));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void the_line_is_that_of_least_squares(void **state) {
@@ -61,12 +61,12 @@ static void the_line_is_that_of_least_squares(void **state) {
     assert_int_equal(trend->verdict, TREND_NOT_CONSTANT);
     assert_non_null(strstr(trend->detail, "falls"));
     assert_non_null(strstr(trend->detail, "not constant"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     make(stays, speeds, COUNT(stays));
     assert_int_equal(trend->verdict, TREND_CONSTANT);
     assert_non_null(strstr(trend->detail, "may be taken as constant"));
     assert_near(trend->missed_change, fmax(fabs(trend->low), fabs(trend->high)), 1e-15);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void what_speeds_cannot_tell_is_said(void **state) {
@@ -75,28 +75,28 @@ static void what_speeds_cannot_tell_is_said(void **state) {
     make(values, alike, 4);
     assert_int_equal(quantity.trend.verdict, CHOICE_ABSENT);
     assert_non_null(strstr(quantity.trend.detail, "all readings were made at about"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     make(values, NULL, 4);
     assert_non_null(strstr(quantity.trend.detail, "0 readings with a speed"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     make(values, NULL, 0);
     assert_true(isnan(quantity.mean) && quantity.count == 0);
     assert_non_null(strstr(quantity.why, "no reading"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void one_reading_has_its_instruments_interval_or_none(void **state) {
     (void)state;
     readings[0] = (Reading){.value = 0.6, .uncertainty = 0.01, .speed = (double)NAN};
-    assert_int_equal(statistic_make(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
     assert_true(isnan(quantity.deviation));
     assert_near(quantity.high - quantity.low, 2 * 1.959963984540054 * 0.01, 1e-12);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     readings[0].uncertainty = (double)NAN;
-    assert_int_equal(statistic_make(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 1, "e", "", &quantity, &problem), STATUS_OK);
     assert_true(isnan(quantity.low) && isnan(quantity.high));
     assert_non_null(strstr(quantity.why, "no interval"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void equal_readings_are_not_taken_for_certainty(void **state) {
@@ -105,12 +105,12 @@ static void equal_readings_are_not_taken_for_certainty(void **state) {
     make(values, NULL, 4);
     assert_true(isnan(quantity.low) && quantity.deviation == 0 && quantity.outliers == 0);
     assert_non_null(strstr(quantity.why, "the same"));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     for (size_t i = 0; i < 4; i++)
         readings[i].uncertainty = 0.02;
-    assert_int_equal(statistic_make(readings, 4, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 4, "e", "", &quantity, &problem), STATUS_OK);
     assert_near(quantity.standard_error, 0.01, 1e-15);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void an_outlier_is_shown_and_counts(void **state) {
@@ -121,12 +121,12 @@ static void an_outlier_is_shown_and_counts(void **state) {
     assert_true(readings[6].is_outlier && readings[6].score < -10);
     assert_near(quantity.mean, 3.89 / 7, 1e-12);
     assert_near(quantity.mean_without_outliers, 3.69 / 6, 1e-12);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     // Most of them the same: the rest need not be far off.
     const double coarse[] = {0.61, 0.61, 0.61, 0.61, 0.61, 0.62};
     make(coarse, NULL, COUNT(coarse));
     assert_int_equal(quantity.outliers, 0);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 // Far from the middle, but where the line leads.
@@ -140,7 +140,7 @@ static void a_trend_makes_no_outliers(void **state) {
     make(values, speeds, 9);
     assert_int_equal(quantity.trend.verdict, TREND_NOT_CONSTANT);
     assert_int_equal(quantity.outliers, 0);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 static void good_samples_seldom_have_outliers(void **state) {
@@ -155,7 +155,7 @@ static void good_samples_seldom_have_outliers(void **state) {
                 values[i] = 0.6 + 0.02 * drops_noise(11, &next);
             make(values, NULL, counts[c]);
             marked += quantity.outliers > 0 ? 1 : 0;
-            statistic_clear(&quantity);
+            fields_clear(reading_statistic_fields, &quantity);
         }
         print_message("%zu readings: %d of 1000 samples have an outlier\n", counts[c], marked);
         assert_in_range(marked, 25, 75);
@@ -177,7 +177,7 @@ static void no_trend_is_shown_in_one_of_twenty_without_one(void **state) {
             make(values, speeds, counts[c]);
             shown += quantity.trend.verdict == TREND_NOT_CONSTANT ? 1 : 0;
             covered += quantity.trend.low <= 0 && quantity.trend.high >= 0 ? 1 : 0;
-            statistic_clear(&quantity);
+            fields_clear(reading_statistic_fields, &quantity);
         }
         print_message("%zu readings: a trend in %d of 1000\n", counts[c], shown);
         assert_in_range(shown, 30, 70);
@@ -194,23 +194,23 @@ static void sure_readings_weigh_more(void **state) {
         weights += 1 / (u[i] * u[i]);
         sum += values[i] / (u[i] * u[i]);
     }
-    assert_int_equal(statistic_make(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
     assert_near(quantity.scatter, 0, 0);
     assert_near(quantity.mean, sum / weights, 1e-15);
     assert_near(quantity.unweighted_mean, 3.17 / 5, 1e-15);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     // Readings that differ by far more than they state: the scatter is their own, all weigh alike.
     for (size_t i = 0; i < 5; i++)
         readings[i].uncertainty = 1e-4 * (double)(1 + i);
-    assert_int_equal(statistic_make(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 5, "e", "", &quantity, &problem), STATUS_OK);
     assert_near(quantity.mean, quantity.unweighted_mean, 1e-5);
     assert_near(quantity.scatter, quantity.deviation, 1e-4);
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
     // Below four there is too little to tell scatter by.
-    assert_int_equal(statistic_make(readings, 3, "e", "", &quantity, &problem), STATUS_OK);
+    assert_int_equal(reading_statistics_run(readings, 3, "e", "", &quantity, &problem), STATUS_OK);
     assert_near(quantity.mean, 1.92 / 3, 1e-15);
     assert_true(isnan(quantity.scatter));
-    statistic_clear(&quantity);
+    fields_clear(reading_statistic_fields, &quantity);
 }
 
 // Noise that is ten times larger for the slow ones, as a ruler has it, and stated.
@@ -228,11 +228,12 @@ static void uneven_noise_makes_no_trends(void **state) {
                                         .uncertainty = noise,
                                         .speed = speed};
             }
-            assert_int_equal(statistic_make(readings, counts[c], "e", "", &quantity, &problem),
-                             STATUS_OK);
+            assert_int_equal(
+                reading_statistics_run(readings, counts[c], "e", "", &quantity, &problem),
+                STATUS_OK);
             shown += quantity.trend.verdict == TREND_NOT_CONSTANT ? 1 : 0;
             held += quantity.low <= 0.6 && 0.6 <= quantity.high ? 1 : 0;
-            statistic_clear(&quantity);
+            fields_clear(reading_statistic_fields, &quantity);
         }
         print_message("%zu uneven readings: a trend in %d, the mean held in %d of 1000\n",
                       counts[c], shown, held);

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "core/drop_test/drop_test.h"
 #include "core/formats/force_trace_text.h"
 
 static Problem problem;
@@ -18,9 +19,10 @@ static Status read_text(const char *text, double interval, Trace *trace) {
     const size_t size = strlen(text);
     char *copy = malloc(size > 0 ? size : 1);
     memcpy(copy, text, size);
-    *trace = (Trace){0};
+    *trace = (Trace){.interval = interval};
     problem_clear(&problem);
-    const Status status = force_trace_text_read(copy, size, interval, trace, &problem);
+    const Status status = force_trace_text_read(copy, size, TRACE_SAMPLES_MAX, &trace->interval,
+                                                &trace->force, &problem);
     free(copy);
     assert_true(status == STATUS_OK || trace->force.at == NULL);
     return status;

@@ -24,7 +24,8 @@ static const GroundMotionOptions nothing = {NAN, CHOICE_ABSENT}, in_g = {NAN, AC
 static GroundMotionText good(const char *text, const GroundMotionOptions *request) {
     GroundMotionText import;
     problem_clear(&problem);
-    if (ground_motion_text_read(text, strlen(text), request, &import, &problem) != STATUS_OK)
+    if (ground_motion_text_read(text, strlen(text), RECORD_SAMPLES, request, &import, &problem) !=
+        STATUS_OK)
         fail_msg("%s: %s", problem.faults[0].pointer, problem.faults[0].detail);
     return import;
 }
@@ -35,7 +36,8 @@ static Status read_bytes(const char *text, size_t size, const GroundMotionOption
     memcpy(copy, text, size);
     GroundMotionText import;
     problem_clear(&problem);
-    const Status status = ground_motion_text_read(copy, size, request, &import, &problem);
+    const Status status =
+        ground_motion_text_read(copy, size, RECORD_SAMPLES, request, &import, &problem);
     free(copy);
     assert_true(status == STATUS_OK || (import.samples.at == NULL && import.header == NULL));
     if (status == STATUS_OK)
