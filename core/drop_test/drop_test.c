@@ -7,6 +7,7 @@
 // which is e v. On a fixed base it is u v.
 #include "core/drop_test/drop_test.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -28,7 +29,7 @@ static const Field drop_fields[] = {
     FIELD_REAL(Drop, approach_speed, "m/s", ABOVE(0), OPTIONAL, "relative to the base, just before contact"),
     FIELD_REAL(Drop, rebound_speed, "m/s", AT_MIN(0), OPTIONAL, "relative to the base, just after contact"),
     FIELD_REAL(Drop, contact_time, "s", ABOVE(0), OPTIONAL, "how long the contact lasted"),
-    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Drop, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
     FIELD_TEXT(Drop, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this drop"),
     FIELD_END
 };
@@ -37,7 +38,7 @@ static const Field trace_fields[] = {
     FIELD_REAL(Trace, interval, "s", WITHIN(1e-9, 1), REQUIRED, "from one sample to the next"),
     FIELD_REALS(Trace, force, "N", ANY, TRACE_SAMPLES_MAX, PRESENCE_REQUIRED, "the transducer's samples; either sign, any baseline"),
     FIELD_LONE_REALS(Trace, approach_speed, "m/s", ABOVE(0), TRACE_CONTACTS_MAX, PRESENCE_OPTIONAL, "of its contacts in order, as far as known"),
-    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it is not to count; it is kept and shown"),
+    FIELD_TEXT(Trace, excluded, TEXT_MAX, PRESENCE_OPTIONAL, 0, "why it does not count; it is kept and shown"),
     FIELD_TEXT(Trace, note, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of this trace"),
     FIELD_END
 };
@@ -48,23 +49,23 @@ const Field drop_test_fields[] = {
     FIELD_CHOICE(DropTest, base, material_base_names, OPTIONAL, "what the buffer lay on"),
     FIELD_REAL(DropTest, base_mass, "kg", ABOVE(0), OPTIONAL, "of a free base"),
     FIELD_TEXT(DropTest, geometry, TEXT_MAX, PRESENCE_OPTIONAL, 0, "of the buffer and the set-up"),
-    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that pulls the impactor into the buffer during contact, to be taken out of e and T_c; 0: none does; if absent it is not taken out; heights count by 9.80665 whatever is said here"),
+    FIELD_REAL(DropTest, gravity, "m/s^2", WITHIN(0, 1000), OPTIONAL, "that presses the impactor into the buffer during contact, to be corrected in e and T_c; 0: none; if absent it is not corrected; heights count by 9.80665 in any case"),
     FIELD_REAL(DropTest, temperature, "degC", WITHIN(-273.15, 5000), OPTIONAL, "of the buffer"),
-    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "that it was read with"),
-    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "when it was done: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
-    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "or lab that did it"),
+    FIELD_TEXT(DropTest, instrument, TEXT_MAX, PRESENCE_OPTIONAL, 0, "with which it was read"),
+    FIELD_TEXT(DropTest, date, 40, PRESENCE_OPTIONAL, 0, "of the test: 2026-11-21, or with a time of day 2026-11-21T09:30:00Z"),
+    FIELD_TEXT(DropTest, person, TEXT_MAX, PRESENCE_OPTIONAL, 0, "or laboratory that did the test"),
     FIELD_TEXT(DropTest, source, TEXT_MAX, PRESENCE_OPTIONAL, 0, "DOI, report or notebook"),
-    FIELD_TEXT(DropTest, notes, NOTE_MAX, PRESENCE_OPTIONAL, 0, "whatever else there is to say"),
+    FIELD_TEXT(DropTest, notes, NOTE_MAX, PRESENCE_OPTIONAL, 0, "further remarks"),
     FIELD_REAL(DropTest, height_uncertainty, "m", AT_MIN(0), OPTIONAL, "standard uncertainty of one height"),
     FIELD_REAL(DropTest, speed_uncertainty, "m/s", AT_MIN(0), OPTIONAL, "standard uncertainty of one speed"),
     FIELD_REAL(DropTest, time_uncertainty, "s", AT_MIN(0), OPTIONAL, "standard uncertainty of one contact time"),
-    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "impacts as they were read, one by one"),
-    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MAX, PRESENCE_OPTIONAL, "records of a force transducer; 1,048,576 samples in all at most"),
+    FIELD_LIST(DropTest, drops, drop_fields, DROPS_MAX, PRESENCE_OPTIONAL, "impacts as they were read"),
+    FIELD_LIST(DropTest, traces, trace_fields, TRACES_MAX, PRESENCE_OPTIONAL, "records of a force transducer; at most 1,048,576 samples in all"),
     FIELD_END
 };
 // clang-format on
 
-static double fall_speed(double height) {
+static double drop_fall_speed(double height) {
     return sqrt(2 * STANDARD_GRAVITY * height);
 }
 
@@ -77,22 +78,28 @@ double drop_test_effective_mass(const DropTest *test) {
 }
 
 double drop_approach_speed(const Drop *drop) {
-    return !isnan(drop->approach_speed) ? drop->approach_speed : fall_speed(drop->drop_height);
+    return !isnan(drop->approach_speed) ? drop->approach_speed : drop_fall_speed(drop->drop_height);
 }
 
 double drop_rebound_speed(const DropTest *test, const Drop *drop) {
     if (!isnan(drop->rebound_speed))
         return drop->rebound_speed;
-    const double rise = fall_speed(drop->rebound_height);
+    const double rise = drop_fall_speed(drop->rebound_height);
     if (test->base != MATERIAL_BASE_FREE)
         return rise;
     const double m = test->impactor_mass, M = test->base_mass;
     return (m * drop_approach_speed(drop) + (m + M) * rise) / M;
 }
 
-static Status drop_fault(Problem *problem, const char *pointer, const char *name, double value,
-                         const char *unit, const char *sentence) {
-    char place[POINTER_SIZE];
+// Adds a fault at a member; `unit` NULL: without its value.
+__attribute__((format(printf, 6, 7))) static Status
+drop_fault(Problem *problem, const char *pointer, const char *name, double value, const char *unit,
+           const char *format, ...) {
+    char place[POINTER_SIZE], sentence[300];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(sentence, sizeof sentence, format, arguments);
+    va_end(arguments);
     pointer_join(place, sizeof place, pointer, name);
     return unit != NULL
                ? problem_add_real(problem, STATUS_INVALID, place, value, unit, "%s", sentence)
@@ -102,43 +109,38 @@ static Status drop_fault(Problem *problem, const char *pointer, const char *name
 // Refuses a speed that its height contradicts.
 static Status drop_check_speed(double height, double speed, const char *name, const char *pointer,
                                Problem *problem) {
-    const double falls = fall_speed(height);
+    const double falls = drop_fall_speed(height);
     if (!(fabs(speed - falls) > height_tolerance * fmax(speed, falls)))
         return STATUS_OK;
-    char sentence[160];
-    snprintf(sentence, sizeof sentence,
-             "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g m/s",
-             100 * height_tolerance, falls, height, speed);
-    return drop_fault(problem, pointer, name, speed, "m/s", sentence);
+    return drop_fault(
+        problem, pointer, name, speed, "m/s",
+        "must be within %.0f %% of the %.4g m/s that a height of %.4g m gives, is %.4g "
+        "m/s",
+        100 * height_tolerance, falls, height, speed);
 }
 
 static Status drop_check_rebound(const DropTest *test, const Drop *drop, const char *pointer,
                                  Problem *problem) {
     const bool has_rise = !isnan(drop->rebound_height), has_speed = !isnan(drop->rebound_speed);
-    if (has_rise && !isnan(drop->drop_height) && drop->rebound_height > drop->drop_height) {
-        char sentence[160];
-        snprintf(sentence, sizeof sentence,
-                 "must be at most the drop_height of %.6g m, is %.6g m: more than all was given "
-                 "back; a drop that does not count takes \"excluded\" with the reason",
-                 drop->drop_height, drop->rebound_height);
-        return drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m", sentence);
-    }
+    if (has_rise && !isnan(drop->drop_height) && drop->rebound_height > drop->drop_height)
+        return drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m",
+                          "must be at most the drop_height of %.6g m, is %.6g m: a rebound cannot "
+                          "exceed the drop; a drop that does not count needs \"excluded\" with the "
+                          "reason",
+                          drop->drop_height, drop->rebound_height);
     if (has_rise && !has_speed && test->base == MATERIAL_BASE_FREE &&
         isnan(drop_test_effective_mass(test)))
         return drop_fault(problem, pointer, "rebound_height", 0, NULL,
-                          "needs impactor_mass and base_mass on a free base, which takes part of "
-                          "the rebound; or rebound_speed relative to the base in its place");
+                          "needs impactor_mass and base_mass on a free base, which moves after the "
+                          "contact; or give rebound_speed relative to the base instead");
     const double before = drop_approach_speed(drop), after = drop_rebound_speed(test, drop);
     if (!(after > before * (1 + 1e-9)))
         return STATUS_OK;
-    char sentence[160];
-    snprintf(sentence, sizeof sentence,
-             "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: more than all was "
-             "given back",
-             before, after);
-    return has_speed ? drop_fault(problem, pointer, "rebound_speed", after, "m/s", sentence)
-                     : drop_fault(problem, pointer, "rebound_height", drop->rebound_height, "m",
-                                  sentence);
+    return drop_fault(problem, pointer, has_speed ? "rebound_speed" : "rebound_height",
+                      has_speed ? after : drop->rebound_height, has_speed ? "m/s" : "m",
+                      "must be at most the speed of approach, %.6g m/s, gives %.6g m/s: a rebound "
+                      "cannot exceed the approach",
+                      before, after);
 }
 
 // Of a drop that counts and whose members are valid one by one.
@@ -147,13 +149,13 @@ static Status drop_check(const DropTest *test, const Drop *drop, const char *poi
     const bool has_before = !isnan(drop->drop_height) || !isnan(drop->approach_speed);
     const bool has_after = !isnan(drop->rebound_height) || !isnan(drop->rebound_speed);
     if (!has_after && isnan(drop->contact_time))
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "must tell a rebound (rebound_height or rebound_speed), a contact_time, "
-                           "or both: without them it says nothing");
+        return problem_add(
+            problem, STATUS_INVALID, pointer,
+            "must have a rebound (rebound_height or rebound_speed), a contact_time, or both");
     if (has_after && !has_before)
         return drop_fault(problem, pointer,
                           !isnan(drop->rebound_height) ? "drop_height" : "approach_speed", 0, NULL,
-                          "is required beside a rebound");
+                          "is required with a rebound");
     Status status = STATUS_OK;
     if (drop_check_speed(drop->drop_height, drop->approach_speed, "approach_speed", pointer,
                          problem) != STATUS_OK)
@@ -204,7 +206,7 @@ static Status drop_test_check_traces(const DropTest *test, const char *pointer, 
     const size_t samples = drop_test_sample_count(test);
     if (samples > TRACE_SAMPLES_MAX)
         status = problem_add(problem, STATUS_INVALID, traces,
-                             "must have at most %d samples in all, have %zu: cut them to the "
+                             "must have at most %d samples in all, have %zu: cut the traces to the "
                              "contacts, or send them as several measurements",
                              TRACE_SAMPLES_MAX, samples);
     return status;
@@ -212,11 +214,10 @@ static Status drop_test_check_traces(const DropTest *test, const char *pointer, 
 
 static Status drop_test_check_base(const DropTest *test, const char *pointer, Problem *problem) {
     if (!isnan(test->base_mass) && test->base != MATERIAL_BASE_FREE)
-        return drop_fault(
-            problem, pointer, "base_mass", test->base_mass, "kg",
-            test->base == MATERIAL_BASE_FIXED
-                ? "must be absent beside \"base\": \"fixed\", which does not move"
-                : "needs \"base\": \"free\" beside it: the mass of a base that moves");
+        return drop_fault(problem, pointer, "base_mass", test->base_mass, "kg",
+                          test->base == MATERIAL_BASE_FIXED
+                              ? "must be absent with \"base\": \"fixed\", which does not move"
+                              : "needs \"base\": \"free\": it is the mass of a base that moves");
     return STATUS_OK;
 }
 
@@ -235,8 +236,9 @@ Status drop_test_validate(const DropTest *test, const char *pointer, Problem *pr
     int64_t unix_ms;
     if (test->date != NULL && !problem_concerns(problem, place) &&
         !date_read(test->date, &unix_ms)) {
-        Fault fault = {.detail = "must be a date as 2026-11-21, or one with a time of day as "
-                                 "2026-11-21T09:30:00Z"};
+        Fault fault = {
+            .detail =
+                "must be a date as 2026-11-21, or with a time of day as 2026-11-21T09:30:00Z"};
         text_fit(fault.pointer, sizeof fault.pointer, place);
         text_quote(fault.value, sizeof fault.value, test->date);
         status = problem_put(problem, STATUS_INVALID, &fault);

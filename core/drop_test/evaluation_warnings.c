@@ -46,29 +46,27 @@ static Status warn_of_gravity(const Measurement *of, size_t test, const Evaluati
     const double T = row->contact_time_counts ? row->contact_time : result->contact_time->mean;
     if (isnan(T))
         return warnings_add(warnings, place,
-                            "gravity during contact is not taken out, and without a contact time "
-                            "nobody can tell how much it does; \"gravity\": 0 says that none "
-                            "pulls");
+                            "gravity during contact is not corrected, and its effect is unknown "
+                            "without a contact time; \"gravity\": 0 states that there is none");
     if (!(e > 0))
         return STATUS_OK;
     const GravityLoad load = {STANDARD_GRAVITY, row->approach_speed, (Separation)result->separation,
                               row->restitution_by == RESTITUTION_BY_HEIGHTS};
     const GravityContact with = gravity_apply(&load, e, T);
-    static const char advice[] = "say \"gravity\": 9.80665 to take it out, 0 where none pulls";
+    static const char advice[] = "set \"gravity\": 9.80665 to correct it, 0 where there is none";
     if (!(with.restitution > 0))
         return warnings_add(warnings, place,
-                            "gravity during contact is not taken out: in a vertical drop at the "
-                            "slowest %.3g m/s a contact of this e and T_c would not part at all; "
-                            "%s",
+                            "gravity during contact is not corrected: in a vertical drop at the "
+                            "slowest %.3g m/s a contact with this e and T_c would not end; %s",
                             row->approach_speed, advice);
     const double longer = with.contact_time / T - 1, lower = 1 - with.restitution / e;
     if (!(fmax(longer, lower) > effect_min))
         return STATUS_OK;
-    return warnings_add(warnings, place,
-                        "gravity during contact is not taken out: in a vertical drop at the "
-                        "slowest %.3g m/s it lengthens a contact of this e and T_c by %.2g %% and "
-                        "lowers e by %.2g %%; %s",
-                        row->approach_speed, 100 * longer, 100 * lower, advice);
+    return warnings_add(
+        warnings, place,
+        "gravity during contact is not corrected: in a vertical drop at the slowest %.3g m/s it "
+        "lengthens a contact with this e and T_c by %.2g %% and lowers e by %.2g %%; %s",
+        row->approach_speed, 100 * longer, 100 * lower, advice);
 }
 
 // Heights give speeds by standard gravity, which need not be the gravity during contact.
@@ -89,11 +87,11 @@ static Status warn_of_heights(const Measurement *of, size_t test, const Evaluati
             continue;
         char place[POINTER_SIZE];
         warning_pointer(of, "gravity", place);
-        return warnings_add(warnings, place,
-                            "%.4g m/s^2 pull during contact, but speeds are told from heights by "
-                            "%.6g m/s^2: where that is not what the impactor fell by, give "
-                            "approach_speed and rebound_speed",
-                            gravity, STANDARD_GRAVITY);
+        return warnings_add(
+            warnings, place,
+            "gravity during contact is %.4g m/s^2, but speeds follow from heights by %.6g m/s^2: "
+            "where the impactor fell by another gravity, give approach_speed and rebound_speed",
+            gravity, STANDARD_GRAVITY);
     }
     return STATUS_OK;
 }
@@ -106,8 +104,8 @@ static Status warn_of_pairs(const Measurement *tests, size_t count, Warnings *wa
         const double other = drop_test_effective_mass(tests[i].test);
         if (fabs(other - first) > pair_tolerance * first)
             TRY(warnings_add(warnings, pointer,
-                             "was made with another pair of masses: effective mass %.4g kg, the "
-                             "first's is %.4g kg; e and T_c belong to a pair",
+                             "was made with another pair of masses: effective mass %.4g kg, that "
+                             "of the first is %.4g kg; e and T_c belong to a pair",
                              other, first));
     }
     return STATUS_OK;
@@ -142,8 +140,8 @@ static Status warn_of_copies(const Measurement *tests, size_t count, const Evalu
         if (tests[k].number != COUNT_ABSENT)
             snprintf(other, sizeof other, "measurement %llu", (unsigned long long)tests[k].number);
         TRY(warnings_add(warnings, pointer,
-                         "is %s once more, the same in every member, and both count: if it was "
-                         "sent twice the standard errors come out too small; leave one out",
+                         "is %s once more, equal in every member, and both count: if it was sent "
+                         "twice the standard errors are too small; leave one out",
                          other));
     }
     return STATUS_OK;
@@ -157,17 +155,17 @@ static Status warn_of_pulses(const EvaluationRows *rows, Warnings *warnings) {
         const bool is_pulse = row->restitution_by == RESTITUTION_BY_PULSE;
         if (is_pulse && row->excluded == NULL && !row->restitution_counts)
             return warnings_add(warnings, "",
-                                "the restitution that pulses tell by their shape is shown but "
-                                "does not count beside heights or speeds");
+                                "the restitution from the shape of pulses is shown but does not "
+                                "count: heights or speeds are known");
         if (row->restitution_counts && is_first)
             is_by_pulse = is_pulse;
         is_first = is_first && !row->restitution_counts;
     }
     return !is_by_pulse ? STATUS_OK
                         : warnings_add(warnings, "",
-                                       "restitution is told by the shape of force pulses alone, "
-                                       "which is right only for a buffer that is the model's; "
-                                       "heights or speeds are surer");
+                                       "restitution follows from the shape of force pulses alone, "
+                                       "which is right only for a buffer that follows the model; "
+                                       "heights or speeds are more reliable");
 }
 
 static Status warn_of_interval(const EvaluationResult *result, Warnings *warnings) {
@@ -178,8 +176,8 @@ static Status warn_of_interval(const EvaluationResult *result, Warnings *warning
         if (row->excluded == NULL && !isnan(row->least_contact_time) &&
             !isnan(row->most_contact_time))
             return warnings_add(warnings, pointer,
-                                "no trace gives a figure for the contact time; by %s it lies "
-                                "between %.3g and %.3g s (%s)",
+                                "no trace gives a value of the contact time; by %s it is between "
+                                "%.3g and %.3g s (%s)",
                                 row->from, row->least_contact_time, row->most_contact_time,
                                 row->note != NULL ? row->note : "no reason is known");
     }
@@ -220,9 +218,9 @@ static Status warn_of_outliers(const EvaluationResult *result, Warnings *warning
             reading_pointer(row, pointer, sizeof pointer);
             TRY(warnings_add(
                 warnings, pointer,
-                "%s %.4g of %s lies %.1f robust deviations from the middle; it counts all the "
-                "same: the mean is %.4g with all readings and %.4g without outliers (%llu); one "
-                "that was seen to go wrong takes \"excluded\" with the reason",
+                "%s %.4g of %s is %.1f robust deviations from the median; it counts: the mean is "
+                "%.4g with all readings and %.4g without outliers (%llu); a reading that is known "
+                "to be wrong needs \"excluded\" with the reason",
                 is_time ? "contact time" : "restitution",
                 is_time ? row->contact_time : row->restitution, row->from,
                 fabs(is_time ? row->contact_time_score : row->restitution_score), of->mean,

@@ -20,19 +20,19 @@ static const double width_max = 0.5, decay_max = 4.2, misfit_max = 0.15;
 const Field trace_detection_fields[] = {
     FIELD_REAL(TraceDetection, baseline, "N", ANY, OPTIONAL, "of the trace"),
     FIELD_REAL(TraceDetection, noise, "N", ANY, OPTIONAL, "of the trace outside contacts, its standard deviation"),
-    FIELD_REAL(TraceDetection, threshold, "N", ANY, OPTIONAL, "distance from the baseline beyond which there is a contact"),
+    FIELD_REAL(TraceDetection, threshold, "N", ANY, OPTIONAL, "distance from the baseline that marks a contact"),
     FIELD_REAL(TraceDetection, first, "s", ANY, OPTIONAL, "the first sample in contact, or beyond the threshold where nothing is fitted; times count from the trace's first sample"),
     FIELD_REAL(TraceDetection, last, "s", ANY, OPTIONAL, "the last such sample"),
     FIELD_COUNT(TraceDetection, samples, NULL, AT_MIN(0), OPTIONAL, "how many samples these are"),
     FIELD_REAL(TraceDetection, peak, "N", ANY, OPTIONAL, "largest force from the baseline, with its sign"),
     FIELD_REAL(TraceDetection, crossing_time, "s", ANY, OPTIONAL, "between the crossings of the threshold on the pressing side"),
     FIELD_REAL(TraceDetection, crossing_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty, of half a sample interval at either end"),
-    FIELD_REAL(TraceDetection, crossing_shortfall, NULL, ANY, OPTIONAL, "share of T_c by which such a crossing time is short of the fitted pulse"),
-    FIELD_REAL(TraceDetection, impulse, "N s", ANY, OPTIONAL, "of the pulse that fits best: m_e v0 (1 + e) where nothing pulls"),
-    FIELD_REAL(TraceDetection, start, "s", ANY, OPTIONAL, "when the contact begins, by the fit; null: too few samples, no pulse fits, or the trace begins or ends meanwhile"),
-    FIELD_REAL(TraceDetection, end, "s", ANY, OPTIONAL, "when it ends"),
-    FIELD_REALS(TraceDetection, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, evenly from start to end, to be drawn over the trace; empty where those are not known"),
-    FIELD_REAL(TraceDetection, misfit, NULL, ANY, OPTIONAL, "rms of what the fit leaves during contact, over the noise"),
+    FIELD_REAL(TraceDetection, crossing_shortfall, NULL, ANY, OPTIONAL, "part of T_c by which crossing_time is too short, by the fitted pulse"),
+    FIELD_REAL(TraceDetection, impulse, "N s", ANY, OPTIONAL, "of the best pulse: m_e v0 (1 + e) without gravity"),
+    FIELD_REAL(TraceDetection, start, "s", ANY, OPTIONAL, "start of the contact, by the fit; null: too few samples, no pulse fits, or the trace begins or ends during the contact"),
+    FIELD_REAL(TraceDetection, end, "s", ANY, OPTIONAL, "end of the contact"),
+    FIELD_REALS(TraceDetection, pulse, "N", ANY, 0, PRESENCE_OPTIONAL, "the fitted pulse on its baseline, at equal intervals from start to end; empty where those are unknown"),
+    FIELD_REAL(TraceDetection, misfit, NULL, ANY, OPTIONAL, "rms of the residuals during contact, over the noise"),
     FIELD_REAL(TraceDetection, misfit_share, NULL, ANY, OPTIONAL, "the same over the peak"),
     FIELD_END
 };
@@ -164,25 +164,25 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     if (!is_form_sure) {
         if (is_wide)
             trace_withdraw(counted, contact);
-        return trace_status(
-            sentence(&contact->why,
-                     "the trace is hardly a pulse of the model's under the separation rule %s: the "
-                     "best one leaves %.2g %% of the peak, and the noise is %.2g %% of it",
-                     separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
+        return trace_status(sentence(
+            &contact->why,
+            "the trace is hardly a pulse of the model under the separation rule %s: the rms "
+            "residual of the best one is %.2g %% of the peak, and the noise is %.2g %% of it",
+            separation_names[separation], 100 * contact->seen.misfit_share, 100 * noise));
     }
     if (is_wide) {
         trace_withdraw(counted, contact);
         return trace_status(
             sentence(&contact->why,
                      "pulses from %.3g s to %.3g s fit the trace about equally well: less noise or "
-                     "more samples in contact would tell them apart",
+                     "more samples in contact would distinguish them",
                      contact->least_contact_time, contact->most_contact_time));
     }
     if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
         trace_withdraw(counted, contact);
-        return trace_status(sentence(
-            &contact->why, "the force fades away without an end that could be told: pulses "
-                           "with a restitution of next to nothing fit the trace as well"));
+        return trace_status(
+            sentence(&contact->why, "the force has no distinct end: pulses with a restitution of "
+                                    "nearly 0 fit the trace as well"));
     }
     return STATUS_OK;
 }
@@ -208,7 +208,7 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
                                 const DetectedContact *run, const TracePart *part, double interval,
                                 const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
-        return trace_status(sentence(&contact->why, "no pulse of the model's fits"));
+        return trace_status(sentence(&contact->why, "no pulse of the model fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
     const double origin = (double)part->from;
@@ -226,17 +226,16 @@ static Status trace_fit_contact(FitWindow *window, const ContactDetection *found
     const double noise = found->noise / fabs(run->peak) / sqrt((double)window->per_block);
     contact->seen.misfit = noise > 0 ? contact->seen.misfit_share / noise : (double)NAN;
     if (contact->seen.samples < SAMPLES_MIN)
-        return trace_status(
-            sentence(&contact->why,
-                     "only %d samples are in contact, and pulses of very different length fit so "
-                     "few: 5 are the least, 20 are better",
-                     (int)contact->seen.samples));
+        return trace_status(sentence(&contact->why,
+                                     "only %d samples are in contact, and pulses of very different "
+                                     "length fit so few: at least 5 are needed, 20 are better",
+                                     (int)contact->seen.samples));
     if (contact->seen.misfit_share > misfit_max && contact->seen.misfit_share > 2 * noise)
-        return trace_status(
-            sentence(&contact->why,
-                     "the trace is no pulse of the model's under the separation rule %s: the best "
-                     "one leaves %.2g %% of the peak",
-                     separation_names[window->separation], 100 * contact->seen.misfit_share));
+        return trace_status(sentence(&contact->why,
+                                     "the trace is no pulse of the model under the separation rule "
+                                     "%s: the rms residual of the best one is %.2g %% of the peak",
+                                     separation_names[window->separation],
+                                     100 * contact->seen.misfit_share));
     // Residuals rarely exceed this by chance, given the number of means and of samples of noise.
     const double freedom = fmax((double)means - 4, 1), known_from = fmax(found->noise_count - 1, 1);
     const double chance = 1 + 3.7 * sqrt(1 / freedom + 1 / known_from) / sqrt(2);
@@ -340,13 +339,13 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
                              : pulse_fit_run(window, fits);
     TRY(trace_fit_contact(window, found, run, &part, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return trace_status(sentence(
-            &contact->why, "gravity is taken into account in part only: the masses and this "
-                           "force do not lead to one approach speed; check them, or give it"));
-    if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return trace_status(
-            sentence(&contact->why, "gravity is not taken into account: neither the approach speed "
-                                    "nor the masses are known"));
+            sentence(&contact->why, "gravity is only partly corrected: the masses and this force "
+                                    "do not lead to one approach speed; check them, or give it"));
+    if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
+        return trace_status(sentence(
+            &contact->why,
+            "gravity is not corrected: neither the approach speed nor the masses are known"));
     return STATUS_OK;
 }
 
@@ -390,10 +389,10 @@ Status trace_analysis_run(double interval, const Reals *force, const TraceOption
         }
         if (status == STATUS_OK && found.count == 0)
             status = trace_status(sentence(
-                &analysis->why, "nothing rises above the threshold of %.3g N", found.threshold));
+                &analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
         if (status == STATUS_OK && found.is_full)
-            status = trace_status(sentence(&analysis->why, "only the first %d contacts are read",
-                                           TRACE_CONTACTS_MAX));
+            status = trace_status(sentence(
+                &analysis->why, "only the first %d contacts are evaluated", TRACE_CONTACTS_MAX));
     }
     contact_detection_clear(&found);
     free(window);

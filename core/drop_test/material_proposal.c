@@ -123,9 +123,8 @@ static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
     Warnings *warnings = &evaluation->warnings;
     const Statistic *e = &evaluation->restitution, *T = &evaluation->contact_time;
     if (e->count == 0)
-        return sentence(&proposal->why,
-                        "no reading that counts tells the restitution: a revision needs one; take "
-                        "in a measurement with heights or speeds")
+        return sentence(&proposal->why, "no reading that counts gives the restitution, which a "
+                                        "revision needs: add a measurement with heights or speeds")
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
     for (size_t i = 0; i < evaluation->rows.count; i++)
@@ -141,8 +140,8 @@ static Status proposal_set_constant(Evaluation *evaluation, Basis *basis,
         TRY(warnings_add(warnings, "/revision/contact_time", "%s", T->trend.detail));
     return T->count > 0 ? STATUS_OK
                         : warnings_add(warnings, "/revision/contact_time",
-                                       "no contact time is known: the material can be used in "
-                                       "contact models of impulse alone");
+                                       "no contact time is known: the material can be used with "
+                                       "impulsive contact only");
 }
 
 // The rows of the basis that make one row of the table.
@@ -241,8 +240,8 @@ static Status proposal_set_table(Evaluation *evaluation, Basis *basis, Bin *bins
     const size_t kept = proposal_keep_bins(basis, bins, all, &has_time);
     if (kept < 2 || kept > MATERIAL_ROWS)
         return sentence(&proposal->why,
-                        "a table needs e%s at two approach speeds at least (%g times one "
-                        "another), %d at most; the readings tell %zu",
+                        "a table needs e%s at two approach speeds at least (%g times one another), "
+                        "%d at most; the readings have %zu",
                         has_time ? " and T_c" : "", PROPOSAL_BIN, MATERIAL_ROWS, kept)
                    ? STATUS_OK
                    : STATUS_NO_MEMORY;
@@ -254,7 +253,7 @@ static Status proposal_set_table(Evaluation *evaluation, Basis *basis, Bin *bins
     return has_time ? STATUS_OK
                     : warnings_add(&evaluation->warnings, "/revision/table",
                                    "no contact time is known at any speed: the material can be "
-                                   "used in contact models of impulse alone");
+                                   "used with impulsive contact only");
 }
 
 Status material_proposal_run(Evaluation *evaluation, const Measurement *tests, size_t count,

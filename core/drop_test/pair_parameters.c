@@ -19,7 +19,7 @@
 static const Field figure_fields[] = {
     FIELD_REAL(PairFigure, value, NULL, ANY, OPTIONAL, "null: not known"),
     FIELD_REAL(PairFigure, uncertainty, NULL, ANY, OPTIONAL, "standard, from the deviations of e and T_c that the material states"),
-    FIELD_REAL(PairFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty: with high what 95 % of contacts lie between if e and T_c scatter log-normally with just these deviations, which few readings tell only roughly"),
+    FIELD_REAL(PairFigure, low, NULL, ANY, OPTIONAL, "value over exp(1.96 u), u the relative uncertainty; 95 % of contacts are between low and high if e and T_c are log-normal with these deviations, whose own uncertainty is ignored"),
     FIELD_REAL(PairFigure, high, NULL, ANY, OPTIONAL, "value times exp(1.96 u)"),
     FIELD_END
 };
@@ -37,7 +37,7 @@ static const Field contact_rows[] = {
 
 const Field pair_parameters_fields[] = {
     FIELD_REAL(PairParameters, damper_mass, "kg", ANY, OPTIONAL, "the free mass"),
-    FIELD_REAL(PairParameters, structure_mass, "kg", ANY, OPTIONAL, "what it strikes; null: it does not move"),
+    FIELD_REAL(PairParameters, structure_mass, "kg", ANY, OPTIONAL, "of the structure that it strikes; null: fixed"),
     FIELD_CHOICE(PairParameters, identified_for, identified_for_names, OPTIONAL, "whose e and T_c the material's are"),
     FIELD_REAL(PairParameters, effective_mass, "kg", ANY, OPTIONAL, "of this pair"),
     FIELD_REAL(PairParameters, test_mass, "kg", ANY, OPTIONAL, "effective mass of the test's pair"),
@@ -175,8 +175,8 @@ static Status pair_warn_of_mass(const Material *material, PairParameters *pair) 
     const bool is_rig = pair->identified_for == IDENTIFIED_FOR_RIG;
     if (isnan(test))
         return warnings_add(&pair->warnings, "/test_mass",
-                            "the masses of the test are not known: e and T_c belong to its pair, "
-                            "and nobody can tell how far this one is from it");
+                            "the masses of the test are unknown: e and T_c belong to its pair, and "
+                            "how far this pair differs is unknown");
     if (!(fabs(mass - test) > mass_tolerance * test))
         return STATUS_OK;
     const double percent = 100 * fabs(mass / test - 1);
@@ -184,7 +184,7 @@ static Status pair_warn_of_mass(const Material *material, PairParameters *pair) 
     if (is_rig)
         return warnings_add(&pair->warnings, "/effective_mass",
                             "this pair's effective mass of %.4g kg is %.3g %% %s the test's %.4g "
-                            "kg: k_b and c_b are carried over, e and T_c are those that follow",
+                            "kg: k_b and c_b are those of the test, e and T_c follow from them",
                             mass, percent, side, test);
     const PairRow known = pair_row(material, 0);
     const int rule = pair->contacts.at[0].separation;
@@ -218,22 +218,22 @@ static Status pair_warn_of_material(const Material *material, int separation,
     Warnings *to = &pair->warnings;
     if (!has_time)
         TRY(warnings_add(to, "/contacts",
-                         "the material has no contact time: stiffness and damping are not known, "
+                         "the material has no contact time: stiffness and damping are unknown, "
                          "only impulsive contact can use it"));
     if (is_dead)
         TRY(warnings_add(to, "/contacts",
-                         "where nothing comes back (e = 0) no stiffness and damping make it"));
+                         "without a rebound (e = 0) stiffness and damping do not exist"));
     if (!has_e || (has_time && !has_T))
         TRY(warnings_add(to, "/contacts",
-                         "the material states no standard deviation of %s%s%s%s: what depends on "
-                         "it has no uncertainty",
+                         "the material states no standard deviation of %s%s%s%s: values that "
+                         "depend on it have no uncertainty",
                          has_e ? "" : "e", has_e || has_T || !has_time ? "" : " and ",
                          has_T || !has_time ? "" : "T_c",
                          material->table.count > 0 ? " in every row" : ""));
     if (material->separation != CHOICE_ABSENT && separation != material->separation)
         TRY(warnings_add(to, "/contacts",
-                         "its T_c was told under %s; figures under %s are of a T_c that another "
-                         "evaluation of the same test would give differently",
+                         "its T_c was determined under %s; values under %s belong to a T_c that "
+                         "another evaluation of the same test would give differently",
                          separation_names[material->separation],
                          separation_names[1 - material->separation]));
     if (isnan(pair->least_speed) || isnan(pair->most_speed))
@@ -269,10 +269,10 @@ Status pair_parameters_run(const Material *material, double damper_mass, double 
     };
     material_speeds(material, &pair->least_speed, &pair->most_speed);
     if (identified_for == IDENTIFIED_FOR_RIG && isnan(pair->test_mass))
-        return problem_add(problem, STATUS_INVALID, "/identified_for",
-                           "must be scene: the material does not state the test's masses "
-                           "(impactor_mass, base, and base_mass of a free one), so that nothing "
-                           "can be carried over from its rig");
+        return problem_add(
+            problem, STATUS_INVALID, "/identified_for",
+            "must be scene: the material does not state the masses of the test (impactor_mass, "
+            "base, and base_mass of a free one), from which k_b and c_b of its rig follow");
     Status status = pair_fill(material, separation, pair);
     if (status == STATUS_OK)
         status = pair_warn_of_mass(material, pair);

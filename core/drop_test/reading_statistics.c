@@ -54,7 +54,7 @@ const Field reading_statistic_fields[] = {
     FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "the smallest reading"),
     FIELD_REAL(Statistic, median, NULL, ANY, OPTIONAL, "the middle one"),
     FIELD_REAL(Statistic, maximum, NULL, ANY, OPTIONAL, "the largest one"),
-    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "readings that lie far off; they are in the mean"),
+    FIELD_COUNT(Statistic, outliers, NULL, AT_MIN(0), OPTIONAL, "outliers; they are in the mean"),
     FIELD_REAL(Statistic, mean_without_outliers, NULL, ANY, OPTIONAL, "null where there are none"),
     FIELD_TEXT(Statistic, why, 0, PRESENCE_OPTIONAL, 0, "how the interval was made, or why there is none"),
     FIELD_ITEM(Statistic, trend, trend_fields, NULL, PRESENCE_DEFAULT, "whether it is constant over approach speed"),
@@ -187,18 +187,20 @@ static bool statistic_set_interval(const Reading *readings, size_t count, Statis
                            statistic->scatter, t, count);
     } else if (stated > 0) {
         statistic->standard_error = stated;
-        is_made = count == 1 ? sentence(&statistic->why,
-                                        "one reading: the interval is what its uncertainty alone "
-                                        "leaves, nothing is known of the spread")
-                             : sentence(&statistic->why,
-                                        "the %zu readings lie closer together than their stated "
-                                        "uncertainty would have it: the interval is made of that",
-                                        count);
+        is_made =
+            count == 1
+                ? sentence(
+                      &statistic->why,
+                      "one reading: the interval is that of its uncertainty; the spread is unknown")
+                : sentence(&statistic->why,
+                           "the %zu readings are closer together than their stated uncertainty "
+                           "allows: the interval is that of the uncertainty",
+                           count);
     } else {
         return sentence(&statistic->why,
                         count == 1 ? "one reading without a stated uncertainty: no interval"
-                                   : "all readings are the same, to what the instrument resolves, "
-                                     "whose uncertainty is not stated: no interval");
+                                   : "all readings are equal within the resolution of the "
+                                     "instrument, whose uncertainty is not stated: no interval");
     }
     statistic->low = mean - t * statistic->standard_error;
     statistic->high = mean + t * statistic->standard_error;
@@ -253,12 +255,12 @@ static Line line_fit(const Reading *readings, size_t count) {
 static bool trend_describe(const char *name, const char *unit, double mean, Trend *trend) {
     const double percent = 100 / fabs(mean), missed = trend->missed_change * percent;
     if (trend->verdict == TREND_NOT_CONSTANT)
-        return sentence(&trend->detail,
-                        "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not "
-                        "constant over speed, and a table over speed says more than a mean",
-                        name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
-                        fabs(trend->change) * percent, trend->least_speed, trend->most_speed,
-                        trend->p);
+        return sentence(
+            &trend->detail,
+            "%s %s by %.2g%s (%.3g %%) from %.3g to %.3g m/s (p = %.2g): it is not constant over "
+            "speed, and a table over speed describes it better than a mean",
+            name, trend->change < 0 ? "falls" : "rises", fabs(trend->change), unit,
+            fabs(trend->change) * percent, trend->least_speed, trend->most_speed, trend->p);
     return sentence(&trend->detail,
                     "%s shows no trend from %.3g to %.3g m/s (slope %.2g +- %.2g%s per m/s, p = "
                     "%.2g)%s a change of up to %.2g%s (%.3g %%) over these speeds would not have "
@@ -267,7 +269,7 @@ static bool trend_describe(const char *name, const char *unit, double mean, Tren
                     trend->standard_error, unit, trend->p,
                     trend->verdict == TREND_CONSTANT
                         ? " and may be taken as constant there;"
-                        : ", but the readings are too few or too scattered to tell:",
+                        : ", but the readings are too few or too scattered for a verdict:",
                     trend->missed_change, unit, missed);
 }
 
@@ -280,14 +282,14 @@ static bool trend_set(const Line *line, const char *name, const char *unit, Stat
     }
     if (line->count < 3)
         return sentence(&trend->detail,
-                        "whether %s is constant over speed cannot be told: %zu reading%s with a "
-                        "speed, at least three are needed",
+                        "whether %s is constant over speed is unknown: %zu reading%s with a speed, "
+                        "at least three are needed",
                         name, line->count, line->count == 1 ? "" : "s");
     const double span = line->most - line->least;
     if (!(span > span_min * line->speed))
         return sentence(&trend->detail,
-                        "whether %s is constant over speed cannot be told: all readings were made "
-                        "at about %.3g m/s",
+                        "whether %s is constant over speed is unknown: all readings were made at "
+                        "about %.3g m/s",
                         name, line->speed);
     const double least = resolved * fabs(statistic->mean);
     const size_t freedom = line->count - 2;
@@ -369,7 +371,7 @@ Status reading_statistics_run(Reading *readings, size_t count, const char *name,
     double *scratch = calloc(2 * count + 1, sizeof *scratch);
     bool is_made = scratch != NULL;
     if (is_made && count == 0) {
-        is_made = sentence(&statistic->why, "no reading that counts tells the %s", name);
+        is_made = sentence(&statistic->why, "no reading that counts gives the %s", name);
     } else if (is_made) {
         statistic->unweighted_mean = statistic_mean(readings, count, true);
         statistic_set_spread(readings, count, scratch, statistic);

@@ -22,23 +22,23 @@ const Field evaluation_row_fields[] = {
     FIELD_REAL(EvaluationRow, approach_speed_uncertainty, "m/s", ANY, OPTIONAL, "its standard uncertainty"),
     FIELD_REAL(EvaluationRow, restitution, NULL, ANY, OPTIONAL, "e"),
     FIELD_REAL(EvaluationRow, restitution_uncertainty, NULL, ANY, OPTIONAL, "its standard uncertainty, from the instrument's or the fit's"),
-    FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "what told it"),
+    FIELD_CHOICE(EvaluationRow, restitution_by, restitution_by_names, OPTIONAL, "its source"),
     FIELD_REAL(EvaluationRow, contact_time, "s", ANY, OPTIONAL, "T_c of the isolated pair"),
     FIELD_REAL(EvaluationRow, contact_time_uncertainty, "s", ANY, OPTIONAL, "its standard uncertainty"),
-    FIELD_CHOICE(EvaluationRow, contact_time_by, contact_time_by_names, OPTIONAL, "what told it"),
-    FIELD_REAL(EvaluationRow, least_contact_time, "s", ANY, OPTIONAL, "of a trace: within which T_c lies, 95 %, also where there is no figure"),
+    FIELD_CHOICE(EvaluationRow, contact_time_by, contact_time_by_names, OPTIONAL, "its source"),
+    FIELD_REAL(EvaluationRow, least_contact_time, "s", ANY, OPTIONAL, "of a trace: lower end of the 95 % interval of T_c, also where there is no value"),
     FIELD_REAL(EvaluationRow, most_contact_time, "s", ANY, OPTIONAL, "likewise"),
-    FIELD_REAL(EvaluationRow, read_restitution, NULL, ANY, OPTIONAL, "e before gravity was taken out; null: it was not"),
-    FIELD_REAL(EvaluationRow, read_contact_time, "s", ANY, OPTIONAL, "T_c before gravity was taken out; null: it was not"),
+    FIELD_REAL(EvaluationRow, read_restitution, NULL, ANY, OPTIONAL, "e before the correction of gravity; null: none was made"),
+    FIELD_REAL(EvaluationRow, read_contact_time, "s", ANY, OPTIONAL, "T_c before the correction of gravity; null: none was made"),
     FIELD_FLAG(EvaluationRow, restitution_counts, 0, "e is in the mean"),
     FIELD_FLAG(EvaluationRow, contact_time_counts, 0, "T_c is in the mean"),
     FIELD_REAL(EvaluationRow, restitution_score, NULL, ANY, OPTIONAL, "robust deviations of e from the median, or from the line where a trend is shown"),
-    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "so far away that one good sample in twenty has such a reading; it counts all the same"),
+    FIELD_FLAG(EvaluationRow, restitution_is_outlier, 0, "so far away that only one good sample in twenty has such a reading; it counts"),
     FIELD_REAL(EvaluationRow, contact_time_score, NULL, ANY, OPTIONAL, "the same of T_c"),
     FIELD_FLAG(EvaluationRow, contact_time_is_outlier, 0, "the same of T_c"),
-    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, in the words of who measured"),
-    FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "what else there is to know of it"),
-    FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as it was detected in its trace; null: none was, or a drop"),
+    FIELD_TEXT(EvaluationRow, excluded, 0, PRESENCE_OPTIONAL, 0, "why neither counts, as stated with the test"),
+    FIELD_TEXT(EvaluationRow, note, 0, PRESENCE_OPTIONAL, 0, "further remarks"),
+    FIELD_ITEM(EvaluationRow, contact, trace_detection_fields, NULL, PRESENCE_OPTIONAL, "the contact as detected in its trace; null: none was detected, or a drop"),
     FIELD_END
 };
 // clang-format on
@@ -185,7 +185,7 @@ static Status reading_add_empty(const Measurement *tests, size_t index, size_t i
     return reading_status(
         sentence(&row->from, "trace %zu", i + 1) &&
             reading_copy(tests[index].test->traces.at[i].excluded, &row->excluded) &&
-            sentence(&row->note, "%s", why != NULL ? why : "no contact is seen in it"),
+            sentence(&row->note, "%s", why != NULL ? why : "no contact is detected in it"),
         problem);
 }
 
@@ -238,7 +238,7 @@ static Status reading_correct_both(const GravityLoad *load, EvaluationRow *row, 
     if (!(row->restitution > 0) || !gravity_correct(load, &read, &isolated)) {
         row->restitution_counts = row->contact_time_counts = false;
         return reading_add_note(
-            row, "does not count: no contact comes to this e and T_c under that gravity", problem);
+            row, "does not count: no contact has this e and T_c under that gravity", problem);
     }
     row->read_restitution = row->restitution;
     row->read_contact_time = row->contact_time;
@@ -259,9 +259,9 @@ static Status reading_correct_one(const GravityLoad *load, double other, Evaluat
     if (!is_known || !gravity_correct_one(load, is_time, *value, other, &isolated))
         return reading_add_note(
             row,
-            is_known  ? "gravity is not taken out: no contact comes to this under it"
-            : is_time ? "gravity is not taken out: this needs a speed and a restitution"
-                      : "gravity is not taken out: this needs a contact time",
+            is_known  ? "gravity is not corrected: no contact has this value under it"
+            : is_time ? "gravity is not corrected: this needs a speed and a restitution"
+                      : "gravity is not corrected: this needs a contact time",
             problem);
     // Errors grow with the correction.
     *(is_time ? &row->contact_time_uncertainty : &row->restitution_uncertainty) *=

@@ -21,7 +21,7 @@ static Status force_trace_check_header(const TextLine *line, Problem *problem) {
         if (is_right || size > UNIT_MAX)
             continue;
         return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line->number, 0),
-                           "must have times in [s] and forces in [N], tells [%.*s]", (int)size,
+                           "must have times in [s] and forces in [N], has [%.*s]", (int)size,
                            begin);
     }
     return STATUS_OK;
@@ -63,15 +63,16 @@ static Status force_trace_take_table(NumberTable *table, TextReader reader, doub
         return problem_set(problem, STATUS_UNREADABLE, "has %zu samples; must have at least 2",
                            table->rows);
     if (table->columns == 1)
-        return !isnan(*interval) ? STATUS_OK
-                                 : problem_set(problem, STATUS_UNREADABLE,
-                                               "has forces alone: --interval must tell the time "
-                                               "between samples");
+        return !isnan(*interval)
+                   ? STATUS_OK
+                   : problem_set(
+                         problem, STATUS_UNREADABLE,
+                         "has forces alone: --interval must state the time between samples");
     double start, found;
     TRY(text_table_split_times(table, reader, &start, &found, problem));
     if (!isnan(*interval) && !(fabs(*interval - found) <= 1e-6 * *interval))
         return problem_set(problem, STATUS_UNREADABLE,
-                           "tells an interval of %s s, but %s s is given", text_real(is, found),
+                           "states an interval of %s s, but %s s is given", text_real(is, found),
                            text_real(asked, *interval));
     *interval = found;
     return STATUS_OK;

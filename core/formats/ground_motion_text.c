@@ -85,14 +85,14 @@ static Status motion_check_count(const MotionHeader *header, Problem *problem) {
     (void)text_table_place(place, header->count_line, 0);
     if (isnan(header->count))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must tell the number of values behind NPTS, or before it");
+                           "must state the number of values after NPTS, or before it");
     if (header->count < 1 || header->count != floor(header->count))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must tell a whole number of values of at least 1, tells %s",
+                           "must state a whole number of values of at least 1, states %s",
                            text_real(is, header->count));
     if (!isnan(header->interval) && !(header->interval > 0))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must tell an interval above 0 s, tells %s",
+                           "must state an interval above 0 s, states %s",
                            text_real(is, header->interval));
     return STATUS_OK;
 }
@@ -267,7 +267,7 @@ static Status motion_read_numbers(TextReader reader, NumberTable *table, Problem
         text_table_upper(&line, seen, sizeof seen);
         if (is_ended && line.at < line.end)
             return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, line.number, 0),
-                               "must be empty, as the line that ends the numbers is above");
+                               "must be empty: the line that ends the numbers is above");
         if (text_table_is_marker(&line) && strstr(seen, "END") != NULL)
             is_ended = true;
         else if (!is_ended)
@@ -309,11 +309,10 @@ static Status motion_check_rows(const NumberTable *table, const MotionHeader *he
     if (!isnan(header->count)) {
         if (header->count == (double)table->count)
             return STATUS_OK;
-        return problem_add(problem, STATUS_UNREADABLE,
-                           text_table_place(place, header->count_line, 0),
-                           "must tell how many values follow: tells %s, but %zu follow, the last "
-                           "on line %zu",
-                           text_real(count, header->count), table->count, table->last_line);
+        return problem_add(
+            problem, STATUS_UNREADABLE, text_table_place(place, header->count_line, 0),
+            "must state how many values follow: states %s, but %zu follow, the last on line %zu",
+            text_real(count, header->count), table->count, table->last_line);
     }
     const bool is_uneven = table->uneven_line != 0;
     if (!is_uneven && table->last_columns <= table->columns)
@@ -333,11 +332,11 @@ static Status motion_choose_interval(const GroundMotionOptions *options, const M
                            header->count_line > 0 ? header->count_line : header->data.line + 1, 0);
     if (isnan(told) && isnan(options->interval))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "must tell the interval of the samples, or interval must be given");
+                           "must state the interval of the samples, or interval must be given");
     if (!isnan(told) && !isnan(options->interval) &&
         !(fabs(told - options->interval) <= 1e-6 * told))
         return problem_add(problem, STATUS_UNREADABLE, place,
-                           "tells an interval of %s s, but %s s is given", text_real(is, told),
+                           "states an interval of %s s, but %s s is given", text_real(is, told),
                            text_real(asked, options->interval));
     motion->interval = isnan(told) ? options->interval : told;
     return STATUS_OK;
@@ -354,7 +353,7 @@ static Status motion_choose_unit(const GroundMotionOptions *options, const Motio
     if (header->conflict_line != 0)
         return problem_add(problem, STATUS_UNREADABLE,
                            text_table_place(place, header->conflict_line, 0),
-                           "tells another unit than line %zu, %s: unit must be given",
+                           "states another unit than line %zu, %s: unit must be given",
                            header->unit_line, acceleration_unit_names[header->unit]);
     if (header->unit != CHOICE_ABSENT)
         return STATUS_OK;
@@ -363,7 +362,7 @@ static Status motion_choose_unit(const GroundMotionOptions *options, const Motio
     if (strncmp(motion->layout, "at2", 3) == 0)
         return STATUS_OK;
     return problem_add(problem, STATUS_UNREADABLE, text_table_place(place, 1, 0),
-                       "must tell the unit, or unit must be given: g, m/s^2 or cm/s^2");
+                       "must state the unit, or unit must be given: g, m/s^2 or cm/s^2");
 }
 
 static Status motion_convert(NumberTable *table, const MotionHeader *header, size_t samples_max,

@@ -148,7 +148,7 @@ test("Where no pulse fits a contact, or nothing is one, the page says why", asyn
   await choose(page, folder, "saturated.csv", csv(pulses(1e-3).map(([time, force]) => [time, Math.min(force, 2.5)])));
   await says(main(page), /Contacts detected: 2; 2\.5 N at .*, the trace is hardly a pulse .*; \S+ N at 400 ms, T_c/);
   await choose(page, folder, "still.csv", csv(pulses(1e-3).slice(150, 390).map(([time, force]) => [time - 0.15, force])));
-  await says(main(page), /Contacts detected: 0; nothing rises above the threshold/);
+  await says(main(page), /Contacts detected: 0; no force exceeds the threshold/);
 });
 
 test("A revision is reviewed, compared and reverted; who writes second is told what happened and does it again", async ({ page, url, daemon, refused }) => {

@@ -16,7 +16,7 @@ test("A file is uploaded, a fault told, shakes a scene, and goes again", async (
   assert.equal(await page.getByLabel("Name").inputValue(), "Valley_7");
   await page.getByLabel("Unit").selectOption("m/s^2");
   await page.getByRole("button", { name: "Upload", exact: true }).click();
-  await says(page.getByRole("alert"), /must tell the interval/);
+  await says(page.getByRole("alert"), /must state the interval/);
   await page.getByLabel("Name").fill("Valley 7");
   await page.getByLabel("Interval").fill("0,01");
   await page.getByRole("button", { name: "Upload", exact: true }).click();

@@ -104,11 +104,11 @@ def test_doubts_are_told():
 def test_bad_files_are_named():
     """Line and column, the value and what would be right; exit code 3, 4 where there is no file."""
     for text, arguments, expected in [
-            (HEADER + " .1 -.2\n .3\n", (), "-: line 4: must tell how many values follow: tells 4, but 3 follow"),
+            (HEADER + " .1 -.2\n .3\n", (), "-: line 4: must state how many values follow: states 4, but 3 follow"),
             (HEADER + " .1 -.2\n .3-.1\n", (), "line 6, column 2: must be one number; these have run together"),
             (HEADER + " .1 -.2\n *** -.1\n", (), "line 6, column 2: must be a number; stars"),
-            ("1\n2\n", ("--unit", "g"), "line 1: must tell the interval"),
-            ("1\n2\n", ("--interval", "1"), "line 1: must tell the unit"),
+            ("1\n2\n", ("--unit", "g"), "line 1: must state the interval"),
+            ("1\n2\n", ("--interval", "1"), "line 1: must state the unit"),
             ("\0\0", (), "byte 0x00"),
             ("", (), "line 1: must hold a line of numbers"),
             (HEADER + ".1 -.1 .3 .1\n", ("--scale", "1e308"), "must leave every sample finite")]:

@@ -231,7 +231,7 @@ def test_measurements_become_a_revision():
         listed = [columns(line) for line in good(daemon.url, "measurements", "foam").splitlines()]
         assert ["count", "2"] in listed and [row[0] for row in listed[-2:]] == ["2", "1"], listed
         assert "two ways" in listed[-1], listed
-        for arguments, expected, words in (((bare,), 3, "--interval"), ((timed, "--interval", "1"), 3, "tells an interval"), ((test,), 3, "no line of numbers"),
+        for arguments, expected, words in (((bare,), 3, "--interval"), ((timed, "--interval", "1"), 3, "states an interval"), ((test,), 3, "no line of numbers"),
                                            ((os.path.join(folder, "no.csv"),), 4, "no.csv")):
             code, out, errors = materials(daemon.url, "measure", "foam", test, "--trace", *arguments)
             assert code == expected and words in errors and out == "", (arguments, code, errors)

@@ -160,7 +160,7 @@ def test_too_few_samples_give_an_interval_and_no_figure():
         row = shown.json()["evaluation"]["rows"][0]
         assert row["contact_time"] is None and row["note"] and not row["contact_time_counts"], row
         assert 0 < row["least_contact_time"] < row["most_contact_time"] < 0.02, row
-        assert any("no trace gives a figure" in warning["detail"] for warning in shown.json()["warnings"]), shown.json()["warnings"]
+        assert any("no trace gives a value" in warning["detail"] for warning in shown.json()["warnings"]), shown.json()["warnings"]
 
 
 def test_a_contact_has_a_start_an_end_and_a_pulse_or_none_of_them():
@@ -169,7 +169,7 @@ def test_a_contact_has_a_start_an_end_and_a_pulse_or_none_of_them():
         return {"interval": 1e-4, "force": [0.0] * before + samples + [0.0] * 300}
     pulse = [80 * math.exp(-0.02 * i) * math.sin(math.pi * i / 40) for i in range(41)]
     cases = (("", trace(pulse)), ("begins during the contact", trace(pulse[12:], before=0)),
-             ("only 3 samples are in contact", trace([50.0, 90.0, 40.0])), ("no pulse of the model's", trace(([1.0] * 4 + [0.2] * 4) * 5)))
+             ("only 3 samples are in contact", trace([50.0, 90.0, 40.0])), ("no pulse of the model", trace(([1.0] * 4 + [0.2] * 4) * 5)))
     with program.daemon() as daemon:
         shown = daemon.request("POST", f"{SPONGE}/measurements?dry_run=1", json={"traces": [sent for _, sent in cases]}, timeout=120)
         rows = {row["trace"]: row for row in shown.json()["evaluation"]["rows"]}
@@ -392,7 +392,7 @@ def test_figures_for_a_pair_are_those_of_the_plan():
                 assert near(contact[name]["value"], plan[name], 1e-12), (contact, plan)
                 assert contact[name]["uncertainty"] is None, contact
         assert {contact["separation"] for contact in figures["contacts"]} == {"zero_penetration", "zero_force"}
-        assert any("test are not known" in warning["detail"] for warning in figures["warnings"]), figures
+        assert any("test are unknown" in warning["detail"] for warning in figures["warnings"]), figures
         for target in (SPONGE, f"{SPONGE}@1"):
             asking.problem(daemon.get(f"{target}/derived?damper_mass=0.1&identified_for=rig"), 422, "/identified_for")
         post(daemon, drops([0.59, 0.61, 0.63]))

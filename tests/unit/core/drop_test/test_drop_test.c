@@ -72,10 +72,10 @@ static void what_says_nothing_is_refused(void **state) {
     (void)state;
     refuse("{}", "/drops", "at least one drop");
     refuse("{\"drops\": [], \"traces\": []}", "/drops", "at least one drop");
-    refuse("{\"drops\": [{}]}", "/drops/0", "must tell a rebound");
-    refuse("{\"drops\": [{\"drop_height\": 1}]}", "/drops/0", "must tell a rebound");
-    refuse("{\"drops\": [{\"rebound_height\": 1}]}", "/drops/0/drop_height", "beside a rebound");
-    refuse("{\"drops\": [{\"rebound_speed\": 1}]}", "/drops/0/approach_speed", "beside a rebound");
+    refuse("{\"drops\": [{}]}", "/drops/0", "must have a rebound");
+    refuse("{\"drops\": [{\"drop_height\": 1}]}", "/drops/0", "must have a rebound");
+    refuse("{\"drops\": [{\"rebound_height\": 1}]}", "/drops/0/drop_height", "with a rebound");
+    refuse("{\"drops\": [{\"rebound_speed\": 1}]}", "/drops/0/approach_speed", "with a rebound");
     refuse("{\"traces\": [{\"interval\": 1e-4}]}", "/traces/0/force", "at least one");
 }
 

@@ -118,7 +118,7 @@ static void gravity_is_taken_out_of_drops_that_say_it(void **state) {
         // Left alone, it is told how much that is.
         test.gravity = (double)NAN;
         evaluate(&test, (Separation)rule);
-        assert_true(is_warned("/gravity", "lengthens a contact of this e and T_c by"));
+        assert_true(is_warned("/gravity", "lengthens a contact with this e and T_c by"));
         evaluation_clear(&evaluation);
         fields_clear(drop_test_fields, &test);
     }
@@ -201,7 +201,7 @@ static void heights_go_by_the_earth_and_say_so_where_another_gravity_pulls(void 
          &test);
     evaluate(&test, SEPARATION_ZERO_FORCE);
     assert_near(evaluation.rows.at[0].approach_speed, sqrt(2 * 9.80665 * 0.1), 1e-15);
-    assert_true(is_warned("/gravity", "told from heights by 9.80665"));
+    assert_true(is_warned("/gravity", "follow from heights by 9.80665"));
     evaluation_clear(&evaluation);
     free(test.drops.at[0].excluded);
     test.drops.at[0].excluded = strdup("slipped");
@@ -277,7 +277,7 @@ static void an_outlier_is_told_and_counts(void **state) {
     assert_true(evaluation.rows.at[4].restitution_is_outlier);
     assert_true(evaluation.rows.at[4].restitution_counts);
     assert_near(evaluation.restitution.mean, 2.645 / 5, 1e-12);
-    assert_true(is_warned("/drops/4", "it counts all the same"));
+    assert_true(is_warned("/drops/4", "it counts"));
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
 }

@@ -129,7 +129,7 @@ static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
     assert_near(pair.contacts.at[0].restitution.value, it.restitution, 0);
     assert_near(pair.contacts.at[0].contact_time.value, it.contact_time, 0);
     assert_true(is_warned("/effective_mass", "355 % above the test's 0.11 kg"));
-    assert_true(is_warned("/effective_mass", "are carried over"));
+    assert_true(is_warned("/effective_mass", "are those of the test"));
     pair_parameters_clear(&pair);
     // Of the test's own pair it is the same thing.
     derive(0.11, (double)NAN, IDENTIFIED_FOR_RIG, SEPARATION_ZERO_FORCE);
@@ -140,7 +140,7 @@ static void a_rigs_stiffness_and_damping_are_carried_over(void **state) {
     assert_int_equal(pair_parameters_run(&material, 0.5, (double)NAN, IDENTIFIED_FOR_RIG,
                                          CHOICE_ABSENT, &pair, &problem),
                      STATUS_INVALID);
-    assert_non_null(strstr(detail_at(&problem, "/identified_for"), "does not state the test's"));
+    assert_non_null(strstr(detail_at(&problem, "/identified_for"), "does not state the masses of the test"));
 }
 
 static void another_pair_is_warned_of(void **state) {
@@ -156,9 +156,9 @@ static void another_pair_is_warned_of(void **state) {
     material.least_speed = (double)NAN;
     material.separation = SEPARATION_ZERO_FORCE;
     derive(0.22, (double)NAN, IDENTIFIED_FOR_SCENE, SEPARATION_ZERO_PENETRATION);
-    assert_true(is_warned("/test_mass", "are not known"));
+    assert_true(is_warned("/test_mass", "are unknown"));
     assert_true(is_warned("/least_speed", "range of approach speeds"));
-    assert_true(is_warned("/contacts", "told under zero_force"));
+    assert_true(is_warned("/contacts", "determined under zero_force"));
 }
 
 static void without_a_contact_time_only_the_ratio_is_known(void **state) {
@@ -196,7 +196,7 @@ static void e_of_one_and_of_none_are_borders(void **state) {
     material.restitution = 0;
     derive(0.11, (double)NAN, IDENTIFIED_FOR_SCENE, CHOICE_ABSENT);
     assert_true(isnan(pair.contacts.at[0].stiffness.value));
-    assert_true(is_warned("/contacts", "nothing comes back"));
+    assert_true(is_warned("/contacts", "without a rebound"));
 }
 
 static void an_overdamped_pair_never_parts(void **state) {

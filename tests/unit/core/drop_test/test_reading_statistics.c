@@ -104,7 +104,7 @@ static void equal_readings_are_not_taken_for_certainty(void **state) {
     const double values[] = {0.6, 0.6, 0.6, 0.6};
     make(values, NULL, 4);
     assert_true(isnan(quantity.low) && quantity.deviation == 0 && quantity.outliers == 0);
-    assert_non_null(strstr(quantity.why, "the same"));
+    assert_non_null(strstr(quantity.why, "are equal"));
     fields_clear(reading_statistic_fields, &quantity);
     for (size_t i = 0; i < 4; i++)
         readings[i].uncertainty = 0.02;

@@ -109,7 +109,7 @@ static void a_count_and_an_interval_may_stand_before_one_column(void **state) {
                &(GroundMotionOptions){NAN, ACCELERATION_METRES}),
           "count_line", 3, 0.01, -3);
     bad("some motion\n4 0.0100\n1\n2\n3\n", &whole, "line 2",
-        "must tell how many values follow: tells 4, but 3 follow, the last on line 5");
+        "must state how many values follow: states 4, but 3 follow, the last on line 5");
 }
 
 static void times_give_the_interval(void **state) {
@@ -128,7 +128,7 @@ static void times_give_the_interval(void **state) {
     bad("0 1\n0.01 2\n0.02 3\n\n0.01 4\n0.02 5\n0.03 6\n", &in_g, "line 5", "is 0.01 s after 0.02");
     bad("Time[s] Accel[g]\n0 1\n0.01 2\n0.02\n0.03 4\n", &nothing, "line 4", "has 1");
     bad("0 1 9\n0.01 2 9\n0.02 3 9\n0.03 4 9\n", &whole, "line 4", "two columns");
-    bad(text, &whole, "line 3", "tells an interval of 0.01 s, but 0.02 s is given");
+    bad(text, &whole, "line 3", "states an interval of 0.01 s, but 0.02 s is given");
 }
 
 static void columns_of_a_rising_acceleration_are_no_times(void **state) {
@@ -169,9 +169,9 @@ static void units_are_found_or_must_be_given(void **state) {
     check(good("unit: gal\n1 2\n3\n", &(GroundMotionOptions){1, ACCELERATION_METRES}), "columns", 3,
           1, 3);
     bad("1\n2\n3\n", &(GroundMotionOptions){1, CHOICE_ABSENT}, "line 1",
-        "must tell the unit, or unit must be given: g, m/s^2");
+        "must state the unit, or unit must be given: g, m/s^2");
     bad("units (g)\nor m/s^2\nNPTS=2, DT=1\n1 2", &nothing, "line 2",
-        "tells another unit than line 1, g");
+        "states another unit than line 1, g");
     bad("VELOCITY TIME HISTORY IN UNITS OF CM/SEC\nNPTS=2, DT=1\n1 2", &nothing, "line 1",
         "must be of an acceleration, is of a velocity");
     bad("DISPLACEMENT TIME SERIES IN UNITS OF CM\nNPTS=2, DT=1\n1 2", &nothing, "line 1",
@@ -180,26 +180,26 @@ static void units_are_found_or_must_be_given(void **state) {
 
 static void what_is_not_told_must_be_given(void **state) {
     (void)state;
-    bad("1\n2\n3\n", &in_g, "line 1", "must tell the interval");
-    bad(PEER "NPTS= 3\n1 2 3", &nothing, "line 4", "must tell the interval");
+    bad("1\n2\n3\n", &in_g, "line 1", "must state the interval");
+    bad(PEER "NPTS= 3\n1 2 3", &nothing, "line 4", "must state the interval");
     check(good(PEER "NPTS= 3\n1 2 3", &(GroundMotionOptions){0.5, CHOICE_ABSENT}), "at2", 3, 0.5,
           3 * 9.80665);
     bad(PEER "NPTS= 3, DT= .01\n1 2 3", &whole, "line 4",
-        "tells an interval of 0.01 s, but 0.02 s is given");
+        "states an interval of 0.01 s, but 0.02 s is given");
 }
 
 static void a_count_that_does_not_match_is_told_with_both_numbers(void **state) {
     (void)state;
     bad(PEER "NPTS= 4, DT= .01\n1 2\n3\n", &nothing, "line 4",
-        "tells 4, but 3 follow, the last on line 6");
+        "states 4, but 3 follow, the last on line 6");
     bad(PEER "NPTS= 2, DT= .01\n1 2\n3\n", &nothing, "line 4",
-        "tells 2, but 3 follow, the last on line 6");
-    bad(PEER "NPTS= 1e300, DT= .01\n1 2\n3\n", &nothing, "line 4", "tells 1e+300, but 3 follow");
+        "states 2, but 3 follow, the last on line 6");
+    bad(PEER "NPTS= 1e300, DT= .01\n1 2\n3\n", &nothing, "line 4", "states 1e+300, but 3 follow");
     bad(PEER "NPTS= 2.5, DT= .01\n1 2\n", &nothing, "line 4", "whole number");
-    bad(PEER "NPTS= -2, DT= .01\n1 2\n", &nothing, "line 4", "at least 1, tells -2");
-    bad(PEER "NPTS= many, DT= .01\n1 2\n", &nothing, "line 4", "behind NPTS");
-    bad(PEER "NPTS= 2, DT= 0\n1 2\n", &nothing, "line 4", "interval above 0 s, tells 0");
-    bad(PEER "NPTS= 2, DT= -1\n1 2\n", &nothing, "line 4", "interval above 0 s, tells -1");
+    bad(PEER "NPTS= -2, DT= .01\n1 2\n", &nothing, "line 4", "at least 1, states -2");
+    bad(PEER "NPTS= many, DT= .01\n1 2\n", &nothing, "line 4", "after NPTS");
+    bad(PEER "NPTS= 2, DT= 0\n1 2\n", &nothing, "line 4", "interval above 0 s, states 0");
+    bad(PEER "NPTS= 2, DT= -1\n1 2\n", &nothing, "line 4", "interval above 0 s, states -1");
     bad("1 2 3\n4 5\n6 7 8\n9\n", &whole, "line 2",
         "must have 3 numbers, as the rows before, has 2");
     bad("1 2 3\n4 5 6 7\n", &whole, "line 2", "has 4");
