@@ -1,5 +1,6 @@
-// One storey and at most one damper: bare names. Otherwise each storey's and each damper's channel
-// carries its number from 1. So one quantity has one name, and equal scenes one canonical form.
+// With one storey and at most one damper channels have bare names. Otherwise the channel of each
+// storey and damper carries its number from 1. So one quantity has one name, and equal scenes have
+// one canonical form.
 #include "core/simulation/channel_names.h"
 
 #include <stdio.h>
@@ -9,118 +10,158 @@
 static const ChannelId usual[] = {CHANNEL_DISPLACEMENT, CHANNEL_VELOCITY, CHANNEL_ACCELERATION,
                                   CHANNEL_DAMPER_DISPLACEMENT, CHANNEL_CONTACT_FORCE};
 
-// How many of each a scene has.
-typedef struct Owners {
+typedef struct ChannelCounts {
     size_t storeys, dampers;
     bool are_numbered;
-} Owners;
+} ChannelCounts;
 
-static size_t owners_count(const Owners *owners, const Channel *channel) {
-    return channel->owner == CHANNEL_OF_STOREY   ? owners->storeys
-           : channel->owner == CHANNEL_OF_DAMPER ? owners->dampers
+static ChannelCounts channel_counts(const Scene *scene) {
+    const size_t storeys = structure_storeys(scene_structure(scene));
+    return (ChannelCounts){storeys, scene->dampers.count, storeys > 1 || scene->dampers.count > 1};
+}
+
+// Number of channels of that kind.
+static size_t channel_counts_of(const ChannelCounts *counts, const Channel *channel) {
+    return channel->owner == CHANNEL_OF_STOREY   ? counts->storeys
+           : channel->owner == CHANNEL_OF_DAMPER ? counts->dampers
                                                  : 1;
 }
 
-// The channel's one name; `number` is from 1.
-static void put_name(char target[CHANNEL_NAME], const Owners *owners, const Channel *channel,
-                     size_t number) {
-    if (owners->are_numbered && channel->owner != CHANNEL_OF_BASE)
+static bool channel_counts_is_numbered(const ChannelCounts *counts, const Channel *channel) {
+    return counts->are_numbered && channel->owner != CHANNEL_OF_BASE;
+}
+
+// `number` is from 1.
+static void channel_counts_name(const ChannelCounts *counts, const Channel *channel, size_t number,
+                                char target[CHANNEL_NAME]) {
+    if (channel_counts_is_numbered(counts, channel))
         snprintf(target, CHANNEL_NAME, "%s_%zu", channel->name, number);
     else
         snprintf(target, CHANNEL_NAME, "%s", channel->name);
 }
 
-static Status add_name(Texts *names, const Owners *owners, const Channel *channel, size_t number) {
-    char name[CHANNEL_NAME];
-    put_name(name, owners, channel, number);
-    char *text = strdup(name);
-    if (text == NULL)
-        return STATUS_NO_MEMORY;
-    names->at[names->count++] = text;
-    return STATUS_OK;
+void channel_names_write(const Scene *scene, ChannelId channel, size_t number,
+                         char target[CHANNEL_NAME]) {
+    const ChannelCounts counts = channel_counts(scene);
+    channel_counts_name(&counts, &channels[channel], number, target);
 }
 
-size_t request_usual_count(const Scene *scene) {
-    const Owners owners = {structure_storeys(scene_structure(scene)), scene->dampers.count, false};
+size_t channel_names_usual_count(const Scene *scene) {
+    const ChannelCounts counts = channel_counts(scene);
     size_t count = 0;
     for (size_t i = 0; i < COUNT(usual); i++)
-        count += owners_count(&owners, &channels[usual[i]]);
+        count += channel_counts_of(&counts, &channels[usual[i]]);
     return count;
 }
 
-static Status add_usual(Texts *names, const Owners *owners, bool is_spectrum) {
-    if (is_spectrum)
-        return add_name(names, owners, &channels[CHANNEL_MEAN_ACCELERATION], owners->storeys);
-    for (size_t i = 0; i < COUNT(usual); i++) {
-        const Channel *channel = &channels[usual[i]];
-        for (size_t number = 1; number <= owners_count(owners, channel); number++)
-            TRY(add_name(names, owners, channel, number));
-    }
-    return STATUS_OK;
-}
-
-static Owners owners_of(const Scene *scene) {
-    const size_t storeys = structure_storeys(scene_structure(scene));
-    return (Owners){storeys, scene->dampers.count, storeys > 1 || scene->dampers.count > 1};
-}
-
-void request_channel_name(const Scene *scene, ChannelId channel, size_t number,
-                          char target[CHANNEL_NAME]) {
-    const Owners owners = owners_of(scene);
-    put_name(target, &owners, &channels[channel], number);
-}
-
-static void clear(Texts *names) {
+void channel_names_clear(Texts *names) {
     for (size_t i = 0; i < names->count; i++)
         free(names->at[i]);
     free(names->at);
     *names = (Texts){NULL, 0};
 }
 
-// The names that one entry of the list became.
-typedef struct Expanded {
-    size_t at, count;
-} Expanded;
+static Status channel_names_append(Texts *names, const char *name) {
+    char **at = realloc(names->at, (names->count + 1) * sizeof *at);
+    if (at == NULL)
+        return STATUS_NO_MEMORY;
+    names->at = at;
+    at[names->count] = strdup(name);
+    return at[names->count] == NULL ? STATUS_NO_MEMORY : (names->count++, STATUS_OK);
+}
 
-// Where the list as it was asked for has what is now name `i`.
-static size_t asked_at(const Expanded *expanded, size_t i) {
+Status channel_names_add(const Scene *scene, ChannelId channel, size_t number, Texts *names) {
+    char name[CHANNEL_NAME];
+    channel_names_write(scene, channel, number, name);
+    for (size_t i = 0; i < names->count; i++)
+        if (strcmp(names->at[i], name) == 0)
+            return STATUS_OK;
+    return channel_names_append(names, name);
+}
+
+static Status channel_names_append_usual(Texts *names, const ChannelCounts *counts,
+                                         bool is_spectrum) {
+    static const ChannelId of_spectrum[] = {CHANNEL_MEAN_ACCELERATION};
+    const ChannelId *ids = is_spectrum ? of_spectrum : usual;
+    for (size_t i = 0; i < (is_spectrum ? COUNT(of_spectrum) : COUNT(usual)); i++) {
+        const Channel *channel = &channels[ids[i]];
+        const size_t last = channel_counts_of(counts, channel);
+        for (size_t number = is_spectrum ? last : 1; number <= last; number++) {
+            char name[CHANNEL_NAME];
+            channel_counts_name(counts, channel, number, name);
+            TRY(channel_names_append(names, name));
+        }
+    }
+    return STATUS_OK;
+}
+
+// The names that one entry of the list was replaced by.
+typedef struct ExpandedNames {
+    size_t at, count;
+} ExpandedNames;
+
+// Index in the requested list of what is now name `i`.
+static size_t expanded_names_index(const ExpandedNames *expanded, size_t i) {
     if (i < expanded->at)
         return i;
     return i < expanded->at + expanded->count ? expanded->at : i - expanded->count + 1;
 }
 
-// CHANNEL_USUAL where it first stands; a second one is left to be refused as such.
-static Status expand(Texts *names, const Owners *owners, bool is_spectrum, Expanded *expanded,
-                     Problem *problem) {
+// Replaces the first CHANNEL_USUAL; a second one stays and is refused.
+static Status channel_names_expand(Texts *names, const ChannelCounts *counts, bool is_spectrum,
+                                   ExpandedNames *expanded, Problem *problem) {
     size_t place = 0;
     while (place < names->count && strcmp(names->at[place], CHANNEL_USUAL) != 0)
         place++;
     if (place == names->count)
         return STATUS_OK;
-    const size_t most = names->count + COUNT(usual) * (owners->storeys + owners->dampers);
-    Texts all = {calloc(most, sizeof *all.at), 0};
-    if (all.at == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
+    Texts all = {NULL, 0};
     Status status = STATUS_OK;
-    for (size_t i = 0; i < names->count && status == STATUS_OK; i++) {
-        if (i == place)
-            status = add_usual(&all, owners, is_spectrum);
-        else if ((all.at[all.count] = strdup(names->at[i])) != NULL)
-            all.count++;
-        else
-            status = STATUS_NO_MEMORY;
-    }
-    if (status == STATUS_OK)
-        *expanded = (Expanded){place, all.count - names->count + 1};
-    clear(status == STATUS_OK ? names : &all);
-    if (status != STATUS_OK)
+    for (size_t i = 0; i < names->count && status == STATUS_OK; i++)
+        status = i == place ? channel_names_append_usual(&all, counts, is_spectrum)
+                            : channel_names_append(&all, names->at[i]);
+    if (status != STATUS_OK) {
+        channel_names_clear(&all);
         return problem_set(problem, status, "no memory for the channels");
+    }
+    *expanded = (ExpandedNames){place, all.count - names->count + 1};
+    channel_names_clear(names);
     *names = all;
     return STATUS_OK;
 }
 
-static Status refuse(const char *name, const char *meant, const char *detail, const char *pointer,
-                     Problem *problem) {
+static Status channel_names_check(const char *name, const ChannelCounts *counts,
+                                  const char *pointer, Problem *problem) {
+    size_t number;
+    const Channel *channel = channel_find(name, &number);
+    if (strcmp(name, CHANNEL_USUAL) == 0)
+        return problem_add(problem, STATUS_INVALID, pointer, "is asked for twice");
+    if (channel == NULL)
+        return problem_concerns(problem, pointer)
+                   ? STATUS_OK // reported with the fields
+                   : texts_refuse(channel_requests, name, pointer, problem);
+    const size_t most = channel_counts_of(counts, channel);
+    if (most == 0)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "%s needs a damper, the scene has none", name);
+    const bool is_numbered = channel_counts_is_numbered(counts, channel);
+    if (is_numbered ? number >= 1 && number <= most : number == 0)
+        return STATUS_OK;
+    char meant[CHANNEL_NAME], last[CHANNEL_NAME], names[160], detail[sizeof((Fault){0}.detail)];
+    channel_counts_name(counts, channel,
+                        number > most || channel->owner == CHANNEL_OF_STOREY ? most : 1, meant);
+    channel_counts_name(counts, channel, most, last);
+    if (most == 1)
+        snprintf(names, sizeof names, "be %s", last);
+    else
+        snprintf(names, sizeof names, "carry the number of a %s, from %s_1 to %s",
+                 channel->owner == CHANNEL_OF_STOREY ? "storey" : "damper", channel->name, last);
+    if (is_numbered)
+        snprintf(detail, sizeof detail, "must %s: the scene has %zu storey%s and %zu damper%s",
+                 names, counts->storeys, counts->storeys == 1 ? "" : "s", counts->dampers,
+                 counts->dampers == 1 ? "" : "s");
+    else
+        snprintf(detail, sizeof detail, "must be %s, without a number: there is but one", meant);
     Fault fault = {0};
     text_fit(fault.pointer, sizeof fault.pointer, pointer);
     text_quote(fault.value, sizeof fault.value, name);
@@ -129,74 +170,27 @@ static Status refuse(const char *name, const char *meant, const char *detail, co
     return problem_put(problem, STATUS_INVALID, &fault);
 }
 
-static bool is_right(const char *name, const Owners *owners) {
-    size_t number;
-    const Channel *channel = channel_find(name, &number);
-    if (channel == NULL)
-        return false;
-    const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
-    return owners_count(owners, channel) > 0 &&
-           (is_numbered ? number >= 1 && number <= owners_count(owners, channel) : number == 0);
-}
-
-// Says what is wrong with a name that is not right.
-static Status refuse_name(const char *name, const Owners *owners, const char *pointer,
-                          Problem *problem) {
-    size_t number;
-    const Channel *channel = channel_find(name, &number);
-    if (strcmp(name, CHANNEL_USUAL) == 0)
-        return problem_add(problem, STATUS_INVALID, pointer, "is asked for twice");
-    if (channel == NULL)
-        return problem_concerns(problem, pointer)
-                   ? STATUS_OK // told by the rows
-                   : texts_refuse(channel_requests, name, pointer, problem);
-    if (channel->owner == CHANNEL_OF_DAMPER && owners->dampers == 0)
-        return problem_add(problem, STATUS_INVALID, pointer,
-                           "%s needs a damper, the scene has none", name);
-    const bool is_numbered = owners->are_numbered && channel->owner != CHANNEL_OF_BASE;
-    const size_t most = owners_count(owners, channel);
-    char meant[CHANNEL_NAME], last[CHANNEL_NAME], names[160], detail[sizeof((Fault){0}.detail)];
-    put_name(meant, owners, channel,
-             number > most || channel->owner == CHANNEL_OF_STOREY ? most : 1);
-    put_name(last, owners, channel, most);
-    if (most == 1)
-        snprintf(names, sizeof names, "be %s", last);
-    else
-        snprintf(names, sizeof names, "carry the number of a %s, from %s_1 to %s",
-                 channel->owner == CHANNEL_OF_STOREY ? "storey" : "damper", channel->name, last);
-    if (is_numbered)
-        snprintf(detail, sizeof detail, "must %s: the scene has %zu storey%s and %zu damper%s",
-                 names, owners->storeys, owners->storeys == 1 ? "" : "s", owners->dampers,
-                 owners->dampers == 1 ? "" : "s");
-    else
-        snprintf(detail, sizeof detail, "must be %s, without a number: there is but one", meant);
-    return refuse(name, meant, detail, pointer, problem);
-}
-
-Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, const char *pointer,
-                        Problem *problem) {
-    const Owners owners = {scene_storeys(scene, problem), scene->dampers.count,
-                           scene_storeys(scene, problem) > 1 || scene->dampers.count > 1};
-    const bool are_known = owners.storeys > 0 && !problem_concerns(problem, "/dampers");
-    Expanded expanded = {0, 1};
+Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum,
+                              const char *pointer, Problem *problem) {
+    const size_t storeys = scene_storeys(scene, problem), dampers = scene->dampers.count;
+    const ChannelCounts counts = {storeys, dampers, storeys > 1 || dampers > 1};
+    const bool are_known = storeys > 0 && !problem_concerns(problem, "/dampers");
+    ExpandedNames expanded = {0, 1};
     if (are_known)
-        TRY(expand(names, &owners, is_spectrum, &expanded, problem));
+        TRY(channel_names_expand(names, &counts, is_spectrum, &expanded, problem));
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
+        char place[sizeof((Fault){0}.pointer)];
+        pointer_index(place, sizeof place, pointer, expanded_names_index(&expanded, i));
+        if (are_known && channel_names_check(names->at[i], &counts, place, problem) != STATUS_OK)
+            status = STATUS_INVALID;
         size_t first = 0;
         while (first < i && strcmp(names->at[i], names->at[first]) != 0)
             first++;
-        const bool is_wrong = are_known && !is_right(names->at[i], &owners);
-        if (!is_wrong && first == i)
-            continue;
-        status = STATUS_INVALID;
-        char place[sizeof((Fault){0}.pointer)];
-        pointer_index(place, sizeof place, pointer, asked_at(&expanded, i));
-        if (is_wrong)
-            (void)refuse_name(names->at[i], &owners, place, problem);
         if (first < i)
-            problem_add(problem, STATUS_INVALID, place, "%.64s is asked for twice, first at %s/%zu",
-                        names->at[i], pointer, asked_at(&expanded, first));
+            status = problem_add(problem, STATUS_INVALID, place,
+                                 "%.64s is asked for twice, first at %s/%zu", names->at[i], pointer,
+                                 expanded_names_index(&expanded, first));
     }
     return status;
 }

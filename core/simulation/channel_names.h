@@ -1,5 +1,5 @@
-// Which channels a request means: the usual ones by name, numbers where a scene has several storeys
-// or dampers. Not what they hold: that is result/channel.h. Used by request.c.
+// Names of channels in a request: the default ones, and numbers where a scene has several storeys
+// or dampers.
 #ifndef CORE_SIMULATION_CHANNEL_NAMES_H
 #define CORE_SIMULATION_CHANNEL_NAMES_H
 
@@ -8,17 +8,21 @@
 
 enum { CHANNEL_NAME = 64 };
 
-// The one name that a channel has in a completed scene, of storey or damper `number`, from 1.
-void request_channel_name(const Scene *scene, ChannelId channel, size_t number,
-                          char target[CHANNEL_NAME]);
+// The one name of a channel in a completed scene; `number` is that of the storey or damper, from 1.
+void channel_names_write(const Scene *scene, ChannelId channel, size_t number,
+                         char target[CHANNEL_NAME]);
 
-// Puts the names of the usual channels, or of the usual spectrum's one, in place of CHANNEL_USUAL;
-// then judges all names, below `pointer`. Says nothing of numbers where a fault leaves the storeys
-// or dampers unknown.
-Status request_channels(const Scene *scene, Texts *names, bool is_spectrum, const char *pointer,
-                        Problem *problem);
+// Appends that name to a list that does not have it yet. STATUS_OK or STATUS_NO_MEMORY.
+Status channel_names_add(const Scene *scene, ChannelId channel, size_t number, Texts *names);
+void channel_names_clear(Texts *names);
 
-// How many channels CHANNEL_USUAL stands for, in a completed scene.
-size_t request_usual_count(const Scene *scene);
+// Replaces CHANNEL_USUAL by the names of the default channels, or of the default spectrum's one,
+// and validates all names; their pointers are below `pointer`. Names are not compared with the
+// numbers of storeys and dampers where a fault leaves these unknown.
+Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum,
+                              const char *pointer, Problem *problem);
+
+// Number of channels that CHANNEL_USUAL stands for in a completed scene.
+size_t channel_names_usual_count(const Scene *scene);
 
 #endif

@@ -2,9 +2,7 @@
 // The parts' costs are as measured; how many contacts there will be can only be guessed.
 #include <math.h>
 
-#include "core/simulation/accuracy_target.h"
-#include "core/simulation/choice.h"
-#include "core/simulation/undamped_baseline.h"
+#include "core/simulation/internal.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/step_work.h"
 
@@ -40,7 +38,7 @@ typedef struct Outlook {
 // Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
 // shows that the stops are out of reach, and coupled modes have no closed form for a whole
 // interval.
-static double flight_arcs(const Scene *scene, const StructureRates *rates) {
+static double cost_flight_arcs(const Scene *scene, const StructureRates *rates) {
     const Excitation *excitation = scene_excitation(scene);
     double rate = rates->fastest;
     if (excitation_kind(excitation)->fastest != NULL)
@@ -52,10 +50,10 @@ static double flight_arcs(const Scene *scene, const StructureRates *rates) {
 }
 
 // Samples of the base within the run.
-static double base_samples(const Simulation *simulation) {
+static double cost_base_samples(const Simulation *simulation) {
     const Excitation *excitation = scene_excitation(&simulation->scene);
     const ExcitationKind *kind = excitation_kind(excitation);
-    const double interval = choice_base_interval(simulation);
+    const double interval = simulation_base_interval(simulation);
     if (!(interval > 0))
         return 0;
     const double lasts = kind->lasts != NULL ? kind->lasts(excitation) : INFINITY;
@@ -63,15 +61,15 @@ static double base_samples(const Simulation *simulation) {
 }
 
 // Kinks of the base that do not lie at samples end an arc each, and have another begin.
-static double base_arcs(const Simulation *simulation) {
+static double cost_base_arcs(const Simulation *simulation) {
     const double ratio =
-        choice_base_interval(simulation) * simulation->scene.sample_rate; // in sample intervals
+        simulation_base_interval(simulation) * simulation->scene.sample_rate; // in sample intervals
     if (!(ratio > 0) || (ratio > 0.5 && fabs(ratio - nearbyint(ratio)) < 1e-9 * ratio))
         return 0;
-    return base_samples(simulation) * (ratio < 1 ? 1 + ratio : 2);
+    return cost_base_samples(simulation) * (ratio < 1 ? 1 + ratio : 2);
 }
 
-static double guess_impacts(const Scene *scene, const StructureRates *rates) {
+static double cost_impacts(const Scene *scene, const StructureRates *rates) {
     const bool is_free = excitation_kind(scene_excitation(scene)) == &excitation_free;
     // What has no spring moves with the duration.
     double rate = rates->slowest > 0 ? rates->slowest : TURN / scene->duration;
@@ -85,7 +83,7 @@ static double guess_impacts(const Scene *scene, const StructureRates *rates) {
            (double)scene->dampers.count;
 }
 
-static double frame_steps(const Scene *scene, const Outlook *outlook) {
+static double cost_frame_steps(const Scene *scene, const Outlook *outlook) {
     const size_t n = outlook->modes, m = scene->dampers.count;
     const bool is_coupled = outlook->is_coupled;
     const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
@@ -102,7 +100,7 @@ static double frame_steps(const Scene *scene, const Outlook *outlook) {
 }
 
 // Whether the engine for one mass serves, as plan_is_single will say.
-static bool is_single(const Scene *scene) {
+static bool cost_is_single(const Scene *scene) {
     const Structure *structure = scene_structure(scene);
     if (structure_storeys(structure) > 1 || scene->dampers.count > 1)
         return false;
@@ -118,42 +116,41 @@ static bool is_single(const Scene *scene) {
 }
 
 // Steps of the exact solver.
-static double exact_steps(const Simulation *simulation, bool *is_fast) {
+static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
-    const size_t modes = accuracy_modes(choice_common(simulation), structure_storeys(structure));
+    const size_t modes = simulation_modes(simulation, structure_storeys(structure));
     StructureRates rates;
     if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // a guess without memory: the run will tell
     const Outlook outlook = {.modes = modes,
-                             .digits = -log10(exact_tolerance(choice_settings(simulation))),
+                             .digits = -log10(exact_tolerance(simulation_settings(simulation))),
                              .samples = (double)scene_sample_count(scene),
-                             .arcs = flight_arcs(scene, &rates) + base_arcs(simulation),
-                             .impacts = guess_impacts(scene, &rates),
+                             .arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation),
+                             .impacts = cost_impacts(scene, &rates),
                              .is_coupled = modes > 1 && isnan(structure->damping_ratio)};
     *is_fast = outlook.arcs > outlook.samples;
-    if (!is_single(scene))
-        return frame_steps(scene, &outlook);
+    if (!cost_is_single(scene))
+        return cost_frame_steps(scene, &outlook);
     return outlook.samples * (scene->dampers.count > 0 ? SAMPLE_NEAR_STOPS : SAMPLE) +
            ARC * outlook.arcs + IMPACT * outlook.impacts;
 }
 
 // Steps of a solver that knows its own cost.
-static double own_steps(const Simulation *simulation) {
+static double cost_own_steps(const Simulation *simulation) {
     Plan *plan;
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
-    if (plan_sketch(&simulation->scene, accuracy_modes(choice_common(simulation), storeys),
-                    &plan) != STATUS_OK)
+    if (plan_sketch(&simulation->scene, simulation_modes(simulation, storeys), &plan) != STATUS_OK)
         return 0; // the run will tell why
     const double steps =
-        choice_solver(simulation)
-            ->cost(choice_settings(simulation), choice_base_interval(simulation), plan);
+        simulation_solver(simulation)
+            ->cost(simulation_settings(simulation), simulation_base_interval(simulation), plan);
     plan_free(plan);
     return steps;
 }
 
-// How often Welch's method transforms a sample.
-static double transforms(const SpectrumRequest *psd) {
+// How often Welch's method cost_transforms a sample.
+static double cost_transforms(const SpectrumRequest *psd) {
     if (psd->channels.count == 0 || psd->segment <= psd->overlap)
         return 0;
     return (double)psd->channels.count * (double)psd->segment /
@@ -161,10 +158,10 @@ static double transforms(const SpectrumRequest *psd) {
 }
 
 // Series and hidden columns, the base and what a coarse one is refined to, matrices, the ledger.
-static double foretell_bytes(const Simulation *simulation) {
+static double cost_bytes(const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
-    const double samples = (double)scene_sample_count(scene), base = base_samples(simulation);
+    const double samples = (double)scene_sample_count(scene), base = cost_base_samples(simulation);
     const double columns = (double)(output->channels.count + output->psd.channels.count);
     const double refined = base > 0 && base < samples ? samples : 0;
     const double size =
@@ -174,37 +171,24 @@ static double foretell_bytes(const Simulation *simulation) {
         rates = (StructureRates){0};
     return sizeof(Outcome) +
            sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
-           sizeof(Impact) * fmin(guess_impacts(scene, &rates), IMPACTS_KEPT);
+           sizeof(Impact) * fmin(cost_impacts(scene, &rates), IMPACTS_KEPT);
 }
 
-static Cost cost_once(const Simulation *simulation) {
-    if (aim_is_asked(simulation))
-        return aim_cost(simulation);
+Cost cost_scene(const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
     const double samples = (double)scene_sample_count(scene);
     const double storeys = (double)structure_storeys(scene_structure(scene));
     const double columns = (double)(output->channels.count + output->psd.channels.count);
-    Cost cost = {.bytes = foretell_bytes(simulation)};
-    cost.spectra = samples * TRANSFORMED * transforms(&output->psd) +
+    Cost cost = {.bytes = cost_bytes(simulation)};
+    cost.spectra = samples * TRANSFORMED * cost_transforms(&output->psd) +
                    (output->psd.channels.count > 0 ? TRANSFORM : 0);
-    cost.base = base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
-    cost.steps = RUN + samples * VALUE * columns + cost.spectra + cost.base +
-                 (storeys > 1 ? MODES * storeys * storeys * storeys : 0) +
-                 (choice_solver(simulation)->cost != NULL ? own_steps(simulation)
-                                                          : exact_steps(simulation, &cost.is_fast));
+    cost.base = cost_base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
+    cost.steps =
+        RUN + samples * VALUE * columns + cost.spectra + cost.base +
+        (storeys > 1 ? MODES * storeys * storeys * storeys : 0) +
+        (simulation_solver(simulation)->cost != NULL ? cost_own_steps(simulation)
+                                                     : cost_exact_steps(simulation, &cost.is_fast));
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
-    return cost;
-}
-
-Cost simulation_cost(const Simulation *simulation) {
-    Cost cost = cost_once(simulation);
-    if (!simulation->output.reduction)
-        return cost;
-    const Cost bare = bare_cost(simulation);
-    cost.steps += bare.steps;
-    cost.cpu_seconds += bare.cpu_seconds;
-    cost.base += bare.base;
-    cost.bytes += bare.bytes; // the first outcome is there still
     return cost;
 }

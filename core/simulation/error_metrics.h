@@ -19,17 +19,17 @@ typedef struct Errors {
 extern const Field error_fields[];
 
 // The error by one Metric.
-double errors_by(const Errors *errors, int metric);
+double error_metrics_by(const Errors *errors, int metric);
 
 // What others are compared with.
-typedef struct Yardstick {
+typedef struct ReferenceSummary {
     double error_estimate, trust_horizon;
     uint64_t impacts;        // within the horizon
     double peak_force;       // of those [N]
     double largest;          // displacement [m]
     double psd_from, psd_to; // the band compared [Hz]
-} Yardstick;
-extern const Field yardstick_fields[];
+} ReferenceSummary;
+extern const Field reference_summary_fields[];
 
 // An outcome whose series holds `storeys` columns of displacement, then as many of
 // mean_acceleration.
@@ -42,10 +42,10 @@ typedef struct Compared {
 } Compared;
 
 // Asks for the channels that errors are measured by, and for no others; the spectra stay.
-Status compare_watch(Simulation *simulation, Problem *problem);
+Status error_metrics_request(Simulation *simulation, Problem *problem);
 
-Yardstick yardstick_make(const Compared *reference);
+ReferenceSummary error_metrics_reference(const Compared *reference);
 
-Errors errors_measure(const Compared *reference, const Compared *point);
+Errors error_metrics_measure(const Compared *reference, const Compared *point);
 
 #endif

@@ -1,35 +1,32 @@
-// One impact of a run seen from near: the contact's force, penetration and speed from its touch to
-// its release, many times within it. The run itself keeps no such thing: the scene is run again for
-// the state at a sample before the impact, and from there once more, finely. Not the ledger's
-// numbers, which it meets. Used by api/force.c and tests.
+// One impact at full detail: force, penetration and speed of the contact from its start to its end.
 #ifndef CORE_SIMULATION_IMPACT_HISTORY_H
 #define CORE_SIMULATION_IMPACT_HISTORY_H
 
 #include "core/simulation/simulation.h"
 
 enum {
-    CLOSEUP_POINTS = 401, // unless others are asked for
-    CLOSEUP_POINTS_MIN = 5,
-    CLOSEUP_POINTS_MAX = 100001,
+    IMPACT_HISTORY_POINTS = 401, // default
+    IMPACT_HISTORY_POINTS_MIN = 5,
+    IMPACT_HISTORY_POINTS_MAX = 100001,
 };
 
-typedef struct Closeup {
-    Impact impact; // as the run's ledger has it
-    // "time", of the scene; "contact_force", positive where the stop pushes; "penetration";
-    // "approach_speed", positive into the stop. About as many rows as points were asked for, evenly
-    // from touch to release, and one at the peak.
+typedef struct ImpactHistory {
+    Impact impact; // as the run lists it
+    // "time" of the scene [s]; "contact_force", positive where the stop pushes [N]; "penetration"
+    // [m]; "approach_speed", positive into the stop [m/s]. About as many rows as points were
+    // requested, equally spaced from start to end, and one at the peak.
     Columns columns;
-} Closeup;
+} ImpactHistory;
 
-// Of the impact `number`, from 1, of a completed simulation's ledger. STATUS_NOT_FOUND where there
-// is none, or where contacts have no length. Stops when `progress` says so. `workspace` may be
-// NULL.
-Status closeup_make(const Simulation *simulation, size_t number, size_t points,
-                    const SimulationLimits *limits, const Progress *progress, Workspace *workspace,
-                    Closeup *closeup, Problem *problem);
-void closeup_clear(Closeup *closeup);
+// The history of impact `number`, from 1, of a completed simulation. STATUS_NOT_FOUND where there
+// is no such impact or where contacts have no duration, STATUS_CANCELLED when `progress` asks to
+// stop. `limits`, `progress` and `workspace` may be NULL. Cleared by impact_history_clear.
+Status impact_history_make(const Simulation *simulation, size_t number, size_t points,
+                           const SimulationLimits *limits, const Progress *progress,
+                           Workspace *workspace, ImpactHistory *history, Problem *problem);
+void impact_history_clear(ImpactHistory *history);
 
-// Solver steps that this may take, foretold.
-double closeup_steps(const Simulation *simulation);
+// Predicted solver steps of that call.
+double impact_history_steps(const Simulation *simulation);
 
 #endif

@@ -1,11 +1,11 @@
-// Impulses in place of contacts that take time: the same scene by the usual, cruder model. Not a
-// judgement of what that makes wrong. Used by aim_way.c and study/.
+// The same scene with the impulse model in place of its contact law.
 #ifndef CORE_SIMULATION_IMPULSE_VARIANT_H
 #define CORE_SIMULATION_IMPULSE_VARIANT_H
 
 #include "core/simulation/simulation.h"
 
-// A completed simulation becomes one to be completed again.
-Status impulses_take(Simulation *simulation, Problem *problem);
+// Changes a completed simulation into one that has to be completed again. Buffers that are given by
+// stiffness and damping get the restitution derived from them.
+Status impulse_variant_apply(Simulation *simulation, Problem *problem);
 
 #endif

@@ -1,35 +1,131 @@
-// From a completed simulation to its outcome: plan, base, solver, spectra, summary.
+// From a completed simulation to its outcome: plan, base motion, solver, spectra and summary. What
+// the scene does not require is left out and reported as a decision, with the number that decided
+// and the share of the predicted cost that this saves. Savings are differences of cost_scene()
+// between the simulation and one with more or less in it. The other shares are measured: the closed
+// form saves two thirds of flight, a row of the list of impacts costs a tenth of its contact, and
+// the search for stops at step ends a tenth of a step.
 #include <math.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/plan/mode_selection.h"
-#include "core/simulation/accuracy_target.h"
-#include "core/simulation/choice.h"
-#include "core/simulation/omissions.h"
-#include "core/simulation/result_warnings.h"
-#include "core/simulation/simulation.h"
-#include "core/simulation/undamped_baseline.h"
-#include "core/solve/exact_accuracy.h"
+#include "core/plan/reachability.h"
+#include "core/simulation/channel_names.h"
+#include "core/simulation/internal.h"
 #include "core/solve/rest.h"
-#include "core/solve/solver.h"
 
-// The part nobody outside sees: how many hold it.
-typedef struct Held {
-    Outcome outcome; // first, so that an Outcome's address is its Held's
-    atomic_size_t holds;
-} Held;
+static const double FORCED_SHARE = 2.0 / 3, ROW_SHARE = 0.1, SEARCH_SHARE = 0.1;
+static const double ROWS_A_SECOND = 7; // impacts of a damper, estimated
 
-static Status make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
-    const Solver *solver = choice_solver(simulation);
+static double omission_share(double left_out, double remaining) {
+    return left_out > 0 ? left_out / (left_out + fmax(remaining, 0)) : 0;
+}
+
+// The scene without dampers, channels and spectra. Views borrow everything from the simulation, and
+// nothing of them is cleared.
+static double omission_flight_steps(const Simulation *simulation) {
+    Simulation view = *simulation;
+    view.output.channels.count = view.output.psd.channels.count = view.scene.dampers.count = 0;
+    return cost_scene(&view).steps;
+}
+
+static double omission_steps_with_channels(const Simulation *simulation, size_t count) {
+    Simulation view = *simulation;
+    view.output.channels.count = count;
+    return cost_scene(&view).steps;
+}
+
+// Contacts; a solver with fixed steps makes its steps in any case.
+static double omission_contact_steps(const Simulation *simulation) {
+    const double all = cost_scene(simulation).steps;
+    if (simulation_solver(simulation)->cost != NULL)
+        return SEARCH_SHARE * all;
+    Simulation view = *simulation;
+    view.scene.dampers.count = 0;
+    return fmax(all - cost_scene(&view).steps, 0);
+}
+
+static Status omissions_of_output(const Simulation *simulation, const Plan *plan,
+                                  Decisions *decisions) {
+    const Output *output = &simulation->output;
+    const size_t usual = channel_names_usual_count(&simulation->scene);
+    const double asked = cost_scene(simulation).steps;
+    if (output->channels.count < usual)
+        TRY(decisions_omit(
+            decisions, "channels", (double)(usual - output->channels.count) * (double)plan->count,
+            "values",
+            omission_share(omission_steps_with_channels(simulation, usual) - asked, asked),
+            "%zu of the %zu usual channels are asked for", output->channels.count, usual));
+    if (output->psd.channels.count == 0) {
+        Simulation view = *simulation;
+        SpectrumRequest *psd = &view.output.psd;
+        psd->channels.count = 1;
+        psd->segment = plan->count < SPECTRUM_SEGMENT ? plan->count : SPECTRUM_SEGMENT;
+        psd->overlap = psd->segment / 2;
+        TRY(decisions_omit(
+            decisions, "psd",
+            floor((double)(plan->count - psd->overlap) / (double)(psd->segment - psd->overlap)),
+            "segments", omission_share(cost_scene(&view).steps - asked, asked),
+            "no spectrum is asked for"));
+    }
+    if (!output->impacts && plan->damper_count > 0)
+        TRY(decisions_omit(decisions, "impacts",
+                           ROWS_A_SECOND * plan->duration * (double)plan->damper_count, "rows",
+                           omission_share(ROW_SHARE * omission_contact_steps(simulation), asked),
+                           "no ledger is asked for: impacts are counted, not listed"));
+    return STATUS_OK;
+}
+
+static Status omissions_of_contacts(const Simulation *simulation, const Plan *plan,
+                                    const Regime *regime, Decisions *decisions) {
+    if (plan->damper_count == 0)
+        return STATUS_OK;
+    if (regime == NULL)
+        return decisions_add(decisions, "contacts", "open", NAN, NULL,
+                             "whether a mass can reach a stop is looked into when the base's "
+                             "motion is made");
+    if (!regime->is_clear)
+        return STATUS_OK;
+    const double saved = omission_contact_steps(simulation);
+    return decisions_omit(decisions, "contacts", regime->reach, NULL,
+                          omission_share(saved, cost_scene(simulation).steps - saved),
+                          "%s at most %.3g of the way to a stop",
+                          plan->damper_count == 1 ? "the mass comes" : "the masses come",
+                          regime->reach);
+}
+
+// Adds what a run leaves out to the plan's decisions. `regime` NULL: the base is not made yet, and
+// what depends on it is reported as open.
+static Status omissions_add(const Simulation *simulation, Plan *plan, const Regime *regime) {
+    Decisions *decisions = &plan->report.decisions;
+    const double asked = cost_scene(simulation).steps;
+    TRY(omissions_of_output(simulation, plan, decisions));
+    if (regime != NULL && regime->is_at_rest) {
+        const double moving = omission_steps_with_channels(simulation, 0);
+        return decisions_omit(decisions, "motion", 0, "J", omission_share(asked, asked - moving),
+                              "nothing moves and nothing sets it moving");
+    }
+    TRY(omissions_of_contacts(simulation, plan, regime, decisions));
+    // Solvers with fixed steps make them in any case.
+    const bool has_closed_form = simulation_solver(simulation) == &solver_exact &&
+                                 (plan_is_single(plan) || (regime != NULL && regime->is_clear &&
+                                                           plan_is_single_in_flight(plan)));
+    if (regime == NULL || !regime->is_unforced || !has_closed_form)
+        return STATUS_OK;
+    const double saved = FORCED_SHARE * omission_flight_steps(simulation);
+    return decisions_omit(decisions, "forcing", 0, "m/s^2", omission_share(saved, asked - saved),
+                          "the base is still: flight goes in closed form");
+}
+
+static Status run_make_plan(const Simulation *simulation, Plan **plan, Problem *problem) {
+    const Solver *solver = simulation_solver(simulation);
     TRY(plan_new(&simulation->scene, simulation->accuracy->kind->name, solver->kind.name, plan,
                  problem));
     Status status = plan_keep(*plan, &simulation->scene,
-                              accuracy_modes(choice_common(simulation), (*plan)->storeys), problem);
+                              simulation_modes(simulation, (*plan)->storeys), problem);
     if (status == STATUS_OK && solver->decide != NULL)
-        status = solver->decide(choice_settings(simulation), choice_base_interval(simulation),
-                                *plan, problem);
+        status = solver->decide(simulation_settings(simulation),
+                                simulation_base_interval(simulation), *plan, problem);
     if (status == STATUS_OK)
         return STATUS_OK;
     plan_free(*plan);
@@ -38,8 +134,17 @@ static Status make_plan(const Simulation *simulation, Plan **plan, Problem *prob
                                       : status;
 }
 
-// A base that never moves is a still one, however it is given.
-static void still(Base *base) {
+// A base without motion becomes BASE_STILL, whatever its kind.
+static Status run_make_base(const Simulation *simulation, size_t samples_max,
+                            FourierStock *transforms, const Progress *progress, Base *base,
+                            Problem *problem) {
+    const Scene *scene = &simulation->scene;
+    const Span span = {.duration = scene->duration,
+                       .sample_rate = scene->sample_rate,
+                       .most = samples_max,
+                       .transforms = transforms};
+    const Excitation *excitation = scene_excitation(scene);
+    TRY(excitation_kind(excitation)->make(excitation, &span, progress, base, problem));
     bool moves = base->form == BASE_SINE && base->amplitude != 0;
     for (size_t i = 0; i < base->count && base->form == BASE_SAMPLED && !moves; i++)
         moves = base->values[i] != 0;
@@ -47,129 +152,115 @@ static void still(Base *base) {
         moves = base->pieces[i].value != 0 || base->pieces[i].slope != 0;
     if (!moves)
         base_clear(base);
-}
-
-// Tells what a plan leaves out as far as it is known before the run: a base in closed form costs
-// nothing to make.
-static Status foretell(const Simulation *simulation, Plan *plan, Problem *problem) {
-    const Scene *scene = &simulation->scene;
-    const Excitation *excitation = scene_excitation(scene);
-    const bool is_known = excitation_kind(excitation)->interval == NULL;
-    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
-    Base base = {0};
-    Regime regime = {0};
-    if (is_known) {
-        TRY(excitation_kind(excitation)->make(excitation, &span, NULL, &base, problem));
-        still(&base);
-        regime = regime_find(plan, &base);
-        base_clear(&base);
-    }
-    if (omissions_tell(simulation, choice_solver(simulation), plan, is_known ? &regime : NULL,
-                       &plan->report.decisions) != STATUS_OK)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     return STATUS_OK;
 }
 
-Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
+Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem) {
     Plan *plan;
-    memset(report, 0, sizeof *report);
-    if (aim_is_asked(simulation))
-        return aim_plan(simulation, report, problem);
-    TRY(make_plan(simulation, &plan, problem));
-    const Status status = foretell(simulation, plan, problem);
+    Base base = {0};
+    Regime regime = {0};
+    TRY(run_make_plan(simulation, &plan, problem));
+    // A base in closed form costs nothing to make.
+    const bool has_base = excitation_kind(scene_excitation(&simulation->scene))->interval == NULL;
+    Status status = has_base ? run_make_base(simulation, 0, NULL, NULL, &base, problem) : STATUS_OK;
+    if (status == STATUS_OK && has_base)
+        regime = regime_find(plan, &base);
+    base_clear(&base);
+    if (status == STATUS_OK &&
+        omissions_add(simulation, plan, has_base ? &regime : NULL) != STATUS_OK)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
     if (status == STATUS_OK) {
         *report = plan->report;
-        memset(&plan->report, 0, sizeof plan->report);
+        plan->report = (PlanReport){0};
     }
     plan_free(plan);
     return status;
 }
 
-// The journey's luggage: everything that must be put down again at its end.
-typedef struct Journey {
+// Resources of one run, released by run_scene().
+typedef struct RunContext {
     const Simulation *simulation;
     const SimulationLimits *limits;
     const Progress *progress;
-    Workspace *workspace; // or NULL
+    FourierStock *transforms; // or NULL
     Plan *plan;
     Base base;
-    Columns hidden;      // channels that only a spectrum wants
-    Columns transformed; // borrowed values of the spectrum's channels
+    Columns hidden;      // channels that only a spectrum needs
+    Columns transformed; // the spectrum's channels; values are borrowed from the other columns
     const char **units;  // of their densities
-    RunColumn *wanted;   // room for all names that ask for one
+    RunColumn *wanted;   // with room for all requested names
     size_t wanted_count;
     Outcome *outcome;
-} Journey;
+} RunContext;
 
-static FourierStock *stock(const Journey *journey) {
-    return journey->workspace == NULL ? NULL : &journey->workspace->transforms;
-}
-
-// What a name asks for; a bare one is of the first storey or damper.
-static RunColumn column_of(const char *name) {
+// The channel of a name. A name without a number means the first storey or damper.
+static RunColumn run_column(const char *name) {
     size_t number;
     const Channel *channel = channel_find(name, &number);
     return (RunColumn){(ChannelId)(channel - channels), number > 0 ? number - 1 : 0, NULL};
 }
 
-static const RunColumn *find_column(const Journey *journey, const char *name) {
-    const RunColumn asked = column_of(name);
-    for (size_t i = 0; i < journey->wanted_count; i++)
-        if (journey->wanted[i].channel == asked.channel &&
-            journey->wanted[i].number == asked.number)
-            return &journey->wanted[i];
+static const RunColumn *run_find_column(const RunContext *context, const char *name) {
+    const RunColumn asked = run_column(name);
+    for (size_t i = 0; i < context->wanted_count; i++)
+        if (context->wanted[i].channel == asked.channel &&
+            context->wanted[i].number == asked.number)
+            return &context->wanted[i];
     return NULL;
 }
 
-// Columns for `names` that no earlier request has, entered into the journey's list.
-static Status make_columns(Journey *journey, const Texts *names, Columns *columns,
-                           Problem *problem) {
+// Makes columns for those of `names` that have none yet and adds them to the list.
+static Status run_make_columns(RunContext *context, const Texts *names, Columns *columns,
+                               Problem *problem) {
     size_t count = 0;
     for (size_t i = 0; i < names->count; i++)
-        count += find_column(journey, names->at[i]) == NULL;
+        count += run_find_column(context, names->at[i]) == NULL;
     if (count == 0)
         return STATUS_OK;
-    TRY(columns_make(columns, count, journey->plan->count, 0, problem));
+    TRY(columns_make(columns, count, context->plan->count, 0, problem));
     for (size_t i = 0, made = 0; i < names->count; i++) {
-        if (find_column(journey, names->at[i]) != NULL)
+        if (run_find_column(context, names->at[i]) != NULL)
             continue;
-        RunColumn *wanted = &journey->wanted[journey->wanted_count++];
-        *wanted = column_of(names->at[i]);
+        RunColumn *wanted = &context->wanted[context->wanted_count++];
+        *wanted = run_column(names->at[i]);
         columns_name(columns, made, names->at[i], channels[wanted->channel].unit);
         wanted->values = columns->at[made++].values;
     }
     return STATUS_OK;
 }
 
-static Status make_spectrum(Journey *journey, Problem *problem) {
-    const SpectrumRequest *request = &journey->simulation->output.psd;
+static Status run_spectrum(RunContext *context, Problem *problem) {
+    const SpectrumRequest *request = &context->simulation->output.psd;
     if (request->channels.count == 0)
         return STATUS_OK;
-    Columns *columns = &journey->transformed;
+    Columns *columns = &context->transformed;
     columns->at = calloc(request->channels.count, sizeof *columns->at);
     const char **units = calloc(request->channels.count, sizeof *units);
-    journey->units = units;
+    context->units = units;
     if (columns->at == NULL || units == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the spectra");
     columns->count = request->channels.count;
-    columns->rows = journey->plan->count;
+    columns->rows = context->plan->count;
     for (size_t i = 0; i < columns->count; i++) {
-        const RunColumn *wanted = find_column(journey, request->channels.at[i]);
+        const RunColumn *wanted = run_find_column(context, request->channels.at[i]);
         const Channel *channel = &channels[wanted->channel];
         columns_name(columns, i, request->channels.at[i], channel->unit);
         columns->at[i].values = wanted->values;
         units[i] = channel->psd_unit;
     }
-    ProgressRange range = progress_range(journey->progress, 0.9, 0.1);
+    ProgressRange range = progress_range(context->progress, 0.9, 0.1);
     const Progress progress = progress_range_view(&range);
     const SpectrumSettings settings = {(size_t)request->segment, (size_t)request->overlap,
                                        request->window, request->detrend};
-    return spectrum_welch(columns, units, journey->plan->sample_rate, &settings, &progress,
-                          stock(journey), &journey->outcome->spectrum, problem);
+    Spectrum *spectrum = &context->outcome->spectrum;
+    TRY(spectrum_welch(columns, units, context->plan->sample_rate, &settings, &progress,
+                       context->transforms, spectrum, problem));
+    context->outcome->work.spectrum_segments = spectrum->segments * spectrum->densities.count;
+    return STATUS_OK;
 }
 
-// Modes left out are wrong from the start; by how much is only foretold.
-static void add_given_up(const Plan *plan, Response *response) {
+// The error of modes left out is predicted, because the run cannot measure it.
+static void run_add_given_up(const Plan *plan, Response *response) {
     response->given_up = plan->given_up;
     if (!plan->is_truncated || !response->has_trust)
         return;
@@ -178,36 +269,31 @@ static void add_given_up(const Plan *plan, Response *response) {
         response->trust_horizon = 0;
 }
 
-static void summarize(Outcome *outcome) {
+// Finite inputs may have products that overflow.
+static Status run_summarize(Outcome *outcome, Problem *problem) {
     const Response *response = &outcome->response;
     const double count = (double)response->statistics_count;
-    outcome->summary =
-        (Summary){.peak_displacement = response->peaks.displacement,
-                  .rms_displacement = sqrt(response->sum_squares_displacement / count),
-                  .peak_acceleration = response->peaks.acceleration,
-                  .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
-                  .impacts = response->impact_count,
-                  .peak_contact_force = response->peaks.contact_force,
-                  .energy_residual = response->energy.residual,
-                  .error_estimate = response->has_trust ? response->error_estimate : NAN,
-                  .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
-}
-
-// Finite inputs can still be too large for their products.
-static Status check_finite(const Outcome *outcome, Problem *problem) {
-    const Summary *summary = &outcome->summary;
-    const double all = summary->peak_displacement + summary->rms_displacement +
-                       summary->peak_acceleration + summary->rms_acceleration +
-                       summary->peak_contact_force + summary->energy_residual;
-    if (isfinite(all))
+    Summary *summary = &outcome->summary;
+    *summary = (Summary){.peak_displacement = response->peaks.displacement,
+                         .rms_displacement = sqrt(response->sum_squares_displacement / count),
+                         .peak_acceleration = response->peaks.acceleration,
+                         .rms_acceleration = sqrt(response->sum_squares_acceleration / count),
+                         .impacts = response->impact_count,
+                         .peak_contact_force = response->peaks.contact_force,
+                         .energy_residual = response->energy.residual,
+                         .error_estimate = response->has_trust ? response->error_estimate : NAN,
+                         .trust_horizon = response->has_trust ? response->trust_horizon : NAN};
+    if (isfinite(summary->peak_displacement + summary->rms_displacement +
+                 summary->peak_acceleration + summary->rms_acceleration +
+                 summary->peak_contact_force + summary->energy_residual))
         return STATUS_OK;
     return problem_set(problem, STATUS_UNSTABLE,
                        "the scene's numbers are too large: peaks or energies leave what double "
                        "precision can hold");
 }
 
-// Where the speeds are counted that meet stops with a range of them.
-static Status make_approaches(const Scene *scene, Response *response, Problem *problem) {
+// Counters of approach speeds, for stops whose buffer was measured over a range of speeds.
+static Status run_make_approaches(const Scene *scene, Response *response, Problem *problem) {
     const size_t stops = 2 * scene->dampers.count;
     for (size_t i = 0; i < stops; i++) {
         double from, to;
@@ -223,151 +309,95 @@ static Status make_approaches(const Scene *scene, Response *response, Problem *p
     return STATUS_OK;
 }
 
-// By the solver, or without it where nothing moves.
-static Status solve(Journey *journey, Run *run, const Regime *regime, Problem *problem) {
-    const Solver *solver = choice_solver(journey->simulation);
-    Outcome *outcome = journey->outcome;
-    run->is_clear = regime->is_clear;
-    if (regime->is_at_rest)
-        TRY(rest_run(run, &outcome->response, problem));
-    else
-        TRY(solver->run(run, &outcome->response, problem));
-    outcome->steps = run->steps;
-    outcome->work = run->work;
-    outcome->work.base_samples = journey->base.count;
-    outcome->work.channel_values = run->column_count * journey->plan->count;
-    return STATUS_OK;
-}
-
-static Status travel(Journey *journey, Problem *problem) {
-    const Simulation *simulation = journey->simulation;
-    const Scene *scene = &simulation->scene;
-    Outcome *outcome = journey->outcome;
-    TRY(make_plan(simulation, &journey->plan, problem));
-    const Span span = {.duration = scene->duration,
-                       .sample_rate = scene->sample_rate,
-                       .most = journey->limits == NULL ? 0 : journey->limits->samples,
-                       .transforms = stock(journey)};
-    const Excitation *excitation = scene_excitation(scene);
-    ProgressRange making = progress_range(journey->progress, 0, 0.2),
-                  solving = progress_range(journey->progress, 0.2, 0.7);
-    const Progress making_watch = progress_range_view(&making),
-                   solving_watch = progress_range_view(&solving);
-    TRY(excitation_kind(excitation)
-            ->make(excitation, &span, &making_watch, &journey->base, problem));
-    still(&journey->base);
-    const Regime regime = regime_find(journey->plan, &journey->base);
-    Run run = {.plan = journey->plan,
-               .base = &journey->base,
-               .progress = &solving_watch,
-               .accuracy = choice_settings(simulation),
-               .workspace = journey->workspace,
+// Runs the solver, or only fills the response if nothing moves.
+static Status run_solve(RunContext *context, const Regime *regime, Workspace *workspace,
+                        Problem *problem) {
+    const Simulation *simulation = context->simulation;
+    const SimulationLimits *limits = context->limits;
+    Outcome *outcome = context->outcome;
+    ProgressRange range = progress_range(context->progress, 0.2, 0.7);
+    const Progress progress = progress_range_view(&range);
+    Run run = {.plan = context->plan,
+               .base = &context->base,
+               .progress = &progress,
+               .accuracy = simulation_settings(simulation),
+               .workspace = workspace,
+               .columns = context->wanted,
+               .column_count = context->wanted_count,
                .statistics_from = simulation->output.statistics_from,
-               .impacts_max = journey->limits == NULL ? 0 : journey->limits->impacts,
-               .steps_max =
-                   journey->limits == NULL ? 0 : SIMULATION_PATIENCE * journey->limits->steps};
-    journey->wanted =
-        calloc(simulation->output.channels.count + simulation->output.psd.channels.count + 1,
-               sizeof *journey->wanted);
-    if (journey->wanted == NULL)
+               .impacts_max = limits == NULL ? 0 : limits->impacts,
+               .steps_max = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps,
+               .is_clear = regime->is_clear};
+    if (regime->is_at_rest)
+        TRY(rest_run(&run, &outcome->response, problem));
+    else
+        TRY(simulation_solver(simulation)->run(&run, &outcome->response, problem));
+    outcome->steps = run.steps;
+    outcome->work = run.work;
+    outcome->work.base_samples = context->base.count;
+    outcome->work.channel_values = run.column_count * context->plan->count;
+    return STATUS_OK;
+}
+
+static Status run_all(RunContext *context, Workspace *workspace, Problem *problem) {
+    const Simulation *simulation = context->simulation;
+    const Output *output = &simulation->output;
+    Outcome *outcome = context->outcome;
+    TRY(run_make_plan(simulation, &context->plan, problem));
+    ProgressRange range = progress_range(context->progress, 0, 0.2);
+    const Progress progress = progress_range_view(&range);
+    TRY(run_make_base(simulation, context->limits == NULL ? 0 : context->limits->samples,
+                      context->transforms, &progress, &context->base, problem));
+    const Regime regime = regime_find(context->plan, &context->base);
+    context->wanted =
+        calloc(output->channels.count + output->psd.channels.count + 1, sizeof *context->wanted);
+    if (context->wanted == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
-    TRY(make_columns(journey, &simulation->output.channels, &outcome->response.series, problem));
-    TRY(make_columns(journey, &simulation->output.psd.channels, &journey->hidden, problem));
-    run.columns = journey->wanted;
-    run.column_count = journey->wanted_count;
-    outcome->response.is_unlisted = !simulation->output.impacts;
-    TRY(make_approaches(scene, &outcome->response, problem));
-    TRY(solve(journey, &run, &regime, problem));
-    add_given_up(journey->plan, &outcome->response);
-    summarize(outcome);
-    TRY(check_finite(outcome, problem));
-    if (caution_warn(scene, &journey->plan->report.derived, outcome) != STATUS_OK)
+    TRY(run_make_columns(context, &output->channels, &outcome->response.series, problem));
+    TRY(run_make_columns(context, &output->psd.channels, &context->hidden, problem));
+    outcome->response.is_unlisted = !output->impacts;
+    TRY(run_make_approaches(&simulation->scene, &outcome->response, problem));
+    TRY(run_solve(context, &regime, workspace, problem));
+    run_add_given_up(context->plan, &outcome->response);
+    TRY(run_summarize(outcome, problem));
+    PlanReport *report = &context->plan->report;
+    if (scene_warnings_of_result(&simulation->scene, &report->derived, outcome) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
-    TRY(make_spectrum(journey, problem));
-    outcome->work.spectrum_segments =
-        outcome->spectrum.segments * outcome->spectrum.densities.count;
-    if (omissions_tell(simulation, choice_solver(simulation), journey->plan, &regime,
-                       &journey->plan->report.decisions) != STATUS_OK)
+    TRY(run_spectrum(context, problem));
+    if (omissions_add(simulation, context->plan, &regime) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
-    outcome->plan = journey->plan->report;
-    memset(&journey->plan->report, 0, sizeof journey->plan->report);
+    outcome->plan = *report;
+    *report = (PlanReport){0};
     return STATUS_OK;
 }
 
-static Status run_once(const Simulation *simulation, const SimulationLimits *limits,
-                       const Progress *progress, Workspace *workspace, Outcome **outcome,
-                       Problem *problem) {
-    if (aim_is_asked(simulation))
-        return aim_run(simulation, limits, progress, workspace, outcome, problem);
-    Outcome *made = outcome_new();
-    if (made == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome");
-    Journey journey = {.simulation = simulation,
-                       .limits = limits,
-                       .progress = progress,
-                       .workspace = workspace,
-                       .outcome = made};
-    const Status status = travel(&journey, problem);
-    free(journey.transformed.at); // its values are the other columns'
-    free(journey.units);
-    free(journey.wanted);
-    columns_clear(&journey.hidden);
-    base_clear(&journey.base);
-    plan_free(journey.plan);
-    if (status != STATUS_OK) {
-        outcome_unref(made);
-        return status;
-    }
-    *outcome = made;
-    return STATUS_OK;
-}
-
-Outcome *outcome_new(void) {
-    Held *held = calloc(1, sizeof *held);
-    if (held == NULL)
-        return NULL;
-    atomic_init(&held->holds, 1);
-    return &held->outcome;
-}
-
-Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Progress *progress, Workspace *workspace, Outcome **outcome,
-                      Problem *problem) {
-    static const double share = 0.8; // of the whole, where the scene without dampers follows
-    *outcome = NULL;
-    if (!simulation->output.reduction)
-        return run_once(simulation, limits, progress, workspace, outcome, problem);
-    ProgressRange first = progress_range(progress, 0, share),
-                  second = progress_range(progress, share, 1 - share);
-    const Progress own = progress_range_view(&first), bare = progress_range_view(&second);
-    TRY(run_once(simulation, limits, &own, workspace, outcome, problem));
-    const Status status = bare_compare(simulation, limits, &bare, workspace, *outcome, problem);
-    if (status != STATUS_OK) {
-        outcome_unref(*outcome);
-        *outcome = NULL;
-    }
+Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
+                 const Progress *progress, Workspace *workspace, RunInputs *inputs,
+                 Outcome **outcome, Problem *problem) {
+    RunContext context = {.simulation = simulation,
+                          .limits = limits,
+                          .progress = progress,
+                          .transforms = workspace == NULL ? NULL : &workspace->transforms,
+                          .outcome = outcome_new()};
+    const Status status = context.outcome == NULL
+                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for an outcome")
+                              : run_all(&context, workspace, problem);
+    free(context.transformed.at); // its values belong to the other columns
+    free(context.units);
+    free(context.wanted);
+    columns_clear(&context.hidden);
+    if (inputs != NULL)
+        *inputs = (RunInputs){context.plan, context.base};
+    else
+        run_inputs_clear(&(RunInputs){context.plan, context.base});
+    if (status == STATUS_OK)
+        *outcome = context.outcome;
+    else
+        outcome_unref(context.outcome);
     return status;
 }
 
-Outcome *outcome_ref(Outcome *outcome) {
-    atomic_fetch_add(&((Held *)outcome)->holds, 1);
-    return outcome;
-}
-
-void outcome_unref(Outcome *outcome) {
-    if (outcome == NULL || atomic_fetch_sub(&((Held *)outcome)->holds, 1) != 1)
-        return;
-    fields_clear(plan_report_fields, &outcome->plan);
-    response_clear(&outcome->response);
-    spectrum_clear(&outcome->spectrum);
-    warnings_clear(&outcome->warnings);
-    free(outcome);
-}
-
-size_t outcome_bytes(const Outcome *outcome) {
-    const Columns *series = &outcome->response.series, *densities = &outcome->spectrum.densities;
-    return sizeof(Held) +
-           sizeof(double) *
-               (series->count * series->rows + (densities->count + 1) * densities->rows) +
-           outcome->response.impacts.count * sizeof(Impact);
+void run_inputs_clear(RunInputs *inputs) {
+    plan_free(inputs->plan);
+    base_clear(&inputs->base);
 }

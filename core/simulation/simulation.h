@@ -1,5 +1,5 @@
-// The whole journey: from what was asked (Simulation) to what came of it (Outcome).
-// Knows no JSON, files or clock. Used by server/ and tests/.
+// The simulation of one scene: the request (Simulation), its validation, plan and cost, its run and
+// the result (Outcome). Knows no JSON, files or clock.
 #ifndef CORE_SIMULATION_SIMULATION_H
 #define CORE_SIMULATION_SIMULATION_H
 
@@ -12,8 +12,8 @@
 #include "core/solve/solver.h"
 #include "core/solve/workspace.h"
 
-// The engine's name and version; part of every result's id. Changes whenever any bit of any result
-// may.
+// Name and version of the engine, part of the id of every result. It must change with every change
+// that may alter any bit of any result.
 extern const char engine_version[];
 
 // "psd" in the output.
@@ -28,12 +28,12 @@ typedef struct SpectrumRequest {
 typedef struct Output {
     Texts channels;
     SpectrumRequest psd;
-    bool impacts;           // the ledger is kept
-    bool reduction;         // what the dampers save is told
+    bool impacts;           // the list of impacts is kept
+    bool reduction;         // peaks and rms are compared with the scene without dampers
     double statistics_from; // [s]
 } Output;
 
-// What was asked: the API's "scene".
+// The API's "scene".
 typedef struct Simulation {
     Scene scene;
     Variant *accuracy; // an Accuracy
@@ -44,38 +44,44 @@ typedef struct Simulation {
 
 extern const Field simulation_fields[];
 
-// Limits that are the caller's policy.
+// Limits set by the caller; 0: no limit.
 typedef struct SimulationLimits {
-    size_t samples; // per channel; 0: none
-    size_t impacts; // ledger rows; 0: none
-    // Solver steps that a run may be foretold to take; it is refused beyond, and stopped at
-    // SIMULATION_PATIENCE times as many where it was foretold too little. 0: none.
+    size_t samples; // per channel
+    size_t impacts; // listed
+    // Predicted solver steps. A run is refused above this number, and stopped at
+    // SIMULATION_PATIENCE times this number if the prediction was too low.
     double steps;
-    double bytes;  // of memory that a run may be foretold to take; 0: none
-    size_t points; // of a sweep; 0: the usual
+    double bytes;  // predicted memory of a run
+    size_t points; // of a sweep; 0: the default
 } SimulationLimits;
 
 #define SIMULATION_PATIENCE 3
 
-// What callers allow a run unless they are told otherwise.
+// Default limits of a run.
 #define SIMULATION_CPU_SECONDS 60
 #define SIMULATION_BYTES 4e9
 
-void simulation_clear(
-    Simulation *simulation); // fields_clear by another name; defaults by fields_default
+void simulation_clear(Simulation *simulation);
 
-// Judges the whole (rows and what rows cannot see), completes it to its canonical form, and
-// collects warnings (implausible values, a cut segment). Slugs must be resolved before. All faults
-// are added to `problem`; faults already in it, a reader's, fail it too. `limits` and `warnings`
-// may be NULL.
+// Whether accuracy.target asks for the cheapest settings that keep an error.
+bool simulation_has_target(const Simulation *simulation);
+
+// Validates the whole simulation, completes it to its canonical form and collects warnings
+// (implausible values, a shortened segment). Slugs must be resolved before. All faults are added to
+// `problem`; faults that are already in it make the call fail too. `limits` and `warnings` may be
+// NULL.
 Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem);
 
-// The plan alone, for a dry run, of a completed simulation. Cleared by
+// The plan of a completed simulation, without a run. Cleared by
 // fields_clear(plan_report_fields, ...).
 Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
 
-// The numbers people ask for first; NAN is unknown.
+// Warns of dampers whose masses are far from those of the tests that measured their materials.
+// These warnings need no run. STATUS_OK or STATUS_NO_MEMORY.
+Status scene_warnings_of_pairs(const Scene *scene, const DerivedList *derived, Warnings *warnings);
+
+// The main numbers of a result; NAN is unknown.
 typedef struct Summary {
     double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
     uint64_t impacts;
@@ -83,49 +89,48 @@ typedef struct Summary {
 } Summary;
 extern const Field summary_fields[];
 
-// By how much the dampers make the summary's numbers smaller: 1 - with over without, where without
-// is the same scene with no damper. NAN is unknown, as where nothing moves.
+// Reduction of the summary's numbers by the dampers: 1 - with / without dampers. NAN is unknown,
+// for example where nothing moves.
 typedef struct Reduction {
     double peak_displacement_reduction, rms_displacement_reduction, peak_acceleration_reduction,
         rms_acceleration_reduction;
 } Reduction;
 extern const Field reduction_fields[];
 
-// All that a run came to. Frozen once made; counted, because jobs, caches and replies share it.
+// The result of a run. Immutable once made; reference counted, because jobs, caches and replies
+// share it.
 typedef struct Outcome Outcome;
 struct Outcome {
     PlanReport plan;
     Response response; // response.series holds output.channels in that order
-    Spectrum spectrum; // of output.psd; empty where none was asked for
+    Spectrum spectrum; // of output.psd; empty if none was requested
     Summary summary;
-    bool has_reduction; // it was asked for
+    bool has_reduction; // it was requested
     Reduction reduction;
-    Warnings warnings; // what only the run could tell
+    Warnings warnings; // those that depend on the run
     double steps;      // solver steps, counted
-    Work work;         // what was done, kind by kind
+    Work work;         // counted by kind
 };
 
-// Runs a completed simulation. Stops with STATUS_CANCELLED when `progress` says so, with
-// STATUS_LIMIT at limits->impacts and STATUS_UNSTABLE where the numbers leave what doubles can hold
-// or energy comes out of nothing. The Outcome is the caller's one hold on it, freed by the last
-// outcome_unref. `workspace` may be NULL.
+// Runs a completed simulation. Errors: STATUS_CANCELLED when `progress` asks to stop, STATUS_LIMIT
+// at a limit, STATUS_UNSTABLE where numbers overflow or energy appears from nothing. The caller
+// owns one reference to the Outcome. `limits`, `progress` and `workspace` may be NULL.
 Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
                       const Progress *progress, Workspace *workspace, Outcome **outcome,
                       Problem *problem);
-Outcome *
-outcome_new(void); // empty, one hold, for whoever has kept the numbers; NULL without memory
+Outcome *outcome_new(void); // empty, with one reference; NULL without memory
 Outcome *outcome_ref(Outcome *outcome);
 void outcome_unref(Outcome *outcome);
-size_t outcome_bytes(const Outcome *outcome); // of memory, for caches
+size_t outcome_bytes(const Outcome *outcome); // memory in use, for caches
 
-// Expected cost of a completed simulation, before running it.
+// Predicted cost of a run.
 typedef struct Cost {
     double steps;       // solver steps
     double cpu_seconds; // the same as time [s]
-    double bytes;       // of memory while it runs
-    double spectra;     // steps of these, for spectra
-    double base;        // and for making the base's motion
-    bool is_fast;       // most of the rest is for motion within sample intervals
+    double bytes;       // peak memory of the run
+    double spectra;     // the part of `steps` for spectra
+    double base;        // the part of `steps` for the motion of the base
+    bool is_fast;       // motion within sample intervals dominates
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
 

@@ -1,15 +1,14 @@
-// What was asked, judged and completed. Three steps: the rows, what rows cannot see, and only then
-// warnings.
+// The fields of a simulation, and their validation: first each field by its row, then the relations
+// between fields. Completes the simulation to its canonical form.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/accuracy_target.h"
+#include "core/result/metric.h"
 #include "core/simulation/channel_names.h"
-#include "core/simulation/input_warnings.h"
-#include "core/simulation/simulation.h"
-#include "core/solve/solvers.h"
+#include "core/simulation/internal.h"
 
-enum { LABELS = 32, TITLE_BYTES = 200, SEGMENT = 4096 };
+enum { LABELS = 32, TITLE_BYTES = 200 };
 
 // Every channel of 200 storeys and 64 dampers once, and the usual ones.
 enum { CHANNELS = 4 * STRUCTURE_STOREYS + 4 * SCENE_DAMPERS + 2 };
@@ -43,34 +42,19 @@ const Field simulation_fields[] = {
     FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE | FIELD_PAIRS, "for people; change nothing"),
     FIELD_END
 };
-
-const Field summary_fields[] = {
-    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events, of all storeys"),
-    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
-    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events, of all storeys"),
-    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
-    FIELD_COUNT(Summary, impacts, NULL, AT_MIN(0), OPTIONAL, "number of impacts"),
-    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
-    FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
-    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
-    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
-    FIELD_END
-};
-
-const Field reduction_fields[] = {
-    FIELD_REAL(Reduction, peak_displacement_reduction, NULL, ANY, OPTIONAL, "1 - peak_displacement over that without dampers"),
-    FIELD_REAL(Reduction, rms_displacement_reduction, NULL, ANY, OPTIONAL, "1 - rms_displacement over that without dampers"),
-    FIELD_REAL(Reduction, peak_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - peak_acceleration over that without dampers"),
-    FIELD_REAL(Reduction, rms_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - rms_acceleration over that without dampers"),
-    FIELD_END
-};
 // clang-format on
 
 void simulation_clear(Simulation *simulation) {
     fields_clear(simulation_fields, simulation);
 }
 
-static Status check_overlap(const SpectrumRequest *psd, Problem *problem) {
+bool simulation_has_target(const Simulation *simulation) {
+    const Variant *accuracy = simulation->accuracy;
+    return accuracy->kind == &solvers[0]->kind &&
+           !isnan(((const AccuracyAuto *)(const void *)accuracy)->target);
+}
+
+static Status validate_overlap(const SpectrumRequest *psd, Problem *problem) {
     if (psd->segment == COUNT_ABSENT || psd->segment == 0 || psd->overlap == COUNT_ABSENT ||
         psd->overlap < psd->segment)
         return STATUS_OK;
@@ -80,7 +64,7 @@ static Status check_overlap(const SpectrumRequest *psd, Problem *problem) {
 }
 
 // `count` is 0 where the number of samples is not known because of another fault.
-static Status complete_psd(SpectrumRequest *psd, size_t count, Warnings *warnings,
+static Status validate_psd(SpectrumRequest *psd, size_t count, Warnings *warnings,
                            Problem *problem) {
     if (psd->channels.count == 0) {
         psd->segment = psd->overlap = COUNT_ABSENT;
@@ -91,11 +75,11 @@ static Status complete_psd(SpectrumRequest *psd, size_t count, Warnings *warning
         psd->window = WINDOW_HANN;
     if (psd->detrend == CHOICE_ABSENT)
         psd->detrend = DETREND_CONSTANT;
-    TRY(check_overlap(psd, problem));
+    TRY(validate_overlap(psd, problem));
     if (count == 0)
         return STATUS_OK;
     if (psd->segment == COUNT_ABSENT)
-        psd->segment = count < SEGMENT ? count : SEGMENT;
+        psd->segment = count < SPECTRUM_SEGMENT ? count : SPECTRUM_SEGMENT;
     if (psd->segment > count) {
         const bool is_overlap_cut = psd->overlap != COUNT_ABSENT && psd->overlap >= count;
         TRY(warnings_add(warnings, "/output/psd/segment",
@@ -108,16 +92,16 @@ static Status complete_psd(SpectrumRequest *psd, size_t count, Warnings *warning
     }
     if (psd->overlap == COUNT_ABSENT)
         psd->overlap = psd->segment / 2;
-    return check_overlap(psd, problem);
+    return validate_overlap(psd, problem);
 }
 
-static Status complete_output(Simulation *simulation, size_t count, Warnings *warnings,
+static Status validate_output(Simulation *simulation, size_t count, Warnings *warnings,
                               Problem *problem) {
     const Scene *scene = &simulation->scene;
     Output *output = &simulation->output;
     const Status faults[] = {
-        request_channels(scene, &output->channels, false, "/output/channels", problem),
-        request_channels(scene, &output->psd.channels, true, "/output/psd/channels", problem),
+        channel_names_complete(scene, &output->channels, false, "/output/channels", problem),
+        channel_names_complete(scene, &output->psd.channels, true, "/output/psd/channels", problem),
     };
     Status status = faults[0] != STATUS_OK ? faults[0] : faults[1];
     // Statistics need a sample at least.
@@ -130,15 +114,15 @@ static Status complete_output(Simulation *simulation, size_t count, Warnings *wa
                                   "must not be behind the last sample, within [0, %s] s, is %s",
                                   text_real(until, last), text_real(is, output->statistics_from));
     }
-    const Status psd = complete_psd(&output->psd, count, warnings, problem);
+    const Status psd = validate_psd(&output->psd, count, warnings, problem);
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
 // What the solver has no use for is left out.
-static Status complete_solver(Simulation *simulation, Problem *problem) {
+static Status validate_solver(Simulation *simulation, Problem *problem) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     const Scene *scene = &simulation->scene;
-    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    const ContactLaw *law = simulation_law(simulation);
     const bool has_power_law = scene->dampers.count > 0 && law->form == CONTACT_POWER;
     if (solver->forget_unused != NULL)
         solver->forget_unused((Accuracy *)(void *)simulation->accuracy, has_power_law);
@@ -151,7 +135,7 @@ static Status complete_solver(Simulation *simulation, Problem *problem) {
 }
 
 // All modes are as many as storeys, which is what none asked for means.
-static Status complete_modes(const Simulation *simulation, Problem *problem) {
+static Status validate_modes(const Simulation *simulation, Problem *problem) {
     Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     if (accuracy->modes == COUNT_ABSENT)
@@ -167,60 +151,44 @@ static Status complete_modes(const Simulation *simulation, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status complete_accuracy(Simulation *simulation, Problem *problem) {
-    TRY(complete_modes(simulation, problem));
-    if (aim_is_asked(simulation))
-        return aim_complete(simulation, problem);
-    // Without a target it says nothing.
+static Status validate_target(Simulation *simulation, Problem *problem) {
+    static const char pointer[] = "/accuracy/metric";
+    AccuracyAuto *asked = (AccuracyAuto *)(void *)simulation->accuracy;
+    const Scene *scene = &simulation->scene;
+    if (asked->accuracy.modes != COUNT_ABSENT)
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes",
+                                (double)asked->accuracy.modes, NULL,
+                                "a target chooses how many modes are kept: leave one of the two "
+                                "out");
+    if (asked->metric == CHOICE_ABSENT)
+        asked->metric = METRIC_DISPLACEMENT;
+    if (asked->metric == METRIC_PSD && simulation->output.psd.channels.count == 0)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "psd needs spectra: ask for some in /output/psd");
+    if ((asked->metric == METRIC_PEAK_FORCE || asked->metric == METRIC_IMPACTS) &&
+        scene->dampers.count == 0)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "%s needs a damper: the scene has none", metric_names[asked->metric]);
+    if (asked->metric == METRIC_PEAK_FORCE && simulation_law(simulation)->form == CONTACT_IMPULSIVE)
+        return problem_add(problem, STATUS_INVALID, pointer,
+                           "peak_force needs contacts with a force: impulses have none, choose "
+                           "another contact model");
+    return STATUS_OK;
+}
+
+static Status validate_accuracy(Simulation *simulation, Problem *problem) {
+    TRY(validate_modes(simulation, problem));
+    if (simulation_has_target(simulation))
+        return validate_target(simulation, problem);
+    // Without a target the metric has no meaning.
     if (simulation->accuracy->kind == &solvers[0]->kind)
         ((AccuracyAuto *)(void *)simulation->accuracy)->metric = CHOICE_ABSENT;
     return STATUS_OK;
 }
 
-static Status refuse_time(const Simulation *simulation, const Cost *cost,
-                          const SimulationLimits *limits, Problem *problem) {
-    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
-    const double most = limits->steps * SOLVER_STEP;
-    static const char told[] = "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
-    if (2 * cost->spectra > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
-                           ", most of it for spectra", "", most,
-                           "ask for fewer channels or less overlap");
-    if (2 * cost->base > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
-                           ", most of it to make the base's motion", "", most,
-                           "take fewer samples of it, or a shorter duration");
-    if (solver->cost != NULL)
-        return problem_add(problem, STATUS_INVALID, "/accuracy", told, cost->cpu_seconds, " by ",
-                           solver->kind.name, most,
-                           "take longer steps or a larger tolerance, or the solver exact");
-    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
-                            told, cost->cpu_seconds, "", "", most,
-                            cost->is_fast ? "take a shorter one; the structure or the base moves "
-                                            "many times within a sample interval"
-                                          : "take a shorter one, or fewer samples");
-}
-
-// A scene that can be told beforehand to take too much is refused at once.
-static Status check_cost(const Simulation *simulation, const SimulationLimits *limits,
-                         Problem *problem) {
-    if (limits == NULL)
-        return STATUS_OK;
-    const Cost cost = simulation_cost(simulation);
-    if (limits->steps > 0 && !(cost.steps <= limits->steps))
-        return refuse_time(simulation, &cost, limits, problem);
-    if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))
-        return problem_add_real(problem, STATUS_INVALID, "/output/channels",
-                                (double)simulation->output.channels.count, NULL,
-                                "would take about %.3g MB of memory, at most %.4g MB are allowed: "
-                                "ask for fewer channels or samples",
-                                1e-6 * cost.bytes, 1e-6 * limits->bytes);
-    return STATUS_OK;
-}
-
 // Many channels may be more than one scene's share, though each of them has few samples.
-static Status check_values(const Simulation *simulation, const SimulationLimits *limits,
-                           Problem *problem) {
+static Status validate_values(const Simulation *simulation, const SimulationLimits *limits,
+                              Problem *problem) {
     const Output *output = &simulation->output;
     const double samples = (double)scene_sample_count(&simulation->scene);
     const double columns = (double)(output->channels.count + output->psd.channels.count);
@@ -234,7 +202,7 @@ static Status check_values(const Simulation *simulation, const SimulationLimits 
         columns, samples, samples * columns, (double)limits->samples * (CHANNEL_COUNT + 1));
 }
 
-Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
+Status simulation_validate(Simulation *simulation, const SimulationLimits *limits,
                            Warnings *warnings, Problem *problem) {
     const size_t most_samples = limits != NULL ? limits->samples : 0;
     const Status rows = fields_check(simulation_fields, simulation, "", problem);
@@ -242,21 +210,17 @@ Status simulation_complete(Simulation *simulation, const SimulationLimits *limit
     // Faults that the caller met before are among those of the problem.
     const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
     const size_t count = is_sound ? scene_sample_count(&simulation->scene) : 0;
-    Status status = complete_output(simulation, count, warnings, problem);
+    Status status = validate_output(simulation, count, warnings, problem);
     TRY(rows);
     TRY(scene);
     if (problem_concerns(problem, ""))
         return problem->status;
     if (status == STATUS_OK)
-        status = check_values(simulation, limits, problem);
+        status = validate_values(simulation, limits, problem);
     if (status == STATUS_OK)
-        status = complete_solver(simulation, problem);
+        status = validate_solver(simulation, problem);
     if (status == STATUS_OK)
-        status = complete_accuracy(simulation, problem);
-    if (status == STATUS_OK)
-        status = check_cost(simulation, limits, problem);
-    if (status == STATUS_OK && warnings != NULL)
-        status = plausible_warn(simulation, warnings);
+        status = validate_accuracy(simulation, problem);
     return status == STATUS_NO_MEMORY ? problem_set(problem, status, "no memory for warnings")
                                       : status;
 }

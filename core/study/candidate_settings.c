@@ -296,7 +296,7 @@ Status candidate_settings_apply(const Simulation *simulation, const TradeoffPoin
     if (status == STATUS_OK)
         status = candidate_apply_solver(point, target);
     if (status == STATUS_OK && point->contact_model != NULL)
-        status = impulses_take(target, problem);
+        status = impulse_variant_apply(target, problem);
     if (status == STATUS_NO_MEMORY)
         return study_no_memory(problem);
     TRY(status);

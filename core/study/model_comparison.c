@@ -225,7 +225,7 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
         (law->form != CONTACT_LINEAR || scene_contact(&target->scene)->separation == separation))
         return STATUS_OK;
     if (law->form == CONTACT_IMPULSIVE)
-        return impulses_take(target, problem);
+        return impulse_variant_apply(target, problem);
     Variant *contact = variant_new(&law->kind);
     if (contact == NULL)
         return study_no_memory(problem);
@@ -239,7 +239,7 @@ static Status comparison_set_contact(Simulation *target, const ContactLaw *law, 
 static Status comparison_set_channel(const Scene *scene, ChannelId channel, uint64_t storey,
                                      Texts *names, Problem *problem) {
     char name[CHANNEL_NAME];
-    request_channel_name(scene, channel, (size_t)storey, name);
+    channel_names_write(scene, channel, (size_t)storey, name);
     for (size_t i = 0; i < names->count; i++)
         free(names->at[i]);
     names->count = 0;

@@ -13,7 +13,7 @@ static const double similar = 1.25; // times as long is within the noise of a me
 // A point's error; NAN if it was not measured.
 static double pareto_error(const TradeoffPoint *point, int metric) {
     return point->status == TRADEOFF_MEASURED && !isnan(point->cpu_minimum)
-               ? errors_by(&point->errors, metric)
+               ? error_metrics_by(&point->errors, metric)
                : (double)NAN;
 }
 

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/simulation/accuracy_target.h"
 #include "core/solve/solvers.h"
 
 Status study_no_memory(Problem *problem) {
@@ -125,7 +124,7 @@ Status study_run_copy(const Simulation *simulation, Simulation *target, Problem 
 }
 
 Status study_run_fix_solver(Simulation *target, Problem *problem) {
-    if (!aim_is_asked(target))
+    if (!simulation_has_target(target))
         return STATUS_OK;
     Variant *accuracy = variant_new(solver_kinds.at(0));
     if (accuracy == NULL)

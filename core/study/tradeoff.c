@@ -29,7 +29,7 @@ static const Field tradeoff_study_fields[] = {
 
 static const Field tradeoff_reference_fields[] = {
     FIELD_TEXT(TradeoffReference, solver, 0, PRESENCE_OPTIONAL, 0, "solver that the points are compared with"),
-    FIELD_BASE(TradeoffReference, yardstick, yardstick_fields),
+    FIELD_BASE(TradeoffReference, yardstick, reference_summary_fields),
     FIELD_END
 };
 
@@ -169,7 +169,7 @@ static Status tradeoff_run_reference(TradeoffRun *run, Problem *problem) {
     Status status =
         candidate_settings_apply(run->simulation, &exact, run->tools->limits, &simulation, problem);
     if (status == STATUS_OK)
-        status = compare_watch(&simulation, problem);
+        status = error_metrics_request(&simulation, problem);
     if (status == STATUS_OK)
         status = tradeoff_run(run, &simulation, run->tools->limits, batch_steps, &run->reference,
                               problem);
@@ -206,7 +206,7 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
     else
         status = candidate_settings_apply(run->simulation, point, &run->limits, &simulation, fault);
     if (status == STATUS_OK)
-        status = compare_watch(&simulation, fault);
+        status = error_metrics_request(&simulation, fault);
     point->status = status == STATUS_OK ? TRADEOFF_FAILED : TRADEOFF_REFUSED;
     if (status == STATUS_OK)
         status = tradeoff_run(run, &simulation, &run->limits, steps, &outcome, fault);
@@ -216,7 +216,7 @@ static Status tradeoff_measure(TradeoffRun *run, size_t index, Problem *problem)
         const Compared to = tradeoff_compared(outcome, &simulation, has_motion);
         point->status = TRADEOFF_MEASURED;
         point->steps = floor(outcome->steps + 0.5); // parts of one are counted too
-        point->errors = errors_measure(&from, &to);
+        point->errors = error_metrics_measure(&from, &to);
     } else if (study_run_ends_study(status)) {
         (void)problem_set(problem, status, "%s", fault->detail);
     } else {
@@ -295,7 +295,7 @@ static Status tradeoff_run_all(TradeoffRun *run, Problem *problem) {
             run->all += tradeoff_timed_steps(study, run->steps[i]);
     TRY(tradeoff_run_reference(run, problem));
     const Compared reference = tradeoff_compared(run->reference, run->simulation, true);
-    answer->reference.yardstick = yardstick_make(&reference);
+    answer->reference.yardstick = error_metrics_reference(&reference);
     for (size_t i = 0; i < points->count; i++)
         TRY(tradeoff_measure(run, i, problem));
     outcome_unref(run->reference);

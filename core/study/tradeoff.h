@@ -18,7 +18,7 @@ typedef struct TradeoffStudy {
 
 typedef struct TradeoffReference {
     char *solver;
-    Yardstick yardstick;
+    ReferenceSummary yardstick;
 } TradeoffReference;
 
 // The answer.

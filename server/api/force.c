@@ -1,5 +1,6 @@
-// One impact at full detail. The result does not keep it: the scene is run again (closeup.h), at
-// once where that is foretold to be quick, else beside the workers while the request sleeps.
+// One impact at full detail. The result does not keep it: the scene is run again
+// (impact_history.h), at once where that is foretold to be quick, else beside the workers while the
+// request sleeps.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,14 +17,14 @@ static const double wait_most = 60; // [s]
 typedef struct Look {
     StudyRequest inquiry;
     size_t number, points;
-    Closeup closeup;
+    ImpactHistory closeup;
     Status status;
     Problem problem;
 } Look;
 
 static void look_free(void *context) {
     Look *look = context;
-    closeup_clear(&look->closeup);
+    impact_history_clear(&look->closeup);
     study_request_clear(&look->inquiry);
     free(look);
 }
@@ -31,8 +32,8 @@ static void look_free(void *context) {
 // Nobody's limits: the scene was within them when its result was made.
 static void look_run(void *context, const Progress *watch) {
     Look *look = context;
-    look->status = closeup_make(&look->inquiry.simulation, look->number, look->points, NULL, watch,
-                                NULL, &look->closeup, &look->problem);
+    look->status = impact_history_make(&look->inquiry.simulation, look->number, look->points, NULL,
+                                       watch, NULL, &look->closeup, &look->problem);
 }
 
 // The scene of the result, as this engine would run it again.
@@ -68,8 +69,8 @@ static Status read_what(const Request *request, Look *look, Problem *problem) {
                            "impacts.json lists them",
                            text);
     look->number = (size_t)number;
-    return request_count(request, "points", CLOSEUP_POINTS_MIN, CLOSEUP_POINTS_MAX, CLOSEUP_POINTS,
-                         &look->points, problem);
+    return request_count(request, "points", IMPACT_HISTORY_POINTS_MIN, IMPACT_HISTORY_POINTS_MAX,
+                         IMPACT_HISTORY_POINTS, &look->points, problem);
 }
 
 // Of a look that has been taken; its columns become the sheet's.
@@ -118,7 +119,7 @@ static Status go_on(App *app, const Request *request, Reply *reply, const Encode
 
 static Status look_begin(App *app, const Request *request, Reply *reply, const Encoder *encoder,
                          Look *look, Problem *problem) {
-    if (closeup_steps(&look->inquiry.simulation) * SOLVER_STEP <= quick) {
+    if (impact_history_steps(&look->inquiry.simulation) * SOLVER_STEP <= quick) {
         look_run(look, NULL);
         const Status status = reply_look(app, reply, encoder, look, problem);
         look_free(look);

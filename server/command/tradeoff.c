@@ -62,7 +62,7 @@ static void point_print(const Tradeoff *tradeoff, size_t index, int width) {
 
 static void table_print(const Variant *answer) {
     const Tradeoff *tradeoff = (const Tradeoff *)(const void *)answer;
-    const Yardstick *reference = &tradeoff->reference.yardstick;
+    const ReferenceSummary *reference = &tradeoff->reference.yardstick;
     char estimate[24], horizon[24];
     int width = 5;
     for (size_t i = 0; i < tradeoff->points.count; i++)

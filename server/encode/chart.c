@@ -50,7 +50,7 @@ static const char *group_name(const TradeoffPoint *point) {
 }
 
 static double error_of(const Chart *chart, const TradeoffPoint *point) {
-    return errors_by(&point->errors, chart->tradeoff->metric);
+    return error_metrics_by(&point->errors, chart->tradeoff->metric);
 }
 
 static bool is_drawn(const Chart *chart, const TradeoffPoint *point) {

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/base/canonical.h"
-#include "core/simulation/result_warnings.h"
+#include "core/simulation/simulation.h"
 #include "core/study/sweep.h"
 #include "server/base/digest.h"
 #include "server/codec/read.h"
@@ -65,8 +65,8 @@ Status intake_dry_run(Intake *intake, const char *text, size_t size, DryRun *dry
                        &dry_run->warnings, problem));
     intake_result_id(&dry_run->inquiry, dry_run->result);
     TRY(simulation_plan(&dry_run->inquiry.simulation, &dry_run->plan, problem));
-    if (caution_warn_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
-                              &dry_run->warnings) != STATUS_OK)
+    if (scene_warnings_of_pairs(&dry_run->inquiry.simulation.scene, &dry_run->plan.derived,
+                                &dry_run->warnings) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a warning");
     TRY(study_request_cost(&dry_run->inquiry, &intake->settings.limits, &dry_run->cost, problem));
     dry_run->is_cached = store_result_exists(intake->store, dry_run->result);

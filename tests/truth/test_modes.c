@@ -205,7 +205,7 @@ static Drawn draw(uint64_t number, bool has_dampers) {
     problem_clear(&problem);
     (void)read_json(text.at, text.length, simulation_fields, &drawn.simulation, &problem);
     if (simulation_complete(&drawn.simulation, NULL, NULL, &problem) != STATUS_OK ||
-        compare_watch(&drawn.simulation, &problem) != STATUS_OK) {
+        error_metrics_request(&drawn.simulation, &problem) != STATUS_OK) {
         printf("%s: %s\n", problem.count > 0 ? problem.faults[0].pointer : "",
                problem.count > 0 ? problem.faults[0].detail : problem.detail);
         abort();
@@ -271,7 +271,7 @@ static void judge(uint64_t number, bool has_dampers) {
                                     .has_motion = true,
                                     .horizon = all->summary.trust_horizon};
         const Compared point = {.outcome = outcome, .storeys = drawn.storeys, .has_motion = true};
-        const Errors found = errors_measure(&reference, &point);
+        const Errors found = error_metrics_measure(&reference, &point);
         const double errors_found[FORETOLD] = {found.displacement, found.mean_acceleration,
                                                found.rms_displacement};
         const TruncationError *one = &errors[kept - 1];

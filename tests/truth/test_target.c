@@ -165,7 +165,7 @@ static bool scene_make(Simulation *simulation, const char *accuracy) {
     const bool is_good =
         read_json(members, strlen(members), simulation_fields, simulation, problem) == STATUS_OK &&
         simulation_complete(simulation, &limits, NULL, problem) == STATUS_OK &&
-        compare_watch(simulation, problem) == STATUS_OK;
+        error_metrics_request(simulation, problem) == STATUS_OK;
     free(problem);
     return is_good;
 }
@@ -193,8 +193,8 @@ static double error_of(const Outcome *reference, const Outcome *outcome, size_t 
                        int metric) {
     const Compared from = {reference, storeys, true, true, (double)NAN},
                    to = {outcome, storeys, true, true, (double)NAN};
-    const Errors errors = errors_measure(&from, &to);
-    const double error = errors_by(&errors, metric);
+    const Errors errors = error_metrics_measure(&from, &to);
+    const double error = error_metrics_by(&errors, metric);
     return metric == METRIC_PSD ? pow(10, error / 10) - 1 : error;
 }
 

@@ -117,7 +117,8 @@ static void too_few_samples_give_an_interval_that_holds_the_truth(void **state) 
 
 // The contact force of the first impact on the stop of a structure so slow that its spring
 // does nothing in a contact, by the exact solver.
-static void simulate(double restitution, double contact_time, int separation, Closeup *closeup) {
+static void simulate(double restitution, double contact_time, int separation,
+                     ImpactHistory *closeup) {
     Simulation simulation;
     scene_with_damper(&simulation, restitution, contact_time);
     Scene *scene = &simulation.scene;
@@ -132,12 +133,12 @@ static void simulate(double restitution, double contact_time, int separation, Cl
     Problem problem;
     problem_clear(&problem);
     assert_int_equal(simulation_complete(&simulation, NULL, NULL, &problem), STATUS_OK);
-    assert_int_equal(closeup_make(&simulation, 1, 20001, NULL, NULL, NULL, closeup, &problem),
-                     STATUS_OK);
+    assert_int_equal(
+        impact_history_make(&simulation, 1, 20001, NULL, NULL, NULL, closeup, &problem), STATUS_OK);
     fields_clear(simulation_fields, &simulation);
 }
 
-static double force_at(const Closeup *closeup, double time) {
+static double force_at(const ImpactHistory *closeup, double time) {
     const double *times = closeup->columns.at[0].values, *force = closeup->columns.at[1].values;
     size_t low = 0, high = closeup->columns.rows - 1;
     if (time < times[0] || time > times[high])
@@ -158,7 +159,7 @@ static void what_the_core_simulates_is_read_back(void **state) {
     for (int separation = 0; separation < 2; separation++)
         for (size_t i = 0; i < COUNT(restitutions); i++)
             for (size_t j = 0; j < COUNT(times); j++) {
-                Closeup closeup;
+                ImpactHistory closeup;
                 simulate(restitutions[i], times[j], separation, &closeup);
                 for (size_t k = 0; k < COUNT(rates); k++) {
                     double values[400];
@@ -188,7 +189,7 @@ static void what_the_core_simulates_is_read_back(void **state) {
                     worst = fmax(worst, off);
                     trace_analysis_clear(&reading);
                 }
-                closeup_clear(&closeup);
+                impact_history_clear(&closeup);
             }
     print_message("largest error of T_c %.1e\n", worst);
 }

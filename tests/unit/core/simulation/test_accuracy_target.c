@@ -10,7 +10,6 @@
 
 #include "core/base/canonical.h"
 #include "core/result/metric.h"
-#include "core/simulation/accuracy_target.h"
 #include "core/simulation/simulation.h"
 #include "core/solve/solvers.h"
 #include "tests/support/document.h"

@@ -40,7 +40,7 @@ static void outcome_free(Outcome *outcome) {
 static Errors measure(const Outcome *reference, const Outcome *point) {
     const Compared from = {reference, 1, true, true, reference->summary.trust_horizon},
                    to = {point, 1, true, true, (double)NAN};
-    return errors_measure(&from, &to);
+    return error_metrics_measure(&from, &to);
 }
 
 static void the_same_outcome_has_no_error_but_the_references_own(void **state) {
@@ -118,13 +118,13 @@ static void impacts_and_forces_are_those_within_the_horizon(void **state) {
     assert_true(measure(&a, &b).impacts == 2);
     assert_true(fabs(measure(&a, &b).peak_force - 0.25) < 1e-15);
     const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
-    const Yardstick told = yardstick_make(&from);
+    const ReferenceSummary told = error_metrics_reference(&from);
     assert_int_equal(told.impacts, 1);
     assert_true(told.peak_force == 4 && told.trust_horizon == 0.45);
     const Compared impulsive = {&b, 1, true, false, (double)NAN};
-    assert_true(isnan(errors_measure(&from, &impulsive).peak_force));
+    assert_true(isnan(error_metrics_measure(&from, &impulsive).peak_force));
     const Compared shorter = {&b, 1, false, true, (double)NAN};
-    const Errors errors = errors_measure(&from, &shorter);
+    const Errors errors = error_metrics_measure(&from, &shorter);
     assert_true(isnan(errors.displacement) && isnan(errors.mean_acceleration) &&
                 isnan(errors.impacts) && isnan(errors.peak_force) &&
                 isnan(errors.rms_displacement) && errors.psd == 0);
@@ -138,7 +138,7 @@ static void spectra_are_compared_over_the_band_that_holds_the_power(void **state
     Outcome a = outcome_make(101, 100, 51), b = outcome_make(101, 100, 51);
     double *density = b.spectrum.densities.at[0].values;
     const Compared from = {&a, 1, true, true, a.summary.trust_horizon};
-    const Yardstick told = yardstick_make(&from);
+    const ReferenceSummary told = error_metrics_reference(&from);
     assert_true(told.psd_from == 1 && told.psd_to == 9);
     density[0] = 1e6;   // the mean is taken off
     density[40] = 1000; // out of the band

@@ -56,11 +56,11 @@ static double larger(double a, double b) {
 
 static void compare(const Simulation *simulation, const Impacts *impacts, size_t number,
                     size_t points, Misses *misses) {
-    Closeup closeup;
+    ImpactHistory closeup;
     Problem problem;
     problem_clear(&problem);
     const Status status =
-        closeup_make(simulation, number, points, NULL, NULL, NULL, &closeup, &problem);
+        impact_history_make(simulation, number, points, NULL, NULL, NULL, &closeup, &problem);
     if (status != STATUS_OK)
         print_error("impact %zu: %s\n", number, problem.detail);
     assert_int_equal(status, STATUS_OK);
@@ -87,7 +87,7 @@ static void compare(const Simulation *simulation, const Impacts *impacts, size_t
         misses->impulse =
             larger(misses->impulse, fabs(fabs(integral_of(columns)) / impact->impulse - 1));
     }
-    closeup_clear(&closeup);
+    impact_history_clear(&closeup);
 }
 
 // The first few impacts of an example, one in the middle and the last.
@@ -153,10 +153,11 @@ static void every_law_base_and_structure_keeps_peak_and_impulse(void **state) {
     }
 }
 
-static Closeup look(const Simulation *simulation, size_t number, size_t points) {
-    Closeup closeup;
-    assert_int_equal(closeup_make(simulation, number, points, NULL, NULL, NULL, &closeup, NULL),
-                     STATUS_OK);
+static ImpactHistory look(const Simulation *simulation, size_t number, size_t points) {
+    ImpactHistory closeup;
+    assert_int_equal(
+        impact_history_make(simulation, number, points, NULL, NULL, NULL, &closeup, NULL),
+        STATUS_OK);
     return closeup;
 }
 
@@ -164,7 +165,7 @@ static void the_rows_go_from_touch_to_release(void **state) {
     (void)state;
     StudyRequest inquiry;
     open_example("paper_free_sponge", &inquiry);
-    Closeup closeup = look(&inquiry.simulation, 1, CLOSEUP_POINTS);
+    ImpactHistory closeup = look(&inquiry.simulation, 1, IMPACT_HISTORY_POINTS);
     const Column *column = closeup.columns.at;
     const Impact *impact = &closeup.impact;
     const size_t last = closeup.columns.rows - 1;
@@ -181,7 +182,7 @@ static void the_rows_go_from_touch_to_release(void **state) {
         assert_true(fabs(column[1].values[i] - k * column[2].values[i] - c * column[3].values[i]) <
                     1e-5);
     }
-    closeup_clear(&closeup);
+    impact_history_clear(&closeup);
     study_request_clear(&inquiry);
 }
 
@@ -203,22 +204,23 @@ static void a_rest_has_a_force_too(void **state) {
     size_t number = impacts->count;
     assert_true(number > 1);
     assert_int_equal(impacts->at[number - 1].kind, IMPACT_RESTING);
-    Closeup closeup = look(simulation, number, 101);
+    ImpactHistory closeup = look(simulation, number, 101);
     assert_in_range(closeup.columns.rows, 98, 103);
     const double *force = closeup.columns.at[1].values;
     assert_true(fabs(force[closeup.columns.rows - 1] - 0.1107 * 2) < 1e-6);
-    closeup_clear(&closeup);
+    impact_history_clear(&closeup);
     outcome_unref(outcome);
     study_request_clear(&inquiry);
 }
 
 static void assert_refused(const Simulation *simulation, size_t number, Status expected,
                            const char *words) {
-    Closeup closeup;
+    ImpactHistory closeup;
     Problem problem;
     problem_clear(&problem);
-    assert_int_equal(closeup_make(simulation, number, 401, NULL, NULL, NULL, &closeup, &problem),
-                     expected);
+    assert_int_equal(
+        impact_history_make(simulation, number, 401, NULL, NULL, NULL, &closeup, &problem),
+        expected);
     assert_non_null(strstr(problem.detail, words));
     assert_int_equal(closeup.columns.count, 0);
 }
@@ -234,10 +236,10 @@ static void what_is_not_there_is_told(void **state) {
     open_example("paper_free_sponge", &inquiry);
     assert_refused(&inquiry.simulation, 0, STATUS_NOT_FOUND, "from 1 to 22");
     assert_refused(&inquiry.simulation, 23, STATUS_NOT_FOUND, "from 1 to 22");
-    Closeup closeup;
+    ImpactHistory closeup;
     const Progress progress = {NULL, never};
     assert_int_equal(
-        closeup_make(&inquiry.simulation, 1, 401, NULL, &progress, NULL, &closeup, NULL),
+        impact_history_make(&inquiry.simulation, 1, 401, NULL, &progress, NULL, &closeup, NULL),
         STATUS_CANCELLED);
     study_request_clear(&inquiry);
     open_example("paper_free_impulse_sponge", &inquiry);

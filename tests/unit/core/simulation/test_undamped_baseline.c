@@ -1,5 +1,5 @@
 // What dampers save: the summary's numbers of two runs, one without dampers, told by one.
-#include "core/simulation/undamped_baseline.h"
+#include "core/simulation/internal.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -58,7 +58,7 @@ static void the_rest_is_as_without_it_and_its_cost_is_foretold(void **state) {
                         a->response.series.count * a->response.series.rows * sizeof(double));
     assert_true(a->steps > b->steps);
     const Cost dear = simulation_cost(&asked), cheap = simulation_cost(&plain),
-               bare = bare_cost(&asked);
+               bare = undamped_baseline_cost(&asked);
     assert_true(bare.steps > 0 && dear.steps == cheap.steps + bare.steps);
     outcome_unref(a);
     outcome_unref(b);

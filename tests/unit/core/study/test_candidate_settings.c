@@ -37,8 +37,7 @@ static void complete(Simulation *simulation) {
 static TradeoffPoints make(const Simulation *simulation) {
     const Texts all = {NULL, 0};
     TradeoffPoints points;
-    assert_int_equal(candidate_settings_list(&all, simulation, &points, &problem),
-                     STATUS_OK);
+    assert_int_equal(candidate_settings_list(&all, simulation, &points, &problem), STATUS_OK);
     return points;
 }
 
@@ -250,7 +249,7 @@ static void what_a_point_does_not_name_stays_the_scenes(void **state) {
     assert_int_equal(target.output.psd.segment, 100);
     assert_int_equal(target.output.psd.overlap, 50);
     assert_int_equal(target.output.channels.count, simulation.output.channels.count);
-    assert_int_equal(compare_watch(&target, &problem), STATUS_OK);
+    assert_int_equal(error_metrics_request(&target, &problem), STATUS_OK);
     assert_int_equal(target.output.channels.count, 2);
     assert_string_equal(target.output.channels.at[0], "displacement");
     assert_string_equal(target.output.channels.at[1], "mean_acceleration");

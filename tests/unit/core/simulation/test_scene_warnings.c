@@ -1,7 +1,8 @@
-// What a result warns of once it is known.
+// Warnings of implausible values, and those that depend on the result.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +14,109 @@
 #include "core/simulation/simulation.h"
 #include "tests/support/fields.h"
 #include "tests/support/scenes.h"
+#include "tests/support/verdict.h"
+
+static Verdict seen;
+
+static Status complete(Simulation *simulation) {
+    return verdict_complete(&seen, simulation);
+}
+
+static Damper *damper_of(Simulation *simulation) {
+    return &simulation->scene.dampers.at[0];
+}
+
+static StructureSdof *sdof_of(Simulation *simulation) {
+    return (StructureSdof *)(void *)simulation->scene.structure;
+}
+
+static void implausible_values_get_a_warning_each(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 25);
+    damper_of(&simulation)->clearance = 15;
+    damper_of(&simulation)->position = -2;
+    damper_of(&simulation)->mass = 110.7;
+    sdof_of(&simulation)->damping = (double)NAN;
+    sdof_of(&simulation)->structure.damping_ratio = 1.6;
+    simulation.scene.duration = 0.1;
+    simulation.scene.sample_rate = 5;
+    scene_start(&simulation, -15, 0);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_string_equal(verdict_warning(&seen, "/dampers/0/clearance"),
+                        "is 15 m, more than 1 m: metres are meant, not millimetres");
+    verdict_begins(verdict_warning(&seen, "/dampers/0/position"), "is -2 m");
+    assert_string_equal(verdict_warning(&seen, "/dampers/0/mass"),
+                        "is 110.7 kg, more than the structure's 1.35 kg");
+    assert_string_equal(verdict_warning(&seen, "/dampers/0/buffer/contact_time"),
+                        "is 25 s, more than 1 s: seconds are meant, not milliseconds");
+    assert_string_equal(verdict_warning(&seen, "/structure/damping_ratio"),
+                        "is 1.6, more than 1: a ratio is meant, not percent");
+    verdict_begins(verdict_warning(&seen, "/excitation/displacement"), "is -15 m, more than 1 m");
+    verdict_begins(verdict_warning(&seen, "/duration"), "is 0.1 s, less than one period");
+    verdict_begins(verdict_warning(&seen, "/sample_rate"), "is 5 Hz, fewer than two samples");
+    assert_int_equal(seen.warnings.count, 8);
+    simulation_clear(&simulation);
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_choose(&simulation.scene.excitation, &excitation_kinds, "random");
+    Variant *random = simulation.scene.excitation;
+    *(Reals *)variant_member(random, "band") = reals_of(2, (const double[]){0, 15});
+    *(double *)variant_member(random, "rms") = 981;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    verdict_begins(verdict_warning(&seen, "/excitation/rms"), "is 981 m/s^2, more than 100 m/s^2");
+    simulation_clear(&simulation);
+}
+
+static void what_an_excitation_doubts_of_itself_becomes_a_warning(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_choose(&simulation.scene.excitation, &excitation_kinds, "half_sine");
+    *(double *)variant_member(simulation.scene.excitation, "amplitude") = 1;
+    *(double *)variant_member(simulation.scene.excitation, "length") = 1e-3;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(seen.warnings.count, 1);
+    verdict_begins(verdict_warning(&seen, "/excitation/length"),
+                   "is 0.001 s, less than two samples");
+    simulation_clear(&simulation);
+}
+
+static void a_scene_in_which_nothing_moves_gets_a_warning(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    scene_start(&simulation, 0, 0);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    verdict_begins(verdict_warning(&seen, "/excitation"),
+                   "is free vibration from rest: nothing will move");
+    assert_int_equal(seen.warnings.count, 1);
+    verdict_clear(&seen);
+    scene_start(&simulation, 0, 0.1);
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(seen.warnings.count, 0);
+    scene_start(&simulation, 0, 0);
+    damper_of(&simulation)->velocity = 0.1;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(seen.warnings.count, 0);
+    simulation_clear(&simulation);
+}
+
+static void a_structure_without_a_spring_has_no_period_to_warn_of(void **state) {
+    (void)state;
+    Simulation simulation;
+    scene_with_damper(&simulation, 0.61, 0.025);
+    sdof_of(&simulation)->stiffness = 0;
+    simulation.scene.duration = 1e-3;
+    assert_int_equal(complete(&simulation), STATUS_OK);
+    assert_int_equal(seen.warnings.count, 0);
+    simulation_clear(&simulation);
+}
+
+static int teardown(void **state) {
+    (void)state;
+    verdict_clear(&seen);
+    return 0;
+}
 
 static Problem problem;
 
@@ -315,6 +419,10 @@ a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene(void 
 int main(void) {
     fourier_start();
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(implausible_values_get_a_warning_each),
+        cmocka_unit_test(what_an_excitation_doubts_of_itself_becomes_a_warning),
+        cmocka_unit_test(a_scene_in_which_nothing_moves_gets_a_warning),
+        cmocka_unit_test(a_structure_without_a_spring_has_no_period_to_warn_of),
         cmocka_unit_test(impacts_outside_a_table_are_told_under_every_form_of_law),
         cmocka_unit_test(speeds_between_the_first_row_and_the_last_are_not_told),
         cmocka_unit_test(each_stop_of_each_damper_has_its_own_table),
@@ -326,5 +434,5 @@ int main(void) {
             a_test_with_other_masses_is_told_where_its_numbers_are_taken_for_the_scene),
         cmocka_unit_test(a_full_ledger_counts_all_and_a_fuller_one_gives_no_result),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, teardown);
 }

@@ -1,0 +1,84 @@
+// Functions shared by the files of core/simulation. Calls go from simulation.c down to
+// undamped_baseline.c, accuracy_target.c, run.c, cost_model.c and validate.c, never up.
+#ifndef CORE_SIMULATION_INTERNAL_H
+#define CORE_SIMULATION_INTERNAL_H
+
+#include "core/simulation/simulation.h"
+#include "core/solve/solvers.h"
+
+enum { SPECTRUM_SEGMENT = 4096 }; // default length [samples]
+
+// The solver that runs: "auto" is exact.
+static inline const Solver *simulation_solver(const Simulation *simulation) {
+    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
+    return solver->run != NULL ? solver : &solver_exact;
+}
+
+// Settings of the solver that runs; NULL: its defaults, since those of "auto" are not its own.
+static inline const Accuracy *simulation_settings(const Simulation *simulation) {
+    const Variant *accuracy = simulation->accuracy;
+    return accuracy->kind == &simulation_solver(simulation)->kind
+               ? (const Accuracy *)(const void *)accuracy
+               : NULL;
+}
+
+// Number of modes that a run keeps.
+static inline size_t simulation_modes(const Simulation *simulation, size_t storeys) {
+    return accuracy_modes((const Accuracy *)(const void *)simulation->accuracy, storeys);
+}
+
+// Interval between the samples of the base motion; 0: it has a closed form [s].
+static inline double simulation_base_interval(const Simulation *simulation) {
+    const Excitation *excitation = scene_excitation(&simulation->scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    return kind->interval == NULL ? 0 : kind->interval(excitation);
+}
+
+static inline const ContactLaw *simulation_law(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    return dampers_contact_law(&scene->dampers, scene_contact(scene));
+}
+
+// simulation_complete without a check of the cost and without warnings of implausible values.
+Status simulation_validate(Simulation *simulation, const SimulationLimits *limits,
+                           Warnings *warnings, Problem *problem);
+
+// Warns of implausible values of a completed simulation. STATUS_OK or STATUS_NO_MEMORY.
+Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings);
+// Adds to the outcome the warnings that depend on its response and summary. Same status.
+Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, Outcome *outcome);
+
+// Plan, cost and run of a completed simulation that has no accuracy target. `output.reduction` is
+// ignored.
+Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
+Cost cost_scene(const Simulation *simulation);
+
+// Plan and base motion of a run.
+typedef struct RunInputs {
+    Plan *plan; // its report has moved to the outcome
+    Base base;
+} RunInputs;
+
+// `inputs`, if not NULL, receives the plan and base of the run, also after a failure. They are
+// cleared by run_inputs_clear.
+Status run_scene(const Simulation *simulation, const SimulationLimits *limits,
+                 const Progress *progress, Workspace *workspace, RunInputs *inputs,
+                 Outcome **outcome, Problem *problem);
+void run_inputs_clear(RunInputs *inputs);
+
+// The same of a simulation with an accuracy target.
+Status accuracy_target_plan(const Simulation *simulation, PlanReport *report, Problem *problem);
+Cost accuracy_target_cost(const Simulation *simulation);
+// `settled`, if not NULL, receives the simulation with the settings of the last run and without a
+// target. It is cleared by simulation_clear, also after a failure.
+Status accuracy_target_run(const Simulation *simulation, const SimulationLimits *limits,
+                           const Progress *progress, Workspace *workspace, Simulation *settled,
+                           Outcome **outcome, Problem *problem);
+
+// Runs the scene without its dampers, compares the outcome's summary with it and adds its work.
+Status undamped_baseline_run(const Simulation *simulation, const SimulationLimits *limits,
+                             const Progress *progress, Workspace *workspace, Outcome *outcome,
+                             Problem *problem);
+Cost undamped_baseline_cost(const Simulation *simulation);
+
+#endif

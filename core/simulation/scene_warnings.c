@@ -1,0 +1,360 @@
+// Warnings that a result should be read with. Those of the input: values that are allowed but
+// implausible (millimetres for metres, percent for a ratio). Single values are checked by a table
+// over the names of their fields, which mean the same everywhere; the rest are relations between
+// two parts. Those of the result: the error of modes left out, the time to which rounding or the
+// solver's steps leave the trajectory valid, and the distance of impacts and masses from those with
+// which the buffers were measured. Every impact of a successful run has its speed counted.
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/base/side.h"
+#include "core/contact/contact.h"
+#include "core/simulation/internal.h"
+
+typedef struct TypicalLimit {
+    const char *name; // of a REAL row
+    double max;       // typical magnitude at most, in the row's unit
+    const char *hint;
+} TypicalLimit;
+
+static const TypicalLimit typical[] = {
+    {"clearance", 1, "metres are meant, not millimetres"},
+    {"offset", 1, "metres are meant, not millimetres"},
+    {"position", 1, "metres are meant, not millimetres"},
+    {"displacement", 1, "metres are meant, not millimetres"},
+    {"velocity", 100, "metres per second are meant"},
+    {"contact_time", 1, "seconds are meant, not milliseconds"},
+    {"interval", 1, "seconds are meant, not milliseconds"},
+    {"damping_ratio", 1, "a ratio is meant, not percent"},
+    {"rms", 100, "m/s^2 are meant, not cm/s^2"},
+};
+
+static const TypicalLimit *scene_warnings_find_limit(const char *name) {
+    for (size_t i = 0; i < COUNT(typical); i++)
+        if (strcmp(typical[i].name, name) == 0)
+            return &typical[i];
+    return NULL;
+}
+
+static Status scene_warnings_of_real(const Field *field, double value, const char *pointer,
+                                     Warnings *warnings) {
+    const TypicalLimit *limit = scene_warnings_find_limit(field->name);
+    if (limit == NULL || !(fabs(value) > limit->max))
+        return STATUS_OK;
+    char is[32], most[32];
+    const char *space = field->unit != NULL ? " " : "";
+    const char *unit = field->unit != NULL ? field->unit : "";
+    return warnings_add(warnings, pointer, "is %s%s%s, more than %s%s%s: %s", text_real(is, value),
+                        space, unit, text_real(most, limit->max), space, unit, limit->hint);
+}
+
+static Status scene_warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
+                                      Warnings *warnings) {
+    if (reals->count == 1)
+        return scene_warnings_of_real(field, reals->at[0], pointer, warnings);
+    for (size_t i = 0; i < reals->count && scene_warnings_find_limit(field->name) != NULL; i++) {
+        char place[sizeof((Fault){0}.pointer)];
+        pointer_index(place, sizeof place, pointer, i);
+        TRY(scene_warnings_of_real(field, reals->at[i], place, warnings));
+    }
+    return STATUS_OK;
+}
+
+static Status scene_warnings_of_rows(const Field *fields, const void *item, const char *pointer,
+                                     Warnings *warnings) {
+    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
+        const void *member = (const char *)item + field->offset;
+        char place[sizeof((Fault){0}.pointer)];
+        if (field->kind == FIELD_KIND_BASE) {
+            TRY(scene_warnings_of_rows(field->fields, member, pointer, warnings));
+            continue;
+        }
+        if ((field->flags & FIELD_HIDDEN) != 0)
+            continue;
+        pointer_join(place, sizeof place, pointer, field->name);
+        if (field->kind == FIELD_KIND_REALS) {
+            TRY(scene_warnings_of_reals(field, member, place, warnings));
+        } else if (field->kind == FIELD_KIND_REAL) {
+            TRY(scene_warnings_of_real(field, *(const double *)member, place, warnings));
+        } else if (field->kind == FIELD_KIND_ITEM) {
+            TRY(scene_warnings_of_rows(field->fields, member, place, warnings));
+        } else if (field->kind == FIELD_KIND_VARIANT) {
+            const Variant *variant = *(Variant *const *)member;
+            if (variant != NULL)
+                TRY(scene_warnings_of_rows(variant->kind->fields, variant, place, warnings));
+        } else if (field->kind == FIELD_KIND_LIST) {
+            List list;
+            memcpy(&list, member, sizeof list);
+            for (size_t i = 0; i < list.count; i++) {
+                char element[sizeof((Fault){0}.pointer)];
+                pointer_index(element, sizeof element, place, i);
+                TRY(scene_warnings_of_rows(field->fields, (const char *)list.at + i * field->size,
+                                           element, warnings));
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
+static Status scene_warnings_of_times(const Scene *scene, Warnings *warnings) {
+    StructureRates rates;
+    TRY(structure_rates(scene_structure(scene), &rates));
+    if (!(rates.slowest > 0))
+        return STATUS_OK;
+    const double frequency = rates.slowest / (2 * 3.14159265358979323846);
+    char is[32];
+    if (scene->duration * frequency < 1)
+        TRY(warnings_add(warnings, "/duration",
+                         "is %s s, less than one period of the structure, %.3g s",
+                         text_real(is, scene->duration), 1 / frequency));
+    if (scene->sample_rate < 2 * frequency)
+        TRY(warnings_add(warnings, "/sample_rate",
+                         "is %s Hz, fewer than two samples in a period of the structure, %.3g s",
+                         text_real(is, scene->sample_rate), 1 / frequency));
+    return STATUS_OK;
+}
+
+// A damper outweighs what it stands on.
+static Status scene_warnings_of_masses(const Scene *scene, Warnings *warnings) {
+    const Structure *structure = scene_structure(scene);
+    for (size_t i = 0; i < scene->dampers.count; i++) {
+        const Damper *on = &scene->dampers.at[i];
+        const double mass = on->mass;
+        double moved;
+        TRY(structure_kind(structure)->moved_mass(structure, (size_t)on->storey - 1, &moved));
+        if (mass <= moved)
+            continue;
+        char damper[64], place[sizeof((Fault){0}.pointer)], is[32], than[32];
+        pointer_index(damper, sizeof damper, "/dampers", i);
+        pointer_join(place, sizeof place, damper, "mass");
+        TRY(warnings_add(warnings, place, "is %s kg, more than the %s's %s kg", text_real(is, mass),
+                         structure_storeys(structure) > 1 ? "storey" : "structure",
+                         text_real(than, moved)));
+    }
+    return STATUS_OK;
+}
+
+// What the excitation's kind alone can judge.
+static Status scene_warnings_of_excitation(const Scene *scene, Warnings *warnings) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    if (kind->doubt == NULL || warnings == NULL)
+        return STATUS_OK;
+    const Span span = {.duration = scene->duration, .sample_rate = scene->sample_rate};
+    Problem doubts;
+    problem_clear(&doubts);
+    kind->doubt(excitation, &span, "/excitation", &doubts);
+    for (size_t i = 0; i < doubts.count && i < PROBLEM_FAULTS; i++)
+        TRY(warnings_add(warnings, doubts.faults[i].pointer, "%s", doubts.faults[i].detail));
+    return STATUS_OK;
+}
+
+static bool scene_warnings_are_zero(const Reals *reals) {
+    for (size_t i = 0; i < reals->count; i++)
+        if (reals->at[i] != 0)
+            return false;
+    return true;
+}
+
+// The default excitation is free vibration from rest: a forgotten one would answer with zeros.
+static Status scene_warnings_of_rest(const Scene *scene, Warnings *warnings) {
+    const Excitation *excitation = scene_excitation(scene);
+    if (excitation_kind(excitation) != &excitation_free ||
+        !scene_warnings_are_zero(&excitation->displacement) ||
+        !scene_warnings_are_zero(&excitation->velocity))
+        return STATUS_OK;
+    for (size_t i = 0; i < scene->dampers.count; i++)
+        if (scene->dampers.at[i].velocity != 0)
+            return STATUS_OK;
+    return warnings_add(warnings, "/excitation",
+                        "is free vibration from rest: nothing will move; give an initial "
+                        "displacement or velocity, or a kind that shakes the base");
+}
+
+Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings) {
+    const Scene *scene = &simulation->scene;
+    TRY(scene_warnings_of_rows(simulation_fields, simulation, "", warnings));
+    TRY(scene_warnings_of_rest(scene, warnings));
+    TRY(scene_warnings_of_times(scene, warnings));
+    TRY(scene_warnings_of_excitation(scene, warnings));
+    return scene_warnings_of_masses(scene, warnings);
+}
+
+// The scene asked for it; the number is foretold, and dampers can make more of it.
+static Status scene_warnings_of_modes(Outcome *outcome) {
+    const double error = outcome->response.given_up;
+    if (!(error > RESPONSE_PARTING))
+        return STATUS_OK;
+    return warnings_add(&outcome->warnings, "/accuracy/modes",
+                        "with the modes left out the displacement is wrong by up to %.2g of its "
+                        "largest value%s: more modes are closer",
+                        error, error > 0.1 ? ", and only statistics hold" : "");
+}
+
+static Status scene_warnings_of_horizon(Outcome *outcome) {
+    if (isnan(outcome->summary.trust_horizon) || outcome->response.given_up > RESPONSE_PARTING)
+        return STATUS_OK;
+    return warnings_add(&outcome->warnings, "/duration",
+                        "the run goes on beyond t = %.6g s: there rounding has moved the "
+                        "displacement by %g of its largest value, and from there on only "
+                        "statistics hold",
+                        outcome->summary.trust_horizon, RESPONSE_PARTING);
+}
+
+// What steps are wrong by is not rounding's.
+static Status scene_warnings_of_steps(Outcome *outcome) {
+    const Summary *summary = &outcome->summary;
+    if (isnan(summary->error_estimate))
+        return warnings_add(&outcome->warnings, "/accuracy",
+                            "the error of these steps is not known: the run beside this one that "
+                            "would tell it came to no end");
+    const double error = summary->error_estimate - outcome->response.given_up;
+    if (error <= RESPONSE_PARTING)
+        return STATUS_OK;
+    return warnings_add(&outcome->warnings, "/accuracy",
+                        "with these steps the displacement is wrong by about %.2g of its largest "
+                        "value%s: shorter steps, a smaller tolerance, or the solver exact "
+                        "without one, are closer",
+                        error, error > 0.1 ? ", and only statistics hold" : "");
+}
+
+// A buffer of a damper, and where it stands.
+typedef struct BufferStops {
+    const Buffer *buffer;
+    const char *name;  // as the scene calls it
+    const char *where; // in words
+    int first, count;  // sides
+} BufferStops;
+
+// One for both sides, or one for each.
+static size_t scene_warnings_find_stops(const Damper *damper, BufferStops stops[2]) {
+    static const char *const names[] = {"left_buffer", "right_buffer"};
+    static const char *const wheres[] = {"left stop", "right stop"};
+    const Buffer *left = damper_buffer(damper, SIDE_LEFT);
+    if (left == damper_buffer(damper, SIDE_RIGHT)) {
+        stops[0] = (BufferStops){left, "buffer", "stops", SIDE_LEFT, 2};
+        return 1;
+    }
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        const bool is_common = buffer == &damper->buffer;
+        stops[side] =
+            (BufferStops){buffer, is_common ? "buffer" : names[side], wheres[side], side, 1};
+    }
+    return 2;
+}
+
+// What met several stops with one range.
+static Approaches scene_warnings_add_up(const Approaches *met, int count) {
+    Approaches sum = met[0];
+    for (int i = 1; i < count; i++) {
+        if (met[i].count == 0)
+            continue;
+        sum.least = sum.count == 0 ? met[i].least : fmin(sum.least, met[i].least);
+        sum.most = sum.count == 0 ? met[i].most : fmax(sum.most, met[i].most);
+        sum.count += met[i].count;
+        sum.below += met[i].below;
+        sum.above += met[i].above;
+    }
+    return sum;
+}
+
+// "0.15 to 1 m/s", "0.15 m/s and more", "1 m/s and less".
+static void scene_warnings_write_range(double from, double to, char *text, size_t size) {
+    char low[32], high[32];
+    text_real(low, from);
+    text_real(high, to);
+    if (isnan(to))
+        snprintf(text, size, "%s m/s and more", low);
+    else if (isnan(from))
+        snprintf(text, size, "%s m/s and less", high);
+    else
+        snprintf(text, size, "%s to %s m/s", low, high);
+}
+
+// "slower than", "faster than" or both, and how far it went.
+static void scene_warnings_write_outside(const Approaches *met, char which[48], char reach[64]) {
+    if (met->above == 0) {
+        snprintf(which, 48, "slower");
+        snprintf(reach, 64, "down to %.3g", met->least);
+    } else if (met->below == 0) {
+        snprintf(which, 48, "faster");
+        snprintf(reach, 64, "up to %.3g", met->most);
+    } else {
+        snprintf(which, 48, "slower and %llu faster", (unsigned long long)met->above);
+        snprintf(reach, 64, "at %.3g to %.3g", met->least, met->most);
+    }
+}
+
+static Status scene_warnings_of_stops(const BufferStops *stops, size_t damper,
+                                      const Approaches *all, Warnings *warnings) {
+    const Approaches met = scene_warnings_add_up(&all[stops->first], stops->count);
+    const bool is_named = stops->buffer->material != NULL;
+    char pointer[64], range[96], which[48], reach[64];
+    if (met.below + met.above == 0)
+        return STATUS_OK;
+    snprintf(pointer, sizeof pointer, "/dampers/%zu/%s%s", damper, stops->name,
+             is_named ? "" : "/table");
+    scene_warnings_write_range(met.from, met.to, range, sizeof range);
+    scene_warnings_write_outside(&met, which, reach);
+    return warnings_add(
+        warnings, pointer,
+        "%llu of %llu impacts at the %s of damper %zu were %s than %.80s%s (%s), %s m/s: %s",
+        (unsigned long long)(met.below > 0 ? met.below : met.above), (unsigned long long)met.count,
+        stops->where, damper + 1, which, is_named ? stops->buffer->material : "the table",
+        is_named ? " was measured" : " tells", range, reach,
+        stops->buffer->table.count > 0 ? "the nearest row is used there"
+                                       : "its numbers are used there without a measurement");
+}
+
+static Status scene_warnings_of_speeds(const Scene *scene, const Approaches *met,
+                                       Warnings *warnings) {
+    for (size_t i = 0; met != NULL && i < scene->dampers.count; i++) {
+        BufferStops stops[2];
+        const size_t count = scene_warnings_find_stops(&scene->dampers.at[i], stops);
+        for (size_t k = 0; k < count; k++)
+            TRY(scene_warnings_of_stops(&stops[k], i, &met[2 * i], warnings));
+    }
+    return STATUS_OK;
+}
+
+// By how much the effective masses may differ of the test and of the scene.
+static const double pair_part = 0.2;
+
+static Status scene_warnings_of_pair(const Derived *derived, const BufferStops *stops,
+                                     Warnings *warnings) {
+    const double tested = buffer_test_mass(stops->buffer), own = derived->effective_mass;
+    char pointer[64];
+    if (!buffer_is_measured(stops->buffer) || !(fabs(own - tested) > pair_part * tested))
+        return STATUS_OK;
+    snprintf(pointer, sizeof pointer, "/dampers/%llu/identified_for",
+             (unsigned long long)derived->damper - 1);
+    return warnings_add(warnings, pointer,
+                        "%.80s was measured with an effective mass of %.3g kg, that of this pair "
+                        "is %.3g kg: restitution and contact time belong to a pair of masses; "
+                        "\"rig\" carries over the stiffness and damping instead",
+                        stops->buffer->material, tested, own);
+}
+
+Status scene_warnings_of_pairs(const Scene *scene, const DerivedList *derived, Warnings *warnings) {
+    const ContactLaw *law = dampers_contact_law(&scene->dampers, scene_contact(scene));
+    for (size_t i = 0; i < derived->count && law->form != CONTACT_IMPULSIVE; i++) {
+        const Derived *at = &derived->at[i];
+        const Damper *damper = &scene->dampers.at[at->damper - 1];
+        BufferStops stops[2];
+        const size_t count = scene_warnings_find_stops(damper, stops);
+        for (size_t k = 0; k < count && damper->identified_for == IDENTIFIED_FOR_SCENE; k++)
+            if (stops[k].first == at->side)
+                TRY(scene_warnings_of_pair(at, &stops[k], warnings));
+    }
+    return STATUS_OK;
+}
+
+Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, Outcome *outcome) {
+    TRY(scene_warnings_of_modes(outcome));
+    TRY(outcome->response.is_stepped ? scene_warnings_of_steps(outcome)
+                                     : scene_warnings_of_horizon(outcome));
+    TRY(scene_warnings_of_pairs(scene, derived, &outcome->warnings));
+    return scene_warnings_of_speeds(scene, outcome->response.approaches, &outcome->warnings);
+}
