@@ -1,6 +1,5 @@
-// A point may have fewer samples than the reference: then its displacement is the line between its
-// samples, and its mean acceleration holds for the whole of its interval. Both are what a reader of
-// the coarser series has.
+// An outcome may have fewer samples than the reference. Then its displacement is interpolated
+// linearly, and its mean acceleration is constant over the sample interval.
 #include "core/simulation/error_metrics.h"
 
 #include <math.h>
@@ -38,25 +37,25 @@ double error_metrics_by(const Errors *errors, int metric) {
     return all[metric];
 }
 
-static double error_metrics_ratio(double difference, double whole) {
+static double errors_ratio(double difference, double whole) {
     if (whole > 0)
         return difference / whole;
     return difference == 0 ? 0 : (double)NAN;
 }
 
-static double error_metrics_end(const Compared *reference) {
+static double errors_end(const Compared *reference) {
     return isnan(reference->horizon) ? (double)INFINITY : reference->horizon;
 }
 
-// How far the reference itself is off in the samples compared: an estimate for the whole run says
-// nothing of those before the horizon, which is where it passes RESPONSE_PARTING.
-static double error_metrics_own(const Compared *reference) {
+// Error of the reference within the samples compared. The estimate is for the whole run; at the
+// horizon the error is RESPONSE_PARTING.
+static double errors_own(const Compared *reference) {
     const double estimate = reference->outcome->summary.error_estimate;
     return isnan(reference->horizon) ? estimate : fmin(estimate, RESPONSE_PARTING);
 }
 
 // Samples of the reference that can be compared.
-static size_t error_metrics_samples(const Compared *reference) {
+static size_t errors_samples(const Compared *reference) {
     const size_t count = reference->outcome->response.count;
     if (isnan(reference->horizon))
         return count;
@@ -64,21 +63,20 @@ static size_t error_metrics_samples(const Compared *reference) {
     return within < (double)count ? (size_t)within : count;
 }
 
-// Sample i of the reference stands at index at + part of the point's, 0 <= part < 1.
+// Sample i of the reference is at index at + part of the other outcome, 0 <= part < 1.
 typedef struct SamplePlace {
     size_t at;
     double part;
 } SamplePlace;
 
-static SamplePlace error_metrics_place(size_t i, const Response *reference, const Response *point) {
+static SamplePlace errors_place(size_t i, const Response *reference, const Response *point) {
     const double index = (double)i * point->sample_rate / reference->sample_rate;
     const double at = floor(index * (1 + 1e-12));
     const double part = index - at;
     return (SamplePlace){(size_t)at, part > 1e-9 ? part : 0};
 }
 
-static double error_metrics_displacement(const Compared *reference, const Compared *point,
-                                         size_t count) {
+static double errors_displacement(const Compared *reference, const Compared *point, size_t count) {
     const Response *from = &reference->outcome->response, *to = &point->outcome->response;
     double largest = 0, worst = 0;
     for (size_t s = 0; s < reference->storeys; s++) {
@@ -86,7 +84,7 @@ static double error_metrics_displacement(const Compared *reference, const Compar
         for (size_t i = 0; i < from->count; i++)
             largest = fmax(largest, fabs(x[i]));
         for (size_t i = 0; i < count; i++) {
-            const SamplePlace place = error_metrics_place(i, from, to);
+            const SamplePlace place = errors_place(i, from, to);
             if (place.at + (place.part > 0) >= to->count)
                 break;
             double value = y[place.at];
@@ -95,18 +93,17 @@ static double error_metrics_displacement(const Compared *reference, const Compar
             worst = fmax(worst, fabs(value - x[i]));
         }
     }
-    return error_metrics_ratio(worst, largest);
+    return errors_ratio(worst, largest);
 }
 
-static double error_metrics_acceleration(const Compared *reference, const Compared *point,
-                                         size_t count) {
+static double errors_acceleration(const Compared *reference, const Compared *point, size_t count) {
     const Response *from = &reference->outcome->response, *to = &point->outcome->response;
     double squares = 0, differences = 0;
     for (size_t s = 0; s < reference->storeys; s++) {
         const double *x = from->series.at[reference->storeys + s].values;
         const double *y = to->series.at[reference->storeys + s].values;
         for (size_t i = 0; i < count; i++) {
-            const SamplePlace place = error_metrics_place(i, from, to);
+            const SamplePlace place = errors_place(i, from, to);
             const size_t at = place.at + (place.part > 0); // the mean before its sample
             if (at >= to->count)
                 break;
@@ -114,16 +111,16 @@ static double error_metrics_acceleration(const Compared *reference, const Compar
             differences += (y[at] - x[i]) * (y[at] - x[i]);
         }
     }
-    return sqrt(error_metrics_ratio(differences, squares));
+    return sqrt(errors_ratio(differences, squares));
 }
 
 typedef struct HorizonImpacts {
     uint64_t impacts;
-    double peak; // NAN where no contact has one
+    double peak; // NAN: no contact has a peak force
 } HorizonImpacts;
 
-// Of the contacts that begin within the horizon.
-static HorizonImpacts error_metrics_impacts(const Impacts *impacts, double horizon) {
+// Contacts that begin within the horizon.
+static HorizonImpacts errors_impacts(const Impacts *impacts, double horizon) {
     HorizonImpacts within = {0, (double)NAN};
     for (size_t i = 0; i < impacts->count; i++) {
         const Impact *impact = &impacts->at[i];
@@ -135,19 +132,19 @@ static HorizonImpacts error_metrics_impacts(const Impacts *impacts, double horiz
     return within;
 }
 
-static double error_metrics_channel_distance(const Spectrum *reference, const double *wanted,
-                                             const Spectrum *point, const double *density) {
+static double errors_channel_distance(const Spectrum *reference, const double *wanted,
+                                      const Spectrum *point, const double *density) {
     const size_t end = distance_band_end(wanted, reference->densities.rows);
     return distance_level(reference, wanted, point, density, 1, end);
 }
 
-// Of the channel that is farthest off.
-static double error_metrics_psd(const Spectrum *reference, const Spectrum *point) {
+// The channel with the largest distance.
+static double errors_psd(const Spectrum *reference, const Spectrum *point) {
     const size_t count = reference->densities.count;
     double worst = (double)NAN;
     for (size_t i = 0; i < count && i < point->densities.count; i++) {
-        const double own = error_metrics_channel_distance(
-            reference, reference->densities.at[i].values, point, point->densities.at[i].values);
+        const double own = errors_channel_distance(reference, reference->densities.at[i].values,
+                                                   point, point->densities.at[i].values);
         if (isnan(own))
             return own;
         worst = fmax(worst, own);
@@ -157,9 +154,8 @@ static double error_metrics_psd(const Spectrum *reference, const Spectrum *point
 
 ReferenceSummary error_metrics_reference(const Compared *reference) {
     const Outcome *outcome = reference->outcome;
-    const HorizonImpacts within =
-        error_metrics_impacts(&outcome->response.impacts, error_metrics_end(reference));
-    ReferenceSummary summary = {.error_estimate = error_metrics_own(reference),
+    const HorizonImpacts within = errors_impacts(&outcome->response.impacts, errors_end(reference));
+    ReferenceSummary summary = {.error_estimate = errors_own(reference),
                                 .trust_horizon = reference->horizon,
                                 .impacts = within.impacts,
                                 .peak_force = within.peak,
@@ -184,26 +180,26 @@ Errors error_metrics_measure(const Compared *reference, const Compared *point) {
                      .mean_acceleration = (double)NAN,
                      .peak_force = (double)NAN,
                      .impacts = (double)NAN,
-                     .psd = error_metrics_psd(&from->spectrum, &to->spectrum),
+                     .psd = errors_psd(&from->spectrum, &to->spectrum),
                      .rms_displacement = (double)NAN};
     if (!point->has_motion)
         return errors;
-    const size_t count = error_metrics_samples(reference);
+    const size_t count = errors_samples(reference);
     if (count > 1) {
         // Nothing closer than the reference itself can be summary.
         errors.displacement =
-            fmax(error_metrics_displacement(reference, point, count), error_metrics_own(reference));
-        errors.mean_acceleration = error_metrics_acceleration(reference, point, count);
+            fmax(errors_displacement(reference, point, count), errors_own(reference));
+        errors.mean_acceleration = errors_acceleration(reference, point, count);
     }
-    const double horizon = error_metrics_end(reference);
-    const HorizonImpacts a = error_metrics_impacts(&from->response.impacts, horizon);
-    const HorizonImpacts b = error_metrics_impacts(&to->response.impacts, horizon);
+    const double horizon = errors_end(reference);
+    const HorizonImpacts a = errors_impacts(&from->response.impacts, horizon);
+    const HorizonImpacts b = errors_impacts(&to->response.impacts, horizon);
     errors.impacts = fabs((double)a.impacts - (double)b.impacts);
     if (point->has_force && reference->has_force && !isnan(a.peak))
-        errors.peak_force = error_metrics_ratio(fabs(fmax(b.peak, 0) - a.peak), a.peak);
+        errors.peak_force = errors_ratio(fabs(fmax(b.peak, 0) - a.peak), a.peak);
     errors.rms_displacement =
-        error_metrics_ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
-                            from->summary.rms_displacement);
+        errors_ratio(fabs(to->summary.rms_displacement - from->summary.rms_displacement),
+                     from->summary.rms_displacement);
     return errors;
 }
 

@@ -1,27 +1,26 @@
-// How far one outcome is from another: the metrics by which accuracy is asked for and measured.
-// Samples are compared within the reference's trust horizon only; beyond it statistics alone mean
-// something. Not a choice between ways to run: that is aim.h and study/. Used by those.
+// Differences between two outcomes, by the metrics of accuracy. Samples are compared within the
+// trust horizon of the reference; beyond it only statistics are meaningful.
 #ifndef CORE_SIMULATION_ERROR_METRICS_H
 #define CORE_SIMULATION_ERROR_METRICS_H
 
 #include "core/result/metric.h"
 #include "core/simulation/simulation.h"
 
-// Differences from the reference; NAN where an outcome does not answer it.
+// Differences from the reference; NAN is unknown.
 typedef struct Errors {
-    double displacement;      // largest over the largest
-    double mean_acceleration; // rms over rms
-    double peak_force;        // of the largest
-    double impacts;           // how many more or fewer
-    double psd;               // rms [dB]
-    double rms_displacement;
+    double displacement;      // largest difference over largest value
+    double mean_acceleration; // rms of the difference over rms
+    double peak_force;        // relative difference of the largest force
+    double impacts;           // difference of the numbers
+    double psd;               // rms distance [dB]
+    double rms_displacement;  // relative difference
 } Errors;
 extern const Field error_fields[];
 
 // The error by one Metric.
 double error_metrics_by(const Errors *errors, int metric);
 
-// What others are compared with.
+// The numbers of the reference.
 typedef struct ReferenceSummary {
     double error_estimate, trust_horizon;
     uint64_t impacts;        // within the horizon
@@ -36,12 +35,12 @@ extern const Field reference_summary_fields[];
 typedef struct Compared {
     const Outcome *outcome;
     size_t storeys;
-    bool has_motion; // false: its samples answer something else, and only its spectra count
-    bool has_force;  // a contact force is known of every impact
-    double horizon;  // of a reference: compared to here [s]; NAN: to the end
+    bool has_motion; // false: only its spectra are compared
+    bool has_force;  // every impact has a contact force
+    double horizon;  // end of the comparison, of a reference [s]; NAN: end of the run
 } Compared;
 
-// Asks for the channels that errors are measured by, and for no others; the spectra stay.
+// Replaces the channels by those that errors are measured with; the spectra stay.
 Status error_metrics_request(Simulation *simulation, Problem *problem);
 
 ReferenceSummary error_metrics_reference(const Compared *reference);

@@ -40,7 +40,7 @@ typedef struct Point {
     double time, force, penetration, speed; // time of the fine run
 } Point;
 
-static Point impact_history_sample(const ImpactRun *run, size_t i) {
+static Point impact_run_sample(const ImpactRun *run, size_t i) {
     const Column *fine = run->fine.at;
     const double sign = run->again->side == SIDE_RIGHT ? 1 : -1;
     return (Point){.time = (double)i / run->inputs.plan->sample_rate,
@@ -52,8 +52,8 @@ static Point impact_history_sample(const ImpactRun *run, size_t i) {
 
 // The contact's side of one of its ends; `near` is the nearest sample inside. The contact may have
 // begun before a pause of its force, and its parameters are those of its beginning.
-static Point impact_history_end(const ImpactRun *run, double time, double speed, bool has_force,
-                                const Point *near) {
+static Point impact_run_end(const ImpactRun *run, double time, double speed, bool has_force,
+                            const Point *near) {
     const Plan *plan = run->inputs.plan;
     const Impact *first = run->again;
     for (const Impact *at = first; at > run->response.impacts.at && first->is_resumed; at--)
@@ -74,7 +74,7 @@ static Point impact_history_end(const ImpactRun *run, double time, double speed,
 
 // The vertex of the parabola through three points. Its force is the listed peak, which the solver
 // has located.
-static Point impact_history_vertex(const Point *a, const Point *b, const Point *c, double force) {
+static Point impact_run_vertex(const Point *a, const Point *b, const Point *c, double force) {
     const double left = a->time - b->time, right = c->time - b->time;
     const double low = (a->force - b->force) / left, high = (c->force - b->force) / right;
     const double bend = (high - low) / (right - left), slope = low - bend * left;
@@ -89,7 +89,7 @@ static Point impact_history_vertex(const Point *a, const Point *b, const Point *
 }
 
 // All points but the peak. Returns their number.
-static size_t impact_history_gather(const ImpactRun *run, Point *points) {
+static size_t impact_run_gather(const ImpactRun *run, Point *points) {
     const Impact *again = run->again;
     const Plan *plan = run->inputs.plan;
     const double rate = plan->sample_rate;
@@ -98,29 +98,28 @@ static size_t impact_history_gather(const ImpactRun *run, Point *points) {
     const size_t last = plan->count - 1;
     size_t count = has_ends ? 1 : 0, i = (size_t)fmax(ceil((again->start + edge) * rate), 0);
     for (; i <= last && ((double)i / rate < end - edge || (is_open && i == last)); i++)
-        points[count++] = impact_history_sample(run, i);
+        points[count++] = impact_run_sample(run, i);
     if (!has_ends)
         return count;
     const Point none = {.time = again->start};
-    points[0] = impact_history_end(run, again->start, again->approach_speed, !again->is_resumed,
-                                   count > 1 ? &points[1] : &none);
+    points[0] = impact_run_end(run, again->start, again->approach_speed, !again->is_resumed,
+                               count > 1 ? &points[1] : &none);
     if (is_open)
         return count;
     const bool pulls = plan->separation == SEPARATION_ZERO_PENETRATION;
-    points[count] =
-        impact_history_end(run, end, -again->separation_speed, pulls, &points[count - 1]);
+    points[count] = impact_run_end(run, end, -again->separation_speed, pulls, &points[count - 1]);
     return count + 1;
 }
 
-static size_t impact_history_add_peak(const ImpactRun *run, Point *points, size_t count) {
+static size_t impact_run_add_peak(const ImpactRun *run, Point *points, size_t count) {
     size_t top = 0;
     for (size_t i = 1; i < count; i++)
         if (fabs(points[i].force) > fabs(points[top].force))
             top = i;
     if (top == 0 || top + 1 >= count || isnan(run->again->peak_force))
         return count;
-    const Point peak = impact_history_vertex(&points[top - 1], &points[top], &points[top + 1],
-                                             run->again->peak_force);
+    const Point peak =
+        impact_run_vertex(&points[top - 1], &points[top], &points[top + 1], run->again->peak_force);
     const double apart = peak.time - points[top].time;
     if (fabs(apart) * run->inputs.plan->sample_rate < 1e-6) {
         points[top] = peak;
@@ -132,7 +131,7 @@ static size_t impact_history_add_peak(const ImpactRun *run, Point *points, size_
     return count + 1;
 }
 
-static Status impact_history_fill(const ImpactRun *run, Columns *columns, Problem *problem) {
+static Status impact_run_fill(const ImpactRun *run, Columns *columns, Problem *problem) {
     static const struct {
         const char *name, *unit;
     } names[COLUMNS] = {[TIME] = {"time", "s"},
@@ -142,7 +141,7 @@ static Status impact_history_fill(const ImpactRun *run, Columns *columns, Proble
     Point *points = malloc((run->inputs.plan->count + 3) * sizeof *points);
     if (points == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the contact");
-    const size_t count = impact_history_add_peak(run, points, impact_history_gather(run, points));
+    const size_t count = impact_run_add_peak(run, points, impact_run_gather(run, points));
     const Status status = columns_make(columns, COLUMNS, count, 0, problem);
     for (size_t c = 0; c < COLUMNS && status == STATUS_OK; c++)
         columns_name(columns, c, names[c].name, names[c].unit);
@@ -158,7 +157,7 @@ static Status impact_history_fill(const ImpactRun *run, Columns *columns, Proble
 
 // Adds all states to the channels. Channels of spectra stay, because a mean acceleration changes
 // the solver's path and with it the last digits; the spectra themselves are not made.
-static Status impact_history_add_states(const Scene *scene, Output *output) {
+static Status impact_run_add_states(const Scene *scene, Output *output) {
     Texts *names = &output->channels, *transformed = &output->psd.channels;
     for (size_t i = 0; i < transformed->count; i++) {
         size_t number;
@@ -179,17 +178,17 @@ static Status impact_history_add_states(const Scene *scene, Output *output) {
 }
 
 // Value of a state of the first run; `index` is from 0.
-static double impact_history_state(const ImpactRun *run, ChannelId channel, size_t index,
-                                   size_t sample) {
+static double impact_run_state(const ImpactRun *run, ChannelId channel, size_t index,
+                               size_t sample) {
     char name[CHANNEL_NAME];
     channel_names_write(&run->simulation.scene, channel, index + 1, name);
     return columns_find(&run->outcome->response.series, name)->values[sample];
 }
 
 // The scene as it was run. The settings of an accuracy target are known only after a run.
-static Status impact_history_settle(ImpactRun *run, const Simulation *asked,
-                                    const SimulationLimits *limits, const Progress *progress,
-                                    Workspace *workspace, Problem *problem) {
+static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
+                                const SimulationLimits *limits, const Progress *progress,
+                                Workspace *workspace, Problem *problem) {
     const Scene *scene = &asked->scene;
     const size_t states = 2 * (structure_storeys(scene_structure(scene)) + scene->dampers.count);
     if ((double)states * (double)scene_sample_count(scene) * sizeof(double) > states_bytes_max)
@@ -207,12 +206,12 @@ static Status impact_history_settle(ImpactRun *run, const Simulation *asked,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
     }
     run->simulation.output.impacts = true;
-    if (impact_history_add_states(scene, &run->simulation.output) != STATUS_OK)
+    if (impact_run_add_states(scene, &run->simulation.output) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
     return STATUS_OK;
 }
 
-static Status impact_history_find(ImpactRun *run, size_t number, Problem *problem) {
+static Status impact_run_find(ImpactRun *run, size_t number, Problem *problem) {
     const Impacts *impacts = &run->outcome->response.impacts;
     if (impacts->count == 0)
         return problem_set(problem, STATUS_NOT_FOUND, "the result has no impacts");
@@ -231,7 +230,7 @@ static Status impact_history_find(ImpactRun *run, size_t number, Problem *proble
 }
 
 // Number of the base's own sample at a sample of the output; -1: it has none there.
-static double impact_history_base_sample(const ImpactRun *run, size_t sample) {
+static double impact_run_base_sample(const ImpactRun *run, size_t sample) {
     const Base *base = &run->inputs.base;
     if (base->form != BASE_SAMPLED)
         return 0;
@@ -240,11 +239,11 @@ static double impact_history_base_sample(const ImpactRun *run, size_t sample) {
     return fabs(number - nearest) <= 1e-9 ? nearest : -1;
 }
 
-static bool impact_history_is_free(const ImpactRun *run, size_t sample) {
+static bool impact_run_is_free(const ImpactRun *run, size_t sample) {
     for (size_t i = 0; i < run->inputs.plan->damper_count; i++) {
         const PlanDamper *damper = &run->inputs.plan->dampers[i];
-        const double u = impact_history_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, sample) -
-                         impact_history_state(run, CHANNEL_DISPLACEMENT, damper->storey, sample);
+        const double u = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, sample) -
+                         impact_run_state(run, CHANNEL_DISPLACEMENT, damper->storey, sample);
         if (!(fabs(u - damper->offset) < 0.5 * damper->clearance))
             return false;
     }
@@ -253,7 +252,7 @@ static bool impact_history_is_free(const ImpactRun *run, size_t sample) {
 
 // The last sample before the impact from which a run can start: no contact is open, all masses are
 // between their stops and the base has a sample. Sample 0 always serves.
-static void impact_history_find_start(ImpactRun *run) {
+static void impact_run_find_start(ImpactRun *run) {
     const Impacts *impacts = &run->outcome->response.impacts;
     const double rate = run->outcome->response.sample_rate;
     size_t sample = (size_t)floor(run->impact->start * rate);
@@ -266,8 +265,7 @@ static void impact_history_find_start(ImpactRun *run) {
                 earliest = other->start;
         if (earliest < time)
             sample = (size_t)floor(earliest * rate);
-        else if (!impact_history_is_free(run, sample) ||
-                 impact_history_base_sample(run, sample) < 0)
+        else if (!impact_run_is_free(run, sample) || impact_run_base_sample(run, sample) < 0)
             sample--;
         else
             break;
@@ -277,19 +275,19 @@ static void impact_history_find_start(ImpactRun *run) {
 }
 
 // Moves the start of a piece by `after` [s].
-static void impact_history_shift_piece(BasePiece *piece, double omega, double after) {
+static void impact_run_shift_piece(BasePiece *piece, double omega, double after) {
     const double value = piece->value, slope = piece->slope;
     const double c = cos(omega * after), s = sin(omega * after);
     piece->value = omega > 0 ? value * c + slope * s : value + slope * after;
     piece->slope = omega > 0 ? slope * c - value * s : slope;
 }
 
-static void impact_history_shift_base(ImpactRun *run) {
+static void impact_run_shift_base(ImpactRun *run) {
     const Base *base = &run->inputs.base;
     Base *shifted = &run->shifted;
     *shifted = *base;
     if (base->form == BASE_SAMPLED) {
-        const size_t first = (size_t)impact_history_base_sample(run, run->sample);
+        const size_t first = (size_t)impact_run_base_sample(run, run->sample);
         const size_t passed = first < base->count ? first : base->count;
         shifted->values += passed;
         shifted->count -= passed;
@@ -299,14 +297,14 @@ static void impact_history_shift_base(ImpactRun *run) {
         shifted->form = BASE_PIECES;
         shifted->pieces[0] = (BasePiece){0, 0, base->amplitude};
         shifted->piece_count = 1;
-        impact_history_shift_piece(&shifted->pieces[0], base->omega, run->start);
+        impact_run_shift_piece(&shifted->pieces[0], base->omega, run->start);
     } else if (base->form == BASE_PIECES) {
         shifted->piece_count = 0;
         for (size_t i = 0; i < base->piece_count; i++) {
             BasePiece piece = base->pieces[i];
             piece.time -= run->start;
             if (piece.time <= 0) {
-                impact_history_shift_piece(&piece, base->omega, -piece.time);
+                impact_run_shift_piece(&piece, base->omega, -piece.time);
                 piece.time = 0;
                 shifted->piece_count = 0;
             }
@@ -316,22 +314,22 @@ static void impact_history_shift_base(ImpactRun *run) {
 }
 
 // The plan belongs to this run alone: it continues from the state at the sample.
-static void impact_history_set_state(const ImpactRun *run) {
+static void impact_run_set_state(const ImpactRun *run) {
     Plan *plan = run->inputs.plan;
     for (size_t i = 0; i < plan->storeys && run->sample > 0; i++) {
-        plan->displacement[i] = impact_history_state(run, CHANNEL_DISPLACEMENT, i, run->sample);
-        plan->velocity[i] = impact_history_state(run, CHANNEL_VELOCITY, i, run->sample);
+        plan->displacement[i] = impact_run_state(run, CHANNEL_DISPLACEMENT, i, run->sample);
+        plan->velocity[i] = impact_run_state(run, CHANNEL_VELOCITY, i, run->sample);
     }
     for (size_t i = 0; i < plan->damper_count && run->sample > 0; i++) {
         PlanDamper *damper = &plan->dampers[i];
-        damper->position = impact_history_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, run->sample) -
+        damper->position = impact_run_state(run, CHANNEL_DAMPER_DISPLACEMENT, i, run->sample) -
                            plan->displacement[damper->storey] - damper->offset;
-        damper->velocity = impact_history_state(run, CHANNEL_DAMPER_VELOCITY, i, run->sample) -
+        damper->velocity = impact_run_state(run, CHANNEL_DAMPER_VELOCITY, i, run->sample) -
                            plan->velocity[damper->storey];
     }
 }
 
-static Status impact_history_set_clock(const ImpactRun *run, size_t points, Problem *problem) {
+static Status impact_run_set_clock(const ImpactRun *run, size_t points, Problem *problem) {
     Plan *plan = run->inputs.plan;
     const double total = run->simulation.scene.duration;
     const double end = isnan(run->impact->end) ? total : run->impact->end;
@@ -356,9 +354,8 @@ static Status impact_history_set_clock(const ImpactRun *run, size_t points, Prob
     return STATUS_OK;
 }
 
-static Status impact_history_run_fine(ImpactRun *run, const SimulationLimits *limits,
-                                      const Progress *progress, Workspace *workspace,
-                                      Problem *problem) {
+static Status impact_run_fine(ImpactRun *run, const SimulationLimits *limits,
+                              const Progress *progress, Workspace *workspace, Problem *problem) {
     const Plan *plan = run->inputs.plan;
     const size_t number = (size_t)run->impact->damper - 1;
     TRY(columns_make(&run->fine, FINE_COLUMNS, plan->count, 0, problem));
@@ -394,21 +391,21 @@ static Status impact_history_run_fine(ImpactRun *run, const SimulationLimits *li
     return STATUS_OK;
 }
 
-static Status impact_history_run(ImpactRun *run, const Simulation *simulation, size_t number,
-                                 size_t points, const SimulationLimits *limits,
-                                 const Progress *progress, Workspace *workspace,
-                                 ImpactHistory *history, Problem *problem) {
-    TRY(impact_history_settle(run, simulation, limits, progress, workspace, problem));
+static Status impact_run_all(ImpactRun *run, const Simulation *simulation, size_t number,
+                             size_t points, const SimulationLimits *limits,
+                             const Progress *progress, Workspace *workspace, ImpactHistory *history,
+                             Problem *problem) {
+    TRY(impact_run_settle(run, simulation, limits, progress, workspace, problem));
     TRY(run_scene(&run->simulation, limits, progress, workspace, &run->inputs, &run->outcome,
                   problem));
-    TRY(impact_history_find(run, number, problem));
-    impact_history_find_start(run);
-    impact_history_shift_base(run);
-    impact_history_set_state(run);
-    TRY(impact_history_set_clock(run, points, problem));
-    TRY(impact_history_run_fine(run, limits, progress, workspace, problem));
+    TRY(impact_run_find(run, number, problem));
+    impact_run_find_start(run);
+    impact_run_shift_base(run);
+    impact_run_set_state(run);
+    TRY(impact_run_set_clock(run, points, problem));
+    TRY(impact_run_fine(run, limits, progress, workspace, problem));
     history->impact = *run->impact;
-    return impact_history_fill(run, &history->columns, problem);
+    return impact_run_fill(run, &history->columns, problem);
 }
 
 Status impact_history_make(const Simulation *simulation, size_t number, size_t points,
@@ -417,8 +414,8 @@ Status impact_history_make(const Simulation *simulation, size_t number, size_t p
     ImpactRun run;
     memset(&run, 0, sizeof run);
     memset(history, 0, sizeof *history);
-    const Status status = impact_history_run(&run, simulation, number, points, limits, progress,
-                                             workspace, history, problem);
+    const Status status = impact_run_all(&run, simulation, number, points, limits, progress,
+                                         workspace, history, problem);
     simulation_clear(&run.simulation);
     outcome_unref(run.outcome);
     run_inputs_clear(&run.inputs);

@@ -30,16 +30,16 @@ static const TypicalLimit typical[] = {
     {"rms", 100, "m/s^2 are meant, not cm/s^2"},
 };
 
-static const TypicalLimit *scene_warnings_find_limit(const char *name) {
+static const TypicalLimit *warnings_find_limit(const char *name) {
     for (size_t i = 0; i < COUNT(typical); i++)
         if (strcmp(typical[i].name, name) == 0)
             return &typical[i];
     return NULL;
 }
 
-static Status scene_warnings_of_real(const Field *field, double value, const char *pointer,
-                                     Warnings *warnings) {
-    const TypicalLimit *limit = scene_warnings_find_limit(field->name);
+static Status warnings_of_real(const Field *field, double value, const char *pointer,
+                               Warnings *warnings) {
+    const TypicalLimit *limit = warnings_find_limit(field->name);
     if (limit == NULL || !(fabs(value) > limit->max))
         return STATUS_OK;
     char is[32], most[32];
@@ -49,55 +49,55 @@ static Status scene_warnings_of_real(const Field *field, double value, const cha
                         space, unit, text_real(most, limit->max), space, unit, limit->hint);
 }
 
-static Status scene_warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
-                                      Warnings *warnings) {
+static Status warnings_of_reals(const Field *field, const Reals *reals, const char *pointer,
+                                Warnings *warnings) {
     if (reals->count == 1)
-        return scene_warnings_of_real(field, reals->at[0], pointer, warnings);
-    for (size_t i = 0; i < reals->count && scene_warnings_find_limit(field->name) != NULL; i++) {
+        return warnings_of_real(field, reals->at[0], pointer, warnings);
+    for (size_t i = 0; i < reals->count && warnings_find_limit(field->name) != NULL; i++) {
         char place[sizeof((Fault){0}.pointer)];
         pointer_index(place, sizeof place, pointer, i);
-        TRY(scene_warnings_of_real(field, reals->at[i], place, warnings));
+        TRY(warnings_of_real(field, reals->at[i], place, warnings));
     }
     return STATUS_OK;
 }
 
-static Status scene_warnings_of_rows(const Field *fields, const void *item, const char *pointer,
-                                     Warnings *warnings) {
+static Status warnings_of_rows(const Field *fields, const void *item, const char *pointer,
+                               Warnings *warnings) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         const void *member = (const char *)item + field->offset;
         char place[sizeof((Fault){0}.pointer)];
         if (field->kind == FIELD_KIND_BASE) {
-            TRY(scene_warnings_of_rows(field->fields, member, pointer, warnings));
+            TRY(warnings_of_rows(field->fields, member, pointer, warnings));
             continue;
         }
         if ((field->flags & FIELD_HIDDEN) != 0)
             continue;
         pointer_join(place, sizeof place, pointer, field->name);
         if (field->kind == FIELD_KIND_REALS) {
-            TRY(scene_warnings_of_reals(field, member, place, warnings));
+            TRY(warnings_of_reals(field, member, place, warnings));
         } else if (field->kind == FIELD_KIND_REAL) {
-            TRY(scene_warnings_of_real(field, *(const double *)member, place, warnings));
+            TRY(warnings_of_real(field, *(const double *)member, place, warnings));
         } else if (field->kind == FIELD_KIND_ITEM) {
-            TRY(scene_warnings_of_rows(field->fields, member, place, warnings));
+            TRY(warnings_of_rows(field->fields, member, place, warnings));
         } else if (field->kind == FIELD_KIND_VARIANT) {
             const Variant *variant = *(Variant *const *)member;
             if (variant != NULL)
-                TRY(scene_warnings_of_rows(variant->kind->fields, variant, place, warnings));
+                TRY(warnings_of_rows(variant->kind->fields, variant, place, warnings));
         } else if (field->kind == FIELD_KIND_LIST) {
             List list;
             memcpy(&list, member, sizeof list);
             for (size_t i = 0; i < list.count; i++) {
                 char element[sizeof((Fault){0}.pointer)];
                 pointer_index(element, sizeof element, place, i);
-                TRY(scene_warnings_of_rows(field->fields, (const char *)list.at + i * field->size,
-                                           element, warnings));
+                TRY(warnings_of_rows(field->fields, (const char *)list.at + i * field->size,
+                                     element, warnings));
             }
         }
     }
     return STATUS_OK;
 }
 
-static Status scene_warnings_of_times(const Scene *scene, Warnings *warnings) {
+static Status warnings_of_times(const Scene *scene, Warnings *warnings) {
     StructureRates rates;
     TRY(structure_rates(scene_structure(scene), &rates));
     if (!(rates.slowest > 0))
@@ -115,8 +115,8 @@ static Status scene_warnings_of_times(const Scene *scene, Warnings *warnings) {
     return STATUS_OK;
 }
 
-// A damper outweighs what it stands on.
-static Status scene_warnings_of_masses(const Scene *scene, Warnings *warnings) {
+// A damper is heavier than the storey that carries it.
+static Status warnings_of_masses(const Scene *scene, Warnings *warnings) {
     const Structure *structure = scene_structure(scene);
     for (size_t i = 0; i < scene->dampers.count; i++) {
         const Damper *on = &scene->dampers.at[i];
@@ -135,8 +135,8 @@ static Status scene_warnings_of_masses(const Scene *scene, Warnings *warnings) {
     return STATUS_OK;
 }
 
-// What the excitation's kind alone can judge.
-static Status scene_warnings_of_excitation(const Scene *scene, Warnings *warnings) {
+// Doubts of the excitation's own kind.
+static Status warnings_of_excitation(const Scene *scene, Warnings *warnings) {
     const Excitation *excitation = scene_excitation(scene);
     const ExcitationKind *kind = excitation_kind(excitation);
     if (kind->doubt == NULL || warnings == NULL)
@@ -150,19 +150,18 @@ static Status scene_warnings_of_excitation(const Scene *scene, Warnings *warning
     return STATUS_OK;
 }
 
-static bool scene_warnings_are_zero(const Reals *reals) {
+static bool warnings_are_zero(const Reals *reals) {
     for (size_t i = 0; i < reals->count; i++)
         if (reals->at[i] != 0)
             return false;
     return true;
 }
 
-// The default excitation is free vibration from rest: a forgotten one would answer with zeros.
-static Status scene_warnings_of_rest(const Scene *scene, Warnings *warnings) {
+// The default excitation is free vibration from rest: if it was forgotten the result is all zeros.
+static Status warnings_of_rest(const Scene *scene, Warnings *warnings) {
     const Excitation *excitation = scene_excitation(scene);
     if (excitation_kind(excitation) != &excitation_free ||
-        !scene_warnings_are_zero(&excitation->displacement) ||
-        !scene_warnings_are_zero(&excitation->velocity))
+        !warnings_are_zero(&excitation->displacement) || !warnings_are_zero(&excitation->velocity))
         return STATUS_OK;
     for (size_t i = 0; i < scene->dampers.count; i++)
         if (scene->dampers.at[i].velocity != 0)
@@ -174,15 +173,15 @@ static Status scene_warnings_of_rest(const Scene *scene, Warnings *warnings) {
 
 Status scene_warnings_of_input(const Simulation *simulation, Warnings *warnings) {
     const Scene *scene = &simulation->scene;
-    TRY(scene_warnings_of_rows(simulation_fields, simulation, "", warnings));
-    TRY(scene_warnings_of_rest(scene, warnings));
-    TRY(scene_warnings_of_times(scene, warnings));
-    TRY(scene_warnings_of_excitation(scene, warnings));
-    return scene_warnings_of_masses(scene, warnings);
+    TRY(warnings_of_rows(simulation_fields, simulation, "", warnings));
+    TRY(warnings_of_rest(scene, warnings));
+    TRY(warnings_of_times(scene, warnings));
+    TRY(warnings_of_excitation(scene, warnings));
+    return warnings_of_masses(scene, warnings);
 }
 
-// The scene asked for it; the number is foretold, and dampers can make more of it.
-static Status scene_warnings_of_modes(Outcome *outcome) {
+// The error is predicted, and dampers can enlarge it.
+static Status warnings_of_modes(Outcome *outcome) {
     const double error = outcome->response.given_up;
     if (!(error > RESPONSE_PARTING))
         return STATUS_OK;
@@ -192,7 +191,7 @@ static Status scene_warnings_of_modes(Outcome *outcome) {
                         error, error > 0.1 ? ", and only statistics hold" : "");
 }
 
-static Status scene_warnings_of_horizon(Outcome *outcome) {
+static Status warnings_of_horizon(Outcome *outcome) {
     if (isnan(outcome->summary.trust_horizon) || outcome->response.given_up > RESPONSE_PARTING)
         return STATUS_OK;
     return warnings_add(&outcome->warnings, "/duration",
@@ -202,8 +201,8 @@ static Status scene_warnings_of_horizon(Outcome *outcome) {
                         outcome->summary.trust_horizon, RESPONSE_PARTING);
 }
 
-// What steps are wrong by is not rounding's.
-static Status scene_warnings_of_steps(Outcome *outcome) {
+// The error of the solver's steps, not of rounding.
+static Status warnings_of_steps(Outcome *outcome) {
     const Summary *summary = &outcome->summary;
     if (isnan(summary->error_estimate))
         return warnings_add(&outcome->warnings, "/accuracy",
@@ -219,16 +218,16 @@ static Status scene_warnings_of_steps(Outcome *outcome) {
                         error, error > 0.1 ? ", and only statistics hold" : "");
 }
 
-// A buffer of a damper, and where it stands.
+// A buffer of a damper, and the stops that have it.
 typedef struct BufferStops {
     const Buffer *buffer;
-    const char *name;  // as the scene calls it
+    const char *name;  // of the member of the scene
     const char *where; // in words
     int first, count;  // sides
 } BufferStops;
 
 // One for both sides, or one for each.
-static size_t scene_warnings_find_stops(const Damper *damper, BufferStops stops[2]) {
+static size_t buffer_stops_find(const Damper *damper, BufferStops stops[2]) {
     static const char *const names[] = {"left_buffer", "right_buffer"};
     static const char *const wheres[] = {"left stop", "right stop"};
     const Buffer *left = damper_buffer(damper, SIDE_LEFT);
@@ -245,8 +244,8 @@ static size_t scene_warnings_find_stops(const Damper *damper, BufferStops stops[
     return 2;
 }
 
-// What met several stops with one range.
-static Approaches scene_warnings_add_up(const Approaches *met, int count) {
+// Sum over stops with the same range.
+static Approaches approaches_sum(const Approaches *met, int count) {
     Approaches sum = met[0];
     for (int i = 1; i < count; i++) {
         if (met[i].count == 0)
@@ -261,7 +260,7 @@ static Approaches scene_warnings_add_up(const Approaches *met, int count) {
 }
 
 // "0.15 to 1 m/s", "0.15 m/s and more", "1 m/s and less".
-static void scene_warnings_write_range(double from, double to, char *text, size_t size) {
+static void approaches_write_range(double from, double to, char *text, size_t size) {
     char low[32], high[32];
     text_real(low, from);
     text_real(high, to);
@@ -273,8 +272,8 @@ static void scene_warnings_write_range(double from, double to, char *text, size_
         snprintf(text, size, "%s to %s m/s", low, high);
 }
 
-// "slower than", "faster than" or both, and how far it went.
-static void scene_warnings_write_outside(const Approaches *met, char which[48], char reach[64]) {
+// "slower", "faster" or both, and the extreme speeds.
+static void approaches_write_outside(const Approaches *met, char which[48], char reach[64]) {
     if (met->above == 0) {
         snprintf(which, 48, "slower");
         snprintf(reach, 64, "down to %.3g", met->least);
@@ -287,17 +286,17 @@ static void scene_warnings_write_outside(const Approaches *met, char which[48], 
     }
 }
 
-static Status scene_warnings_of_stops(const BufferStops *stops, size_t damper,
-                                      const Approaches *all, Warnings *warnings) {
-    const Approaches met = scene_warnings_add_up(&all[stops->first], stops->count);
+static Status warnings_of_stops(const BufferStops *stops, size_t damper, const Approaches *all,
+                                Warnings *warnings) {
+    const Approaches met = approaches_sum(&all[stops->first], stops->count);
     const bool is_named = stops->buffer->material != NULL;
     char pointer[64], range[96], which[48], reach[64];
     if (met.below + met.above == 0)
         return STATUS_OK;
     snprintf(pointer, sizeof pointer, "/dampers/%zu/%s%s", damper, stops->name,
              is_named ? "" : "/table");
-    scene_warnings_write_range(met.from, met.to, range, sizeof range);
-    scene_warnings_write_outside(&met, which, reach);
+    approaches_write_range(met.from, met.to, range, sizeof range);
+    approaches_write_outside(&met, which, reach);
     return warnings_add(
         warnings, pointer,
         "%llu of %llu impacts at the %s of damper %zu were %s than %.80s%s (%s), %s m/s: %s",
@@ -308,22 +307,21 @@ static Status scene_warnings_of_stops(const BufferStops *stops, size_t damper,
                                        : "its numbers are used there without a measurement");
 }
 
-static Status scene_warnings_of_speeds(const Scene *scene, const Approaches *met,
-                                       Warnings *warnings) {
+static Status warnings_of_speeds(const Scene *scene, const Approaches *met, Warnings *warnings) {
     for (size_t i = 0; met != NULL && i < scene->dampers.count; i++) {
         BufferStops stops[2];
-        const size_t count = scene_warnings_find_stops(&scene->dampers.at[i], stops);
+        const size_t count = buffer_stops_find(&scene->dampers.at[i], stops);
         for (size_t k = 0; k < count; k++)
-            TRY(scene_warnings_of_stops(&stops[k], i, &met[2 * i], warnings));
+            TRY(warnings_of_stops(&stops[k], i, &met[2 * i], warnings));
     }
     return STATUS_OK;
 }
 
-// By how much the effective masses may differ of the test and of the scene.
+// Largest relative difference between the effective masses of test and scene.
 static const double pair_part = 0.2;
 
-static Status scene_warnings_of_pair(const Derived *derived, const BufferStops *stops,
-                                     Warnings *warnings) {
+static Status warnings_of_pair(const Derived *derived, const BufferStops *stops,
+                               Warnings *warnings) {
     const double tested = buffer_test_mass(stops->buffer), own = derived->effective_mass;
     char pointer[64];
     if (!buffer_is_measured(stops->buffer) || !(fabs(own - tested) > pair_part * tested))
@@ -343,18 +341,17 @@ Status scene_warnings_of_pairs(const Scene *scene, const DerivedList *derived, W
         const Derived *at = &derived->at[i];
         const Damper *damper = &scene->dampers.at[at->damper - 1];
         BufferStops stops[2];
-        const size_t count = scene_warnings_find_stops(damper, stops);
+        const size_t count = buffer_stops_find(damper, stops);
         for (size_t k = 0; k < count && damper->identified_for == IDENTIFIED_FOR_SCENE; k++)
             if (stops[k].first == at->side)
-                TRY(scene_warnings_of_pair(at, &stops[k], warnings));
+                TRY(warnings_of_pair(at, &stops[k], warnings));
     }
     return STATUS_OK;
 }
 
 Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, Outcome *outcome) {
-    TRY(scene_warnings_of_modes(outcome));
-    TRY(outcome->response.is_stepped ? scene_warnings_of_steps(outcome)
-                                     : scene_warnings_of_horizon(outcome));
+    TRY(warnings_of_modes(outcome));
+    TRY(outcome->response.is_stepped ? warnings_of_steps(outcome) : warnings_of_horizon(outcome));
     TRY(scene_warnings_of_pairs(scene, derived, &outcome->warnings));
-    return scene_warnings_of_speeds(scene, outcome->response.approaches, &outcome->warnings);
+    return warnings_of_speeds(scene, outcome->response.approaches, &outcome->warnings);
 }

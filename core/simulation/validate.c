@@ -10,7 +10,7 @@
 
 enum { LABELS = 32, TITLE_BYTES = 200 };
 
-// Every channel of 200 storeys and 64 dampers once, and the usual ones.
+// Every channel of 200 storeys and 64 dampers once, and the default ones.
 enum { CHANNELS = 4 * STRUCTURE_STOREYS + 4 * SCENE_DAMPERS + 2 };
 
 static const char *const usual[] = {CHANNEL_USUAL, NULL};
@@ -63,7 +63,7 @@ static Status validate_overlap(const SpectrumRequest *psd, Problem *problem) {
                             (unsigned long long)psd->segment, (unsigned long long)psd->overlap);
 }
 
-// `count` is 0 where the number of samples is not known because of another fault.
+// `count` is the number of samples, 0 if another fault leaves it unknown.
 static Status validate_psd(SpectrumRequest *psd, size_t count, Warnings *warnings,
                            Problem *problem) {
     if (psd->channels.count == 0) {
@@ -104,7 +104,7 @@ static Status validate_output(Simulation *simulation, size_t count, Warnings *wa
         channel_names_complete(scene, &output->psd.channels, true, "/output/psd/channels", problem),
     };
     Status status = faults[0] != STATUS_OK ? faults[0] : faults[1];
-    // Statistics need a sample at least.
+    // Statistics need at least one sample.
     const double last = count > 0 ? (double)(count - 1) / scene->sample_rate : scene->duration;
     if (scene->duration > 0 && output->statistics_from > last &&
         isfinite(output->statistics_from)) {
@@ -118,7 +118,7 @@ static Status validate_output(Simulation *simulation, size_t count, Warnings *wa
     return psd == STATUS_NO_MEMORY || status == STATUS_OK ? psd : status;
 }
 
-// What the solver has no use for is left out.
+// Erases settings that the solver does not use.
 static Status validate_solver(Simulation *simulation, Problem *problem) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     const Scene *scene = &simulation->scene;
@@ -134,7 +134,7 @@ static Status validate_solver(Simulation *simulation, Problem *problem) {
                        solver->kind.name, law->kind.name);
 }
 
-// All modes are as many as storeys, which is what none asked for means.
+// As many modes as storeys are the same as no number.
 static Status validate_modes(const Simulation *simulation, Problem *problem) {
     Accuracy *accuracy = (Accuracy *)(void *)simulation->accuracy;
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
@@ -186,7 +186,7 @@ static Status validate_accuracy(Simulation *simulation, Problem *problem) {
     return STATUS_OK;
 }
 
-// Many channels may be more than one scene's share, though each of them has few samples.
+// Limits the sum over all channels, not only the samples of each.
 static Status validate_values(const Simulation *simulation, const SimulationLimits *limits,
                               Problem *problem) {
     const Output *output = &simulation->output;
@@ -207,7 +207,7 @@ Status simulation_validate(Simulation *simulation, const SimulationLimits *limit
     const size_t most_samples = limits != NULL ? limits->samples : 0;
     const Status rows = fields_check(simulation_fields, simulation, "", problem);
     const Status scene = scene_complete(&simulation->scene, most_samples, problem);
-    // Faults that the caller met before are among those of the problem.
+    // The problem may contain earlier faults of the caller.
     const bool is_sound = rows == STATUS_OK && scene == STATUS_OK && !problem_concerns(problem, "");
     const size_t count = is_sound ? scene_sample_count(&simulation->scene) : 0;
     Status status = validate_output(simulation, count, warnings, problem);
