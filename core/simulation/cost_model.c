@@ -1,5 +1,5 @@
-// What a run will take, before anything runs: from what the scene says, without making its plan.
-// The parts' costs are as measured; how many contacts there will be can only be guessed.
+// Predicted cost of a run, from the scene alone: no plan is made. All coefficients are measured, in
+// solver steps of SOLVER_STEP. The number of contacts can only be estimated.
 #include <math.h>
 
 #include "core/simulation/internal.h"
@@ -8,34 +8,42 @@
 
 static const double TURN = 6.28318530717958647693;
 
-// In solver steps: a sample of the engine for one mass, an arc, and an impact, which is flight up
-// to it, contact and flight after it.
+// Steps of the engine for one mass: a sample, a Taylor step, and an impact with the flight before
+// and after it.
 static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
-static const double VALUE = 0.02;                   // of a channel, at one sample
-static const double TRANSFORMED = 0.4;              // of a spectrum, once
-static const double MODES = 2;                      // of a storey cubed
-static const double RUN = 200;                      // plan, room and summary
-static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // of an impact in a frame, of one by impulse
-static const double NEIGHBOUR = 1.6; // of a frame with dampers, and its neighbour until they part
+static const double VALUE = 0.02;                   // a value of a channel
+static const double MODES = 2;                      // storeys cubed
+static const double RUN = 200;                      // plan, memory and summary
+static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // Taylor steps of a contact, of an impulse
+static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion until they diverge
 static const double IMPACTS_A_CYCLE = 2;
-static const double TRANSFORM = 8000; // the first time, because it is planned then
-static const double REACHING = 0.3;   // of fast flight, where no bound keeps it from the stops
-static const double FREE_CYCLES = 30; // after which free vibration does not reach the stops
+static const double REACHING = 0.3;   // share of fast flight that no bound keeps from the stops
+static const double FREE_CYCLES = 30; // after these free vibration does not reach the stops
 
-// Of a contact under a power law, what it takes whatever its tolerance; and the digits of the
-// whole.
+// A contact under a power law: the share that does not depend on the tolerance, and the digits of
+// full accuracy.
 static const double EASY = 0.3, DIGITS = 15;
 
-static const double IMPACTS_KEPT = 1e5; // more are hardly meant
+// A segment of a spectrum, per sample: window, trend, sums and the transform. Lengths up to
+// CACHED_LENGTH fit in the caches; FFTW takes 1 to 25 ns a sample of them, and 3 to 10 times as
+// long above if the length has a prime factor that large.
+static const double CACHED_LENGTH = 4096, SEGMENT_SAMPLE = 0.4, SEGMENT_DOUBLING = 0.05;
+static const double PRIME_SAMPLE = 1, PRIME_DOUBLING = 1.1;
+static const double PLANNING = 8000, PRIME_PLANNING = 0.5; // steps; share of a transform
 
-// What the exact solver will meet.
+// Bytes per sample of a segment without and with a large prime factor (FFTW, window and sums), and
+// per value of a spectrum in a JSON document.
+static const double SEGMENT_BYTES = 48, PRIME_BYTES = 96, TEXT_BYTES = 24;
+static const double IMPACTS_KEPT = 1e5; // limit of the estimate of memory for impacts
+
+// Estimated work of the exact solver.
 typedef struct Outlook {
     size_t modes; // of a frame
     double samples, arcs, impacts, digits;
     bool is_coupled;
 } Outlook;
 
-// Arcs of flight where a sample interval is longer than the fastest motion in it: there no bound
+// Taylor steps of flight where the fastest motion is shorter than a sample interval. There no bound
 // shows that the stops are out of reach, and coupled modes have no closed form for a whole
 // interval.
 static double cost_flight_arcs(const Scene *scene, const StructureRates *rates) {
@@ -60,7 +68,7 @@ static double cost_base_samples(const Simulation *simulation) {
     return fmin(lasts, simulation->scene.duration) / interval;
 }
 
-// Kinks of the base that do not lie at samples end an arc each, and have another begin.
+// Each kink of the base between samples ends a Taylor step and starts another.
 static double cost_base_arcs(const Simulation *simulation) {
     const double ratio =
         simulation_base_interval(simulation) * simulation->scene.sample_rate; // in sample intervals
@@ -71,12 +79,12 @@ static double cost_base_arcs(const Simulation *simulation) {
 
 static double cost_impacts(const Scene *scene, const StructureRates *rates) {
     const bool is_free = excitation_kind(scene_excitation(scene)) == &excitation_free;
-    // What has no spring moves with the duration.
+    // Without a spring there is one slow movement.
     double rate = rates->slowest > 0 ? rates->slowest : TURN / scene->duration;
     const Excitation *excitation = scene_excitation(scene);
     if (excitation_kind(excitation)->fastest != NULL)
         rate = fmax(rate, fmin(excitation_kind(excitation)->fastest(excitation), 3 * rate));
-    // Masses on a frame feel its higher modes as well.
+    // Masses on a frame respond to its higher modes too.
     rate *= sqrt((double)structure_storeys(scene_structure(scene)));
     const double cycles = rate / TURN * scene->duration;
     return IMPACTS_A_CYCLE * (is_free ? fmin(cycles, FREE_CYCLES) : cycles) *
@@ -99,7 +107,7 @@ static double cost_frame_steps(const Scene *scene, const Outlook *outlook) {
                                       outlook->impacts * (contact + 2 * event + 2 * arc));
 }
 
-// Whether the engine for one mass serves, as plan_is_single will say.
+// plan_is_single() without a plan.
 static bool cost_is_single(const Scene *scene) {
     const Structure *structure = scene_structure(scene);
     if (structure_storeys(structure) > 1 || scene->dampers.count > 1)
@@ -122,7 +130,7 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     const size_t modes = simulation_modes(simulation, structure_storeys(structure));
     StructureRates rates;
     if (structure_rates_of(structure, modes, &rates) != STATUS_OK)
-        rates = (StructureRates){0}; // a guess without memory: the run will tell
+        rates = (StructureRates){0}; // without memory: the run reports it
     const Outlook outlook = {.modes = modes,
                              .digits = -log10(exact_tolerance(simulation_settings(simulation))),
                              .samples = (double)scene_sample_count(scene),
@@ -136,12 +144,12 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
            ARC * outlook.arcs + IMPACT * outlook.impacts;
 }
 
-// Steps of a solver that knows its own cost.
+// Steps of a solver with its own cost function.
 static double cost_own_steps(const Simulation *simulation) {
     Plan *plan;
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     if (plan_sketch(&simulation->scene, simulation_modes(simulation, storeys), &plan) != STATUS_OK)
-        return 0; // the run will tell why
+        return 0; // the run reports why
     const double steps =
         simulation_solver(simulation)
             ->cost(simulation_settings(simulation), simulation_base_interval(simulation), plan);
@@ -149,29 +157,56 @@ static double cost_own_steps(const Simulation *simulation) {
     return steps;
 }
 
-// How often Welch's method cost_transforms a sample.
-static double cost_transforms(const SpectrumRequest *psd) {
-    if (psd->channels.count == 0 || psd->segment <= psd->overlap)
-        return 0;
-    return (double)psd->channels.count * (double)psd->segment /
-           (double)(psd->segment - psd->overlap);
+// The largest prime factor of a length over CACHED_LENGTH, at least 1.
+static double cost_prime_ratio(uint64_t length) {
+    uint64_t left = length;
+    for (uint64_t factor = 2; factor * factor <= left; factor++)
+        while (left % factor == 0 && left > factor)
+            left /= factor;
+    return fmax((double)left / CACHED_LENGTH, 1);
 }
 
-// Series and hidden columns, the base and what a coarse one is refined to, matrices, the ledger.
-static double cost_bytes(const Simulation *simulation) {
+double cost_spectra(const SpectrumRequest *psd, size_t samples) {
+    if (psd->channels.count == 0 || psd->segment <= psd->overlap)
+        return 0;
+    const double length = (double)psd->segment, prime = cost_prime_ratio(psd->segment);
+    const double doublings = fmax(log2(length / CACHED_LENGTH), 0);
+    double sample = SEGMENT_SAMPLE + SEGMENT_DOUBLING * doublings, planning = PLANNING;
+    if (prime > 1) {
+        const double own = PRIME_SAMPLE + PRIME_DOUBLING * (1 + log2(prime));
+        sample += own;
+        planning += PRIME_PLANNING * own * length;
+    }
+    const double transformed =
+        (double)psd->channels.count * length / (length - (double)psd->overlap);
+    return (double)samples * sample * transformed + planning;
+}
+
+// Memory of series and hidden columns, of the base and its refinement, matrices, impacts, spectra
+// and their document.
+static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
+    const SpectrumRequest *psd = &output->psd;
     const double samples = (double)scene_sample_count(scene), base = cost_base_samples(simulation);
-    const double columns = (double)(output->channels.count + output->psd.channels.count);
+    const double columns = (double)(output->channels.count + psd->channels.count);
     const double refined = base > 0 && base < samples ? samples : 0;
     const double size =
         (double)structure_storeys(scene_structure(scene)) + (double)scene->dampers.count;
     StructureRates rates;
     if (structure_rates(scene_structure(scene), &rates) != STATUS_OK)
         rates = (StructureRates){0};
-    return sizeof(Outcome) +
-           sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
-           sizeof(Impact) * fmin(cost_impacts(scene, &rates), IMPACTS_KEPT);
+    cost->bytes = sizeof(Outcome) +
+                  sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
+                  sizeof(Impact) * fmin(cost_impacts(scene, &rates), IMPACTS_KEPT);
+    if (psd->channels.count == 0)
+        return;
+    const double values = (double)(psd->channels.count + 1) * (double)(psd->segment / 2 + 1);
+    cost->document_bytes = TEXT_BYTES * values;
+    cost->spectra_bytes =
+        (cost_prime_ratio(psd->segment) > 1 ? PRIME_BYTES : SEGMENT_BYTES) * (double)psd->segment +
+        sizeof(double) * values + cost->document_bytes;
+    cost->bytes += cost->spectra_bytes;
 }
 
 Cost cost_scene(const Simulation *simulation) {
@@ -180,9 +215,8 @@ Cost cost_scene(const Simulation *simulation) {
     const double samples = (double)scene_sample_count(scene);
     const double storeys = (double)structure_storeys(scene_structure(scene));
     const double columns = (double)(output->channels.count + output->psd.channels.count);
-    Cost cost = {.bytes = cost_bytes(simulation)};
-    cost.spectra = samples * TRANSFORMED * cost_transforms(&output->psd) +
-                   (output->psd.channels.count > 0 ? TRANSFORM : 0);
+    Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene))};
+    cost_add_bytes(simulation, &cost);
     cost.base = cost_base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
     cost.steps =
         RUN + samples * VALUE * columns + cost.spectra + cost.base +

@@ -52,6 +52,7 @@ Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, 
 // ignored.
 Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost cost_scene(const Simulation *simulation);
+double cost_spectra(const SpectrumRequest *psd, size_t samples); // solver steps
 
 // Plan and base motion of a run.
 typedef struct RunInputs {

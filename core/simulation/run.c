@@ -229,10 +229,21 @@ static Status run_make_columns(RunContext *context, const Texts *names, Columns 
     return STATUS_OK;
 }
 
+static double run_steps_max(const SimulationLimits *limits) {
+    return limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps;
+}
+
+// The predicted steps of the spectra count like those of the solver, so that the same scene stops
+// at the same place on any machine.
 static Status run_spectrum(RunContext *context, Problem *problem) {
     const SpectrumRequest *request = &context->simulation->output.psd;
     if (request->channels.count == 0)
         return STATUS_OK;
+    const double steps_max = run_steps_max(context->limits);
+    if (steps_max > 0 &&
+        context->outcome->steps + cost_spectra(request, context->plan->count) > steps_max)
+        return problem_set(problem, STATUS_LIMIT, SOLVER_STOPPED "the spectra", steps_max,
+                           steps_max * SOLVER_STEP);
     Columns *columns = &context->transformed;
     columns->at = calloc(request->channels.count, sizeof *columns->at);
     const char **units = calloc(request->channels.count, sizeof *units);
@@ -326,7 +337,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
                .column_count = context->wanted_count,
                .statistics_from = simulation->output.statistics_from,
                .impacts_max = limits == NULL ? 0 : limits->impacts,
-               .steps_max = limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps,
+               .steps_max = run_steps_max(limits),
                .is_clear = regime->is_clear};
     if (regime->is_at_rest)
         TRY(rest_run(&run, &outcome->response, problem));

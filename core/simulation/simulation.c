@@ -14,7 +14,8 @@ static Status simulation_refuse_time(const Simulation *simulation, const Cost *c
     if (2 * cost->spectra > cost->steps)
         return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
                            ", most of it for spectra", "", most,
-                           "ask for fewer channels or less overlap");
+                           "ask for fewer channels, less overlap, or a segment without large "
+                           "prime factors");
     if (2 * cost->base > cost->steps)
         return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
                            ", most of it to make the base's motion", "", most,
@@ -30,7 +31,19 @@ static Status simulation_refuse_time(const Simulation *simulation, const Cost *c
                                           : "take a shorter one, or fewer samples");
 }
 
-// A scene that can be told beforehand to take too much is refused at once.
+static Status simulation_refuse_bytes(const Simulation *simulation, const Cost *cost,
+                                      const SimulationLimits *limits, Problem *problem) {
+    static const char told[] =
+        "would take about %.3g MB of memory, at most %.4g MB are allowed: %s";
+    if (2 * cost->spectra_bytes > cost->bytes)
+        return problem_add(problem, STATUS_INVALID, "/output/psd", told, 1e-6 * cost->bytes,
+                           1e-6 * limits->bytes, "ask for shorter segments or fewer channels");
+    return problem_add_real(
+        problem, STATUS_INVALID, "/output/channels", (double)simulation->output.channels.count,
+        NULL, told, 1e-6 * cost->bytes, 1e-6 * limits->bytes, "ask for fewer channels or samples");
+}
+
+// Refuses a scene that is predicted to exceed the limits.
 static Status simulation_check_cost(const Simulation *simulation, const SimulationLimits *limits,
                                     Problem *problem) {
     if (limits == NULL)
@@ -38,12 +51,13 @@ static Status simulation_check_cost(const Simulation *simulation, const Simulati
     const Cost cost = simulation_cost(simulation);
     if (limits->steps > 0 && !(cost.steps <= limits->steps))
         return simulation_refuse_time(simulation, &cost, limits, problem);
+    if (limits->document_bytes > 0 && !(cost.document_bytes <= limits->document_bytes))
+        return problem_add(problem, STATUS_INVALID, "/output/psd",
+                           "would make a document of about %.3g MB, at most %.4g MB can be kept: "
+                           "ask for shorter segments or fewer channels",
+                           1e-6 * cost.document_bytes, 1e-6 * limits->document_bytes);
     if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))
-        return problem_add_real(problem, STATUS_INVALID, "/output/channels",
-                                (double)simulation->output.channels.count, NULL,
-                                "would take about %.3g MB of memory, at most %.4g MB are allowed: "
-                                "ask for fewer channels or samples",
-                                1e-6 * cost.bytes, 1e-6 * limits->bytes);
+        return simulation_refuse_bytes(simulation, &cost, limits, problem);
     return STATUS_OK;
 }
 

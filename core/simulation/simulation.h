@@ -51,8 +51,9 @@ typedef struct SimulationLimits {
     // Predicted solver steps. A run is refused above this number, and stopped at
     // SIMULATION_PATIENCE times this number if the prediction was too low.
     double steps;
-    double bytes;  // predicted memory of a run
-    size_t points; // of a sweep; 0: the default
+    double bytes;          // predicted memory of a run
+    double document_bytes; // predicted size of the spectra as a document
+    size_t points;         // of a sweep; 0: the default
 } SimulationLimits;
 
 #define SIMULATION_PATIENCE 3
@@ -125,12 +126,14 @@ size_t outcome_bytes(const Outcome *outcome); // memory in use, for caches
 
 // Predicted cost of a run.
 typedef struct Cost {
-    double steps;       // solver steps
-    double cpu_seconds; // the same as time [s]
-    double bytes;       // peak memory of the run
-    double spectra;     // the part of `steps` for spectra
-    double base;        // the part of `steps` for the motion of the base
-    bool is_fast;       // motion within sample intervals dominates
+    double steps;          // solver steps
+    double cpu_seconds;    // the same as time [s]
+    double bytes;          // peak memory of the run and its documents
+    double spectra_bytes;  // the part of `bytes` for spectra and their document
+    double document_bytes; // size of that document
+    double spectra;        // the part of `steps` for spectra
+    double base;           // the part of `steps` for the motion of the base
+    bool is_fast;          // motion within sample intervals dominates
 } Cost;
 Cost simulation_cost(const Simulation *simulation);
 

@@ -221,6 +221,7 @@ static Status serve(const ServeSettings *settings, const sigset_t *signals, Prob
                                             .impacts = settings->max_impacts,
                                             .steps = settings->max_cpu_seconds / SOLVER_STEP,
                                             .bytes = (double)settings->max_run_bytes,
+                                            .document_bytes = DOCUMENT_BYTES,
                                             .points = settings->max_points}};
     const KeepRules keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes};
     const ReachSettings asked = {settings->host, settings->base_url, settings->tls_cert,

@@ -10,6 +10,8 @@
 
 typedef struct Intake Intake;
 
+enum { DOCUMENT_BYTES = 900000000 }; // of one document; the database takes a billion
+
 typedef struct IntakeSettings {
     size_t workers;     // threads, at least 1
     size_t queue_most;  // unfinished jobs at most

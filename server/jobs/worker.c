@@ -43,9 +43,6 @@ void findings_clear(Findings *findings) {
     *findings = (Findings){0};
 }
 
-// Of one document; the database takes a billion.
-enum { DOCUMENT_BYTES = 900000000 };
-
 static char *take(Bytes *bytes, Status *status) {
     char *text = bytes_take(bytes, NULL);
     if (text == NULL)

@@ -156,6 +156,13 @@ def test_what_takes_too_long_is_refused_at_the_door():
             reply = daemon.request("POST", path, json=slow)
             problem(reply, 422, "/accuracy")
             assert "at most 60 s are allowed" in reply.json()["errors"][0]["detail"], reply
+        names = ["displacement", "velocity", "acceleration", "mean_acceleration", "damper_displacement",
+                 "damper_velocity", "penetration", "contact_force", "base_acceleration"]
+        for segment, overlap, says in ((8388593, 7549733, "prime factors"), (8388608, 0, "900 MB can be kept")):
+            psd = {"channels": names, "segment": segment, "overlap": overlap}
+            reply = daemon.submit(sponge(duration=33554, output={"channels": [], "psd": psd}))
+            problem(reply, 422, "/output/psd")
+            assert says in reply.json()["errors"][0]["detail"], reply
     with program.daemon("--max-cpu-seconds", "0.001", "--max-run-bytes", "2000000") as daemon:
         problem(daemon.submit(sponge(duration=1e4)), 422, "/output/psd")
         problem(daemon.submit(sponge(duration=1e4, output={"psd": None})), 422, "/duration")

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "core/math/fft.h"
 #include "core/solve/step_work.h"
 #include "tests/support/document.h"
 #include "tests/support/fields.h"
@@ -121,6 +122,79 @@ static void what_takes_too_much_memory_is_refused(void **state) {
            "would take about 4.01 MB of memory, at most 1 MB are allowed");
 }
 
+#define SPECTRUM                                                                                   \
+    SDOF ", \"output\": {\"channels\": [], \"psd\": {\"channels\": [\"displacement\"]}}"
+#define ALL_SPECTRA                                                                                \
+    SDOF "," DAMPER ", \"output\": {\"channels\": [], \"psd\": {\"channels\": [\"displacement\", " \
+         "\"velocity\", \"acceleration\", \"mean_acceleration\", \"damper_displacement\", "        \
+         "\"damper_velocity\", \"penetration\", \"contact_force\", \"base_acceleration\"]}}"
+
+// Of 33,554,001 samples.
+static Status complete_spectra(const char *members, uint64_t segment, uint64_t overlap,
+                               const SimulationLimits *limits, Cost *cost) {
+    Simulation simulation;
+    document_pass(&simulation, members);
+    simulation.scene.duration = 33554;
+    simulation.scene.sample_rate = 1000;
+    simulation.output.psd.segment = segment;
+    simulation.output.psd.overlap = overlap;
+    problem_clear(&told);
+    const Status status = simulation_complete(&simulation, limits, NULL, &told);
+    *cost = simulation_cost(&simulation);
+    simulation_clear(&simulation);
+    return status;
+}
+
+static void refuse_spectra(const char *members, uint64_t segment, uint64_t overlap,
+                           const SimulationLimits *limits, const char *says) {
+    Cost cost;
+    assert_int_equal(complete_spectra(members, segment, overlap, limits, &cost), STATUS_INVALID);
+    if (strstr(detail_at(&told, "/output/psd"), says) == NULL)
+        fail_msg("%s: %s", told.faults[0].pointer, told.faults[0].detail);
+}
+
+// 8388593 and 16777213 are primes.
+static void spectra_are_priced_by_the_length_of_segments_and_its_prime_factors(void **state) {
+    (void)state;
+    Cost cached, smooth, prime;
+    const SimulationLimits minute = {.steps = 60 / SOLVER_STEP};
+    assert_int_equal(complete_spectra(SPECTRUM, 4096, 2048, &minute, &cached), STATUS_OK);
+    assert_int_equal(complete_spectra(SPECTRUM, 1 << 24, 1 << 23, &minute, &smooth), STATUS_OK);
+    assert_int_equal(complete_spectra(SPECTRUM, 16777213, 8388606, &minute, &prime), STATUS_OK);
+    assert_true(smooth.spectra > 1.2 * cached.spectra && smooth.spectra < 4 * cached.spectra);
+    assert_true(prime.spectra > 10 * smooth.spectra);
+    refuse_spectra(ALL_SPECTRA, 8388593, 7549733, &minute, "a segment without large prime factors");
+}
+
+static void spectra_that_cannot_be_kept_are_refused(void **state) {
+    (void)state;
+    const SimulationLimits document = {.document_bytes = 9e8}, memory = {.bytes = 1e9};
+    refuse_spectra(ALL_SPECTRA, 1 << 23, 0, &document,
+                   "a document of about 1.01e+03 MB, at most 900 MB can be kept");
+    refuse_spectra(SPECTRUM, 1 << 25, 0, &memory,
+                   "MB of memory, at most 1000 MB are allowed: ask for shorter segments");
+}
+
+static void spectra_count_against_the_steps_of_a_run(void **state) {
+    (void)state;
+    const SimulationLimits limits = {.steps = 5e4};
+    for (uint64_t overlap = 0; overlap < 64; overlap += 63) {
+        Simulation simulation;
+        Outcome *outcome = NULL;
+        document_pass(&simulation, SPECTRUM);
+        simulation.scene.duration = 100;
+        simulation.output.psd.segment = 64;
+        simulation.output.psd.overlap = overlap;
+        problem_clear(&told);
+        assert_int_equal(simulation_run(&simulation, &limits, NULL, NULL, &outcome, &told),
+                         overlap == 0 ? STATUS_OK : STATUS_LIMIT);
+        if (overlap > 0)
+            assert_non_null(strstr(told.detail, "stopped at the spectra"));
+        outcome_unref(outcome);
+        simulation_clear(&simulation);
+    }
+}
+
 // Two masses between stops without clearance, T_c a hundred-thousandth of a sample interval.
 static void a_run_foretold_too_little_stops_at_a_count_of_its_own(void **state) {
     (void)state;
@@ -200,10 +274,14 @@ int main(void) {
         cmocka_unit_test(a_short_record_makes_no_long_run),
         cmocka_unit_test(what_takes_too_long_is_refused_where_it_helps_most),
         cmocka_unit_test(what_takes_too_much_memory_is_refused),
+        cmocka_unit_test(spectra_are_priced_by_the_length_of_segments_and_its_prime_factors),
+        cmocka_unit_test(spectra_that_cannot_be_kept_are_refused),
+        cmocka_unit_test(spectra_count_against_the_steps_of_a_run),
         cmocka_unit_test(a_run_foretold_too_little_stops_at_a_count_of_its_own),
         cmocka_unit_test(many_dampers_on_many_storeys_are_foretold_to_take_long),
         cmocka_unit_test(a_contact_among_many_masses_is_foretold_by_their_number),
         cmocka_unit_test(coupled_flight_is_foretold_by_the_pairs_of_modes),
     };
+    fourier_start();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
