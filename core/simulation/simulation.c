@@ -1,119 +1,66 @@
-// Entry points: each decides between a plain scene, an accuracy target and a comparison with the
-// undamped baseline.
-#include <stddef.h>
+// The version of the engine, and the result of a run: its fields and its reference count.
+#include "core/simulation/simulation.h"
 
-#include "core/simulation/internal.h"
+#include <stdatomic.h>
+#include <stdlib.h>
 
 const char engine_version[] = "impactd-4";
 
-static Status simulation_refuse_time(const Simulation *simulation, const Cost *cost,
-                                     const SimulationLimits *limits, Problem *problem) {
-    const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
-    const double most = limits->steps * SOLVER_STEP;
-    static const char told[] = "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
-    if (2 * cost->spectra > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
-                           ", most of it for spectra", "", most,
-                           "ask for fewer channels, less overlap, or a segment without large "
-                           "prime factors");
-    if (2 * cost->base > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
-                           ", most of it to make the base's motion", "", most,
-                           "take fewer samples of it, or a shorter duration");
-    if (solver->cost != NULL)
-        return problem_add(problem, STATUS_INVALID, "/accuracy", told, cost->cpu_seconds, " by ",
-                           solver->kind.name, most,
-                           "take longer steps or a larger tolerance, or the solver exact");
-    return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
-                            told, cost->cpu_seconds, "", "", most,
-                            cost->is_fast ? "take a shorter one; the structure or the base moves "
-                                            "many times within a sample interval"
-                                          : "take a shorter one, or fewer samples");
+// clang-format off
+const Field summary_fields[] = {
+    FIELD_REAL(Summary, peak_displacement, "m", ANY, OPTIONAL, "largest |displacement| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_displacement, "m", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
+    FIELD_REAL(Summary, peak_acceleration, "m/s^2", ANY, OPTIONAL, "largest |acceleration| over samples and events, of all storeys"),
+    FIELD_REAL(Summary, rms_acceleration, "m/s^2", ANY, OPTIONAL, "root mean square over samples, the largest of all storeys"),
+    FIELD_COUNT(Summary, impacts, NULL, AT_MIN(0), OPTIONAL, "number of impacts"),
+    FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
+    FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
+    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
+    FIELD_END
+};
+
+const Field reduction_fields[] = {
+    FIELD_REAL(Reduction, peak_displacement_reduction, NULL, ANY, OPTIONAL, "1 - peak_displacement over that without dampers"),
+    FIELD_REAL(Reduction, rms_displacement_reduction, NULL, ANY, OPTIONAL, "1 - rms_displacement over that without dampers"),
+    FIELD_REAL(Reduction, peak_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - peak_acceleration over that without dampers"),
+    FIELD_REAL(Reduction, rms_acceleration_reduction, NULL, ANY, OPTIONAL, "1 - rms_acceleration over that without dampers"),
+    FIELD_END
+};
+// clang-format on
+
+typedef struct OutcomeRef {
+    Outcome outcome; // first, so that both have the same address
+    atomic_size_t count;
+} OutcomeRef;
+
+Outcome *outcome_new(void) {
+    OutcomeRef *ref = calloc(1, sizeof *ref);
+    if (ref == NULL)
+        return NULL;
+    atomic_init(&ref->count, 1);
+    return &ref->outcome;
 }
 
-static Status simulation_refuse_bytes(const Simulation *simulation, const Cost *cost,
-                                      const SimulationLimits *limits, Problem *problem) {
-    static const char told[] =
-        "would take about %.3g MB of memory, at most %.4g MB are allowed: %s";
-    if (2 * cost->spectra_bytes > cost->bytes)
-        return problem_add(problem, STATUS_INVALID, "/output/psd", told, 1e-6 * cost->bytes,
-                           1e-6 * limits->bytes, "ask for shorter segments or fewer channels");
-    return problem_add_real(
-        problem, STATUS_INVALID, "/output/channels", (double)simulation->output.channels.count,
-        NULL, told, 1e-6 * cost->bytes, 1e-6 * limits->bytes, "ask for fewer channels or samples");
+Outcome *outcome_ref(Outcome *outcome) {
+    atomic_fetch_add(&((OutcomeRef *)outcome)->count, 1);
+    return outcome;
 }
 
-// Refuses a scene that is predicted to exceed the limits.
-static Status simulation_check_cost(const Simulation *simulation, const SimulationLimits *limits,
-                                    Problem *problem) {
-    if (limits == NULL)
-        return STATUS_OK;
-    const Cost cost = simulation_cost(simulation);
-    if (limits->steps > 0 && !(cost.steps <= limits->steps))
-        return simulation_refuse_time(simulation, &cost, limits, problem);
-    if (limits->document_bytes > 0 && !(cost.document_bytes <= limits->document_bytes))
-        return problem_add(problem, STATUS_INVALID, "/output/psd",
-                           "would make a document of about %.3g MB, at most %.4g MB can be kept: "
-                           "ask for shorter segments or fewer channels",
-                           1e-6 * cost.document_bytes, 1e-6 * limits->document_bytes);
-    if (limits->bytes > 0 && !(cost.bytes <= limits->bytes))
-        return simulation_refuse_bytes(simulation, &cost, limits, problem);
-    return STATUS_OK;
+void outcome_unref(Outcome *outcome) {
+    if (outcome == NULL || atomic_fetch_sub(&((OutcomeRef *)outcome)->count, 1) != 1)
+        return;
+    fields_clear(plan_report_fields, &outcome->plan);
+    response_clear(&outcome->response);
+    spectrum_clear(&outcome->spectrum);
+    warnings_clear(&outcome->warnings);
+    free(outcome);
 }
 
-Status simulation_complete(Simulation *simulation, const SimulationLimits *limits,
-                           Warnings *warnings, Problem *problem) {
-    TRY(simulation_validate(simulation, limits, warnings, problem));
-    TRY(simulation_check_cost(simulation, limits, problem));
-    return warnings == NULL || scene_warnings_of_input(simulation, warnings) == STATUS_OK
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for warnings");
-}
-
-Status simulation_plan(const Simulation *simulation, PlanReport *report, Problem *problem) {
-    *report = (PlanReport){0};
-    return simulation_has_target(simulation) ? accuracy_target_plan(simulation, report, problem)
-                                             : plan_scene(simulation, report, problem);
-}
-
-Cost simulation_cost(const Simulation *simulation) {
-    Cost cost = simulation_has_target(simulation) ? accuracy_target_cost(simulation)
-                                                  : cost_scene(simulation);
-    if (!simulation->output.reduction)
-        return cost;
-    const Cost undamped = undamped_baseline_cost(simulation);
-    cost.steps += undamped.steps;
-    cost.cpu_seconds += undamped.cpu_seconds;
-    cost.base += undamped.base;
-    cost.bytes += undamped.bytes; // the first outcome is still in memory
-    return cost;
-}
-
-static Status simulation_run_damped(const Simulation *simulation, const SimulationLimits *limits,
-                                    const Progress *progress, Workspace *workspace,
-                                    Outcome **outcome, Problem *problem) {
-    return simulation_has_target(simulation)
-               ? accuracy_target_run(simulation, limits, progress, workspace, NULL, outcome,
-                                     problem)
-               : run_scene(simulation, limits, progress, workspace, NULL, outcome, problem);
-}
-
-Status simulation_run(const Simulation *simulation, const SimulationLimits *limits,
-                      const Progress *progress, Workspace *workspace, Outcome **outcome,
-                      Problem *problem) {
-    static const double share = 0.8; // of the progress, if the undamped scene follows
-    *outcome = NULL;
-    if (!simulation->output.reduction)
-        return simulation_run_damped(simulation, limits, progress, workspace, outcome, problem);
-    ProgressRange first = progress_range(progress, 0, share),
-                  second = progress_range(progress, share, 1 - share);
-    const Progress damped = progress_range_view(&first), undamped = progress_range_view(&second);
-    TRY(simulation_run_damped(simulation, limits, &damped, workspace, outcome, problem));
-    const Status status =
-        undamped_baseline_run(simulation, limits, &undamped, workspace, *outcome, problem);
-    if (status != STATUS_OK) {
-        outcome_unref(*outcome);
-        *outcome = NULL;
-    }
-    return status;
+size_t outcome_bytes(const Outcome *outcome) {
+    const Columns *series = &outcome->response.series, *densities = &outcome->spectrum.densities;
+    return sizeof(OutcomeRef) +
+           sizeof(double) *
+               (series->count * series->rows + (densities->count + 1) * densities->rows) +
+           outcome->response.impacts.count * sizeof(Impact);
 }
