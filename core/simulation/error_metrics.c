@@ -11,21 +11,21 @@
 const Field error_fields[] = {
     FIELD_REAL(Errors, displacement, NULL, ANY, OPTIONAL, "largest difference within the horizon over the largest displacement, of all storeys; the reference's own error where that is larger"),
     FIELD_REAL(Errors, mean_acceleration, NULL, ANY, OPTIONAL, "rms of the difference over rms within the horizon"),
-    FIELD_REAL(Errors, peak_force, NULL, ANY, OPTIONAL, "difference of the largest contact force within the horizon, of that force; unknown where impacts have no force"),
-    FIELD_REAL(Errors, impacts, NULL, ANY, OPTIONAL, "impacts within the horizon, how many more or fewer"),
-    FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel that is farthest off; unknown where that band is not covered"),
-    FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "difference of the rms displacement of the whole run, of that rms"),
+    FIELD_REAL(Errors, peak_force, NULL, ANY, OPTIONAL, "relative difference of the largest contact force within the horizon; unknown where impacts have no force"),
+    FIELD_REAL(Errors, impacts, NULL, ANY, OPTIONAL, "difference of the numbers of impacts within the horizon"),
+    FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel with the largest distance; unknown if that band is not covered"),
+    FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "relative difference of the rms displacement of the whole run"),
     FIELD_END
 };
 
 const Field reference_summary_fields[] = {
-    FIELD_REAL(ReferenceSummary, error_estimate, NULL, ANY, OPTIONAL, "its own error of displacement, to the horizon"),
-    FIELD_REAL(ReferenceSummary, trust_horizon, "s", ANY, OPTIONAL, "to here samples and impacts are compared; unknown: to the end"),
+    FIELD_REAL(ReferenceSummary, error_estimate, NULL, ANY, OPTIONAL, "error of its displacement up to the horizon"),
+    FIELD_REAL(ReferenceSummary, trust_horizon, "s", ANY, OPTIONAL, "end of the comparison of samples and impacts; unknown: end of the run"),
     FIELD_COUNT(ReferenceSummary, impacts, NULL, AT_MIN(0), OPTIONAL, "its impacts within the horizon"),
     FIELD_REAL(ReferenceSummary, peak_force, "N", ANY, OPTIONAL, "its largest contact force within the horizon"),
     FIELD_REAL(ReferenceSummary, largest, "m", ANY, OPTIONAL, "its largest displacement"),
-    FIELD_REAL(ReferenceSummary, psd_from, "Hz", ANY, OPTIONAL, "its spectra are compared from here"),
-    FIELD_REAL(ReferenceSummary, psd_to, "Hz", ANY, OPTIONAL, "to here"),
+    FIELD_REAL(ReferenceSummary, psd_from, "Hz", ANY, OPTIONAL, "lower limit of the compared band"),
+    FIELD_REAL(ReferenceSummary, psd_to, "Hz", ANY, OPTIONAL, "upper limit of the compared band"),
     FIELD_END
 };
 // clang-format on

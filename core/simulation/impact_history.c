@@ -226,7 +226,7 @@ static Status impact_run_find(ImpactRun *run, size_t number, Problem *problem) {
         return STATUS_OK;
     return problem_set(problem, STATUS_NOT_FOUND,
                        "under the contact model impulse an impact takes no time and has no force: "
-                       "its impulse stands in the ledger");
+                       "its impulse is in the list of impacts");
 }
 
 // Number of the base's own sample at a sample of the output; -1: it has none there.
@@ -336,7 +336,7 @@ static Status impact_run_set_clock(const ImpactRun *run, size_t points, Problem 
     const double length = end - run->impact->start;
     if (!(length > 0))
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "the contact takes no time that could be shown: from %.17g s to %.17g s",
+                           "the contact has no duration: from %.17g s to %.17g s",
                            run->impact->start, end);
     const double left = total - run->start;
     plan->sample_rate = (double)(points - 2) / length;
@@ -346,10 +346,11 @@ static Status impact_run_set_clock(const ImpactRun *run, size_t points, Problem 
         plan->sample_rate = ceil(left * plan->sample_rate) / left;
     const double samples = plan->duration * plan->sample_rate * (1 + 1e-12) + 1;
     if (samples > FINE_MAX)
-        return problem_set(problem, STATUS_LIMIT,
-                           "so short a contact, %.3g s, cannot be shown at %zu points from where a "
-                           "run can begin, %.3g s before it: ask for fewer points",
-                           length, points, run->impact->start - run->start);
+        return problem_set(
+            problem, STATUS_LIMIT,
+            "a contact of %.3g s is too short for %zu points, because the run has to "
+            "start %.3g s before it: ask for fewer points",
+            length, points, run->impact->start - run->start);
     plan->count = (size_t)samples;
     return STATUS_OK;
 }
@@ -385,8 +386,8 @@ static Status impact_run_fine(ImpactRun *run, const SimulationLimits *limits,
             run->again = at;
     if (run->again == NULL)
         return problem_set(problem, STATUS_UNSTABLE,
-                           "the impact does not come again from the sample before it, at %.17g s: "
-                           "the solver's steps were too coarse for it",
+                           "the impact does not occur again in a run from the sample before it, "
+                           "at %.17g s: the solver's steps were too coarse",
                            run->start);
     return STATUS_OK;
 }

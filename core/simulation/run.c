@@ -299,8 +299,8 @@ static Status run_summarize(Outcome *outcome, Problem *problem) {
                  summary->peak_contact_force + summary->energy_residual))
         return STATUS_OK;
     return problem_set(problem, STATUS_UNSTABLE,
-                       "the scene's numbers are too large: peaks or energies leave what double "
-                       "precision can hold");
+                       "the scene's numbers are too large: peaks or energies overflow double "
+                       "precision");
 }
 
 // Counters of approach speeds, for stops whose buffer was measured over a range of speeds.

@@ -15,8 +15,8 @@ const Field summary_fields[] = {
     FIELD_COUNT(Summary, impacts, NULL, AT_MIN(0), OPTIONAL, "number of impacts"),
     FIELD_REAL(Summary, peak_contact_force, "N", ANY, OPTIONAL, "largest |contact force| over events, of all dampers"),
     FIELD_REAL(Summary, energy_residual, NULL, ANY, OPTIONAL, "largest |balance| over the largest energy"),
-    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown where the solver makes none"),
-    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "to here the trajectory is the scene's own: rounding, or the error of a solver's steps, has parted it from exact arithmetic by 1e-6 of the largest displacement, and beyond rounding's only statistics hold; null with an error_estimate: not within the run"),
+    FIELD_REAL(Summary, error_estimate, NULL, ANY, OPTIONAL, "estimated largest error of displacement over its largest value, at most 1; unknown if the solver makes no estimate"),
+    FIELD_REAL(Summary, trust_horizon, "s", ANY, OPTIONAL, "end of the predictable trajectory: here rounding, or the error of the solver's steps, reaches 1e-6 of the largest displacement, and beyond it only statistics are valid; null with an error_estimate: not within the run"),
     FIELD_END
 };
 

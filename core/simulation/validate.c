@@ -17,29 +17,29 @@ static const char *const usual[] = {CHANNEL_USUAL, NULL};
 
 // clang-format off
 static const Field psd_fields[] = {
-    FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels of which a spectrum is wanted; usual: mean_acceleration of the top storey"),
-    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_MIN(1), OPTIONAL, "length of a segment; min(4096, count) if not given"),
-    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_MIN(0), OPTIONAL, "of one segment with the next; half a segment if not given"),
+    FIELD_TEXTS(SpectrumRequest, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels to transform; usual: mean_acceleration of the top storey"),
+    FIELD_COUNT(SpectrumRequest, segment, "samples", AT_MIN(1), OPTIONAL, "length of a segment; default min(4096, count)"),
+    FIELD_COUNT(SpectrumRequest, overlap, "samples", AT_MIN(0), OPTIONAL, "overlap of adjacent segments; default half a segment"),
     FIELD_CHOICE(SpectrumRequest, window, spectrum_window_names, WINDOW_HANN, "window of each segment"),
-    FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "what is taken off each segment"),
+    FIELD_CHOICE(SpectrumRequest, detrend, spectrum_detrend_names, DETREND_CONSTANT, "trend removed from each segment"),
     FIELD_END
 };
 
 static const Field output_fields[] = {
-    FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels that are sampled; with several storeys or dampers each with its number from 1, displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
+    FIELD_TEXTS(Output, channels, channel_requests, usual, CHANNELS, PRESENCE_DEFAULT, FIELD_NUMBERED, "channels to sample; with several storeys or dampers each name ends with its number from 1, as in displacement_2; usual: displacement, velocity, acceleration, damper_displacement and contact_force, of all storeys and dampers"),
     FIELD_ITEM_OR_NULL(Output, psd, psd_fields, PRESENCE_DEFAULT, "power spectral densities by Welch's method; null: none"),
-    FIELD_FLAG(Output, impacts, true, "whether the ledger of impacts is kept; false: they are counted, and their peaks and energies summed, but not listed"),
-    FIELD_RARE_FLAG(Output, reduction, "whether the summary tells by how much the dampers lower peaks and rms; the scene without them is run beside it"),
-    FIELD_REAL(Output, statistics_from, "s", AT_MIN(0), 0, "time from which rms and peaks are taken"),
+    FIELD_FLAG(Output, impacts, true, "whether impacts are listed; false: they are counted, and their peaks and energies are summed"),
+    FIELD_RARE_FLAG(Output, reduction, "whether the summary contains the reduction of peaks and rms by the dampers; the scene without dampers is run too"),
+    FIELD_REAL(Output, statistics_from, "s", AT_MIN(0), 0, "start of the interval for rms and peaks"),
     FIELD_END
 };
 
 const Field simulation_fields[] = {
     FIELD_BASE(Simulation, scene, scene_fields),
-    FIELD_VARIANT(Simulation, accuracy, &solver_kinds, PRESENCE_DEFAULT, "how it is solved"),
-    FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "what is wanted of it"),
-    FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "for people; changes nothing"),
-    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE | FIELD_PAIRS, "for people; change nothing"),
+    FIELD_VARIANT(Simulation, accuracy, &solver_kinds, PRESENCE_DEFAULT, "solver and its settings"),
+    FIELD_ITEM(Simulation, output, output_fields, NULL, PRESENCE_DEFAULT, "requested results"),
+    FIELD_TEXT(Simulation, title, TITLE_BYTES, PRESENCE_OPTIONAL, FIELD_NOTE, "a note; does not affect the result"),
+    FIELD_TEXTS(Simulation, labels, NULL, NULL, LABELS, PRESENCE_OPTIONAL, FIELD_NOTE | FIELD_PAIRS, "notes; do not affect the result"),
     FIELD_END
 };
 // clang-format on
@@ -156,10 +156,9 @@ static Status validate_target(Simulation *simulation, Problem *problem) {
     AccuracyAuto *asked = (AccuracyAuto *)(void *)simulation->accuracy;
     const Scene *scene = &simulation->scene;
     if (asked->accuracy.modes != COUNT_ABSENT)
-        return problem_add_real(problem, STATUS_INVALID, "/accuracy/modes",
-                                (double)asked->accuracy.modes, NULL,
-                                "a target chooses how many modes are kept: leave one of the two "
-                                "out");
+        return problem_add_real(
+            problem, STATUS_INVALID, "/accuracy/modes", (double)asked->accuracy.modes, NULL,
+            "must not be given with a target, which chooses the number of modes");
     if (asked->metric == CHOICE_ABSENT)
         asked->metric = METRIC_DISPLACEMENT;
     if (asked->metric == METRIC_PSD && simulation->output.psd.channels.count == 0)
