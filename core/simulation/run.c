@@ -21,40 +21,39 @@ static double omission_share(double left_out, double remaining) {
     return left_out > 0 ? left_out / (left_out + fmax(remaining, 0)) : 0;
 }
 
-// The scene without dampers, channels and spectra. Views borrow everything from the simulation, and
-// nothing of them is cleared.
-static double omission_flight_steps(const Simulation *simulation) {
-    Simulation view = *simulation;
-    view.output.channels.count = view.output.psd.channels.count = view.scene.dampers.count = 0;
+// Predicted steps with other numbers of channels, spectra and dampers.
+static double omission_steps(const Simulation *simulation, size_t channel_count,
+                             size_t spectrum_count, size_t damper_count) {
+    Simulation view = *simulation; // borrows everything; not cleared
+    view.output.channels.count = channel_count;
+    view.output.psd.channels.count = spectrum_count;
+    view.scene.dampers.count = damper_count;
     return cost_scene(&view).steps;
 }
 
-static double omission_steps_with_channels(const Simulation *simulation, size_t count) {
-    Simulation view = *simulation;
-    view.output.channels.count = count;
-    return cost_scene(&view).steps;
-}
-
-// Contacts; a solver with fixed steps makes its steps in any case.
-static double omission_contact_steps(const Simulation *simulation) {
-    const double all = cost_scene(simulation).steps;
+// Predicted steps of contacts. A solver with fixed steps makes its steps in any case.
+static double omission_contact_steps(const Simulation *simulation, double asked) {
+    const Output *output = &simulation->output;
     if (simulation_solver(simulation)->cost != NULL)
-        return SEARCH_SHARE * all;
-    Simulation view = *simulation;
-    view.scene.dampers.count = 0;
-    return fmax(all - cost_scene(&view).steps, 0);
+        return SEARCH_SHARE * asked;
+    return fmax(
+        asked - omission_steps(simulation, output->channels.count, output->psd.channels.count, 0),
+        0);
 }
 
-static Status omissions_of_output(const Simulation *simulation, const Plan *plan,
+// `asked`: predicted steps of the simulation.
+static Status omissions_of_output(const Simulation *simulation, const Plan *plan, double asked,
                                   Decisions *decisions) {
     const Output *output = &simulation->output;
     const size_t usual = channel_names_usual_count(&simulation->scene);
-    const double asked = cost_scene(simulation).steps;
     if (output->channels.count < usual)
         TRY(decisions_omit(
             decisions, "channels", (double)(usual - output->channels.count) * (double)plan->count,
             "values",
-            omission_share(omission_steps_with_channels(simulation, usual) - asked, asked),
+            omission_share(omission_steps(simulation, usual, output->psd.channels.count,
+                                          simulation->scene.dampers.count) -
+                               asked,
+                           asked),
             "%zu of the %zu usual channels are asked for", output->channels.count, usual));
     if (output->psd.channels.count == 0) {
         Simulation view = *simulation;
@@ -69,14 +68,14 @@ static Status omissions_of_output(const Simulation *simulation, const Plan *plan
             "no spectrum is asked for"));
     }
     if (!output->impacts && plan->damper_count > 0)
-        TRY(decisions_omit(decisions, "impacts",
-                           ROWS_A_SECOND * plan->duration * (double)plan->damper_count, "rows",
-                           omission_share(ROW_SHARE * omission_contact_steps(simulation), asked),
-                           "no ledger is asked for: impacts are counted, not listed"));
+        TRY(decisions_omit(
+            decisions, "impacts", ROWS_A_SECOND * plan->duration * (double)plan->damper_count,
+            "rows", omission_share(ROW_SHARE * omission_contact_steps(simulation, asked), asked),
+            "no ledger is asked for: impacts are counted, not listed"));
     return STATUS_OK;
 }
 
-static Status omissions_of_contacts(const Simulation *simulation, const Plan *plan,
+static Status omissions_of_contacts(const Simulation *simulation, const Plan *plan, double asked,
                                     const Regime *regime, Decisions *decisions) {
     if (plan->damper_count == 0)
         return STATUS_OK;
@@ -86,12 +85,11 @@ static Status omissions_of_contacts(const Simulation *simulation, const Plan *pl
                              "motion is made");
     if (!regime->is_clear)
         return STATUS_OK;
-    const double saved = omission_contact_steps(simulation);
-    return decisions_omit(decisions, "contacts", regime->reach, NULL,
-                          omission_share(saved, cost_scene(simulation).steps - saved),
-                          "%s at most %.3g of the way to a stop",
-                          plan->damper_count == 1 ? "the mass comes" : "the masses come",
-                          regime->reach);
+    const double saved = omission_contact_steps(simulation, asked);
+    return decisions_omit(
+        decisions, "contacts", regime->reach, NULL, omission_share(saved, asked - saved),
+        "%s at most %.3g of the way to a stop",
+        plan->damper_count == 1 ? "the mass comes" : "the masses come", regime->reach);
 }
 
 // Adds what a run leaves out to the plan's decisions. `regime` NULL: the base is not made yet, and
@@ -99,20 +97,21 @@ static Status omissions_of_contacts(const Simulation *simulation, const Plan *pl
 static Status omissions_add(const Simulation *simulation, Plan *plan, const Regime *regime) {
     Decisions *decisions = &plan->report.decisions;
     const double asked = cost_scene(simulation).steps;
-    TRY(omissions_of_output(simulation, plan, decisions));
+    TRY(omissions_of_output(simulation, plan, asked, decisions));
     if (regime != NULL && regime->is_at_rest) {
-        const double moving = omission_steps_with_channels(simulation, 0);
-        return decisions_omit(decisions, "motion", 0, "J", omission_share(asked, asked - moving),
+        const double moving = omission_steps(simulation, 0, simulation->output.psd.channels.count,
+                                             plan->damper_count);
+        return decisions_omit(decisions, "motion", 0, "J", omission_share(moving, asked - moving),
                               "nothing moves and nothing sets it moving");
     }
-    TRY(omissions_of_contacts(simulation, plan, regime, decisions));
+    TRY(omissions_of_contacts(simulation, plan, asked, regime, decisions));
     // Solvers with fixed steps make them in any case.
     const bool has_closed_form = simulation_solver(simulation) == &solver_exact &&
                                  (plan_is_single(plan) || (regime != NULL && regime->is_clear &&
                                                            plan_is_single_in_flight(plan)));
     if (regime == NULL || !regime->is_unforced || !has_closed_form)
         return STATUS_OK;
-    const double saved = FORCED_SHARE * omission_flight_steps(simulation);
+    const double saved = FORCED_SHARE * omission_steps(simulation, 0, 0, 0);
     return decisions_omit(decisions, "forcing", 0, "m/s^2", omission_share(saved, asked - saved),
                           "the base is still: flight goes in closed form");
 }
