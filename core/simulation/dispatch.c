@@ -8,22 +8,23 @@ static Status simulation_refuse_time(const Simulation *simulation, const Cost *c
                                      const SimulationLimits *limits, Problem *problem) {
     const Solver *solver = (const Solver *)(const void *)simulation->accuracy->kind;
     const double most = limits->steps * SOLVER_STEP;
-    static const char told[] = "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
+    static const char format[] =
+        "would take about %.2g s of CPU%s%s, at most %.4g s are allowed: %s";
     if (2 * cost->spectra > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/output/psd", told, cost->cpu_seconds,
+        return problem_add(problem, STATUS_INVALID, "/output/psd", format, cost->cpu_seconds,
                            ", most of it for spectra", "", most,
                            "ask for fewer channels, less overlap, or a segment without large "
                            "prime factors");
     if (2 * cost->base > cost->steps)
-        return problem_add(problem, STATUS_INVALID, "/excitation", told, cost->cpu_seconds,
+        return problem_add(problem, STATUS_INVALID, "/excitation", format, cost->cpu_seconds,
                            ", most of it to make the base's motion", "", most,
                            "take fewer samples of it, or a shorter duration");
     if (solver->cost != NULL)
-        return problem_add(problem, STATUS_INVALID, "/accuracy", told, cost->cpu_seconds, " by ",
+        return problem_add(problem, STATUS_INVALID, "/accuracy", format, cost->cpu_seconds, " by ",
                            solver->kind.name, most,
                            "take longer steps or a larger tolerance, or the solver exact");
     return problem_add_real(problem, STATUS_INVALID, "/duration", simulation->scene.duration, "s",
-                            told, cost->cpu_seconds, "", "", most,
+                            format, cost->cpu_seconds, "", "", most,
                             cost->is_fast ? "take a shorter one; the structure or the base moves "
                                             "many times within a sample interval"
                                           : "take a shorter one, or fewer samples");
@@ -31,14 +32,15 @@ static Status simulation_refuse_time(const Simulation *simulation, const Cost *c
 
 static Status simulation_refuse_bytes(const Simulation *simulation, const Cost *cost,
                                       const SimulationLimits *limits, Problem *problem) {
-    static const char told[] =
+    static const char format[] =
         "would take about %.3g MB of memory, at most %.4g MB are allowed: %s";
     if (2 * cost->spectra_bytes > cost->bytes)
-        return problem_add(problem, STATUS_INVALID, "/output/psd", told, 1e-6 * cost->bytes,
+        return problem_add(problem, STATUS_INVALID, "/output/psd", format, 1e-6 * cost->bytes,
                            1e-6 * limits->bytes, "ask for shorter segments or fewer channels");
-    return problem_add_real(
-        problem, STATUS_INVALID, "/output/channels", (double)simulation->output.channels.count,
-        NULL, told, 1e-6 * cost->bytes, 1e-6 * limits->bytes, "ask for fewer channels or samples");
+    return problem_add_real(problem, STATUS_INVALID, "/output/channels",
+                            (double)simulation->output.channels.count, NULL, format,
+                            1e-6 * cost->bytes, 1e-6 * limits->bytes,
+                            "ask for fewer channels or samples");
 }
 
 // Refuses a scene that is predicted to exceed the limits.
