@@ -52,7 +52,15 @@ Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, 
 // ignored.
 Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost cost_scene(const Simulation *simulation);
-double cost_spectra(const SpectrumRequest *psd, size_t samples); // solver steps
+// Predicted steps of parts: spectra, contacts, the list of impacts, the motion of the base in
+// flight, and of the whole with other numbers of channels, spectra and dampers.
+double cost_spectra(const SpectrumRequest *psd, size_t samples);
+double cost_contact_steps(const Simulation *simulation);
+double cost_listing_steps(const Simulation *simulation);
+double cost_forcing_steps(const Simulation *simulation);
+double cost_variant_steps(const Simulation *simulation, size_t channel_count, size_t spectrum_count,
+                          size_t damper_count);
+double cost_listed_impacts(const Simulation *simulation); // predicted number
 
 // Plan and base motion of a run.
 typedef struct RunInputs {

@@ -1,9 +1,6 @@
 // From a completed simulation to its outcome: plan, base motion, solver, spectra and summary. What
 // the scene does not require is left out and reported as a decision, with the number that decided
-// and the share of the predicted cost that this saves. Savings are differences of cost_scene()
-// between the simulation and one with more or less in it. The other shares are measured: the closed
-// form saves two thirds of flight, a row of the list of impacts costs a tenth of its contact, and
-// the search for stops at step ends a tenth of a step.
+// and the share of the predicted cost that this saves.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,31 +11,8 @@
 #include "core/simulation/internal.h"
 #include "core/solve/rest.h"
 
-static const double FORCED_SHARE = 2.0 / 3, ROW_SHARE = 0.1, SEARCH_SHARE = 0.1;
-static const double ROWS_A_SECOND = 7; // impacts of a damper, estimated
-
 static double omission_share(double left_out, double remaining) {
     return left_out > 0 ? left_out / (left_out + fmax(remaining, 0)) : 0;
-}
-
-// Predicted steps with other numbers of channels, spectra and dampers.
-static double omission_steps(const Simulation *simulation, size_t channel_count,
-                             size_t spectrum_count, size_t damper_count) {
-    Simulation view = *simulation; // borrows everything; not cleared
-    view.output.channels.count = channel_count;
-    view.output.psd.channels.count = spectrum_count;
-    view.scene.dampers.count = damper_count;
-    return cost_scene(&view).steps;
-}
-
-// Predicted steps of contacts. A solver with fixed steps makes its steps in any case.
-static double omission_contact_steps(const Simulation *simulation, double asked) {
-    const Output *output = &simulation->output;
-    if (simulation_solver(simulation)->cost != NULL)
-        return SEARCH_SHARE * asked;
-    return fmax(
-        asked - omission_steps(simulation, output->channels.count, output->psd.channels.count, 0),
-        0);
 }
 
 // `asked`: predicted steps of the simulation.
@@ -50,8 +24,8 @@ static Status omissions_of_output(const Simulation *simulation, const Plan *plan
         TRY(decisions_omit(
             decisions, "channels", (double)(usual - output->channels.count) * (double)plan->count,
             "values",
-            omission_share(omission_steps(simulation, usual, output->psd.channels.count,
-                                          simulation->scene.dampers.count) -
+            omission_share(cost_variant_steps(simulation, usual, output->psd.channels.count,
+                                              simulation->scene.dampers.count) -
                                asked,
                            asked),
             "%zu of the %zu usual channels are asked for", output->channels.count, usual));
@@ -68,10 +42,9 @@ static Status omissions_of_output(const Simulation *simulation, const Plan *plan
             "no spectrum is asked for"));
     }
     if (!output->impacts && plan->damper_count > 0)
-        TRY(decisions_omit(
-            decisions, "impacts", ROWS_A_SECOND * plan->duration * (double)plan->damper_count,
-            "rows", omission_share(ROW_SHARE * omission_contact_steps(simulation, asked), asked),
-            "no ledger is asked for: impacts are counted, not listed"));
+        TRY(decisions_omit(decisions, "impacts", cost_listed_impacts(simulation), "rows",
+                           omission_share(cost_listing_steps(simulation), asked),
+                           "no ledger is asked for: impacts are counted, not listed"));
     return STATUS_OK;
 }
 
@@ -85,7 +58,7 @@ static Status omissions_of_contacts(const Simulation *simulation, const Plan *pl
                              "motion is made");
     if (!regime->is_clear)
         return STATUS_OK;
-    const double saved = omission_contact_steps(simulation, asked);
+    const double saved = cost_contact_steps(simulation);
     return decisions_omit(
         decisions, "contacts", regime->reach, NULL, omission_share(saved, asked - saved),
         "%s at most %.3g of the way to a stop",
@@ -99,8 +72,8 @@ static Status omissions_add(const Simulation *simulation, Plan *plan, const Regi
     const double asked = cost_scene(simulation).steps;
     TRY(omissions_of_output(simulation, plan, asked, decisions));
     if (regime != NULL && regime->is_at_rest) {
-        const double moving = omission_steps(simulation, 0, simulation->output.psd.channels.count,
-                                             plan->damper_count);
+        const double moving = cost_variant_steps(
+            simulation, 0, simulation->output.psd.channels.count, plan->damper_count);
         return decisions_omit(decisions, "motion", 0, "J", omission_share(moving, asked - moving),
                               "nothing moves and nothing sets it moving");
     }
@@ -111,7 +84,7 @@ static Status omissions_add(const Simulation *simulation, Plan *plan, const Regi
                                                            plan_is_single_in_flight(plan)));
     if (regime == NULL || !regime->is_unforced || !has_closed_form)
         return STATUS_OK;
-    const double saved = FORCED_SHARE * omission_steps(simulation, 0, 0, 0);
+    const double saved = cost_forcing_steps(simulation);
     return decisions_omit(decisions, "forcing", 0, "m/s^2", omission_share(saved, asked - saved),
                           "the base is still: flight goes in closed form");
 }
