@@ -2,84 +2,79 @@
 //
 //   p1 = p0 + h/2 (a0 + a1)      q1 = q0 + h p0 + h^2/4 (a0 + a1)
 //
-// with the equations of motion at its end. G = I + h/2 D + h^2/4 W^2 is made once. With G a1 =
-// (what is known) + S N, the columns of S being the dampers' shapes, each r'' at the end is linear
-// in the contact forces there,
+// with the equations of motion at its end. G = I + h/2 D + h^2/4 W^2 is inverted once per step
+// length. G a1 = (terms of the step's start) + S N, where the columns of S are the mode shapes of
+// the dampers' storeys. Each r'' at the end is therefore linear in the contact forces there,
 //
 //   r'' = b - Q N,   Q = S' G^-1 S + 1/m on the diagonal,
 //
-// which leaves as many equations N = N(r, r') as there are contacts: Newton's method solves them,
-// in one go where the law is linear.
+// which leaves one equation N = N(r, r') per contact. Newton's method solves them, in one iteration
+// where the contact law is linear. N. M. Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 
 enum { NEWTON_MAX = 60 };
 
 typedef struct Newmark {
-    double length;   // of the step that the tables are for [s]
-    double *inverse; // G^-1: its diagonal, or all of it
-    double *lift;    // G^-1 S, damper after damper
-    double *soften;  // Q
-    double *shift;   // of the dampers: a_g's part in r'' beside that in a1
-    double *rates, *from, *end, *force, *left, *right, *bare;
-    double *block;
+    double length;        // step of the tables [s]
+    double *inverse;      // G^-1: its diagonal where D is diagonal, else all of it
+    double *lift;         // G^-1 S, damper after damper
+    double *soften;       // Q, dampers x dampers
+    double *shift;        // of the dampers: a_g's coefficient in r'' apart from a1
+    double *rates;        // y' at the step's start
+    double *from;         // y there
+    double *end;          // a1 of the modes [m/s^2]
+    double *force;        // N of the dampers at the step's end [N]
+    double *left, *right; // Newton's linear system
+    double *bare;         // b: r'' at the step's end without contact forces [m/s^2]
+    double values[];
 } Newmark;
 
-static void swap(double *a, double *b) {
+static void newmark_swap(double *a, double *b) {
     const double kept = *a;
     *a = *b;
     *b = kept;
 }
 
-static Status no_memory(const Steps *steps) {
-    return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run of %zu modes",
-                       steps->state.mode_count);
+static Status newmark_no_memory(const TimeStepping *stepping) {
+    return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
+                       "no memory for a run of %zu modes", stepping->state.mode_count);
 }
 
-static Status newmark_make(Steps *steps) {
-    const ModalState *state = &steps->state;
-    const size_t n = state->mode_count, m = state->dampers, size = steps->size;
+static Status newmark_make(TimeStepping *stepping) {
+    const ModalState *state = &stepping->state;
+    const size_t n = state->mode_count, m = state->dampers, size = stepping->size;
     const size_t square = state->diagonal != NULL ? n : n * n;
-    Newmark *own = calloc(1, sizeof *own);
-    steps->own = own;
-    if (own == NULL)
-        return no_memory(steps);
     const size_t sizes[] = {square, m * n, m * m, m, size, size, n, m, m * m, m, m};
-    double **const arrays[] = {&own->inverse, &own->lift,  &own->soften, &own->shift,
-                               &own->rates,   &own->from,  &own->end,    &own->force,
-                               &own->left,    &own->right, &own->bare};
     size_t total = 0;
     for (size_t i = 0; i < COUNT(sizes); i++)
         total += sizes[i];
-    own->block = calloc(total, sizeof *own->block);
-    if (own->block == NULL)
-        return no_memory(steps);
-    double *at = own->block;
+    Newmark *newmark = calloc(1, sizeof *newmark + total * sizeof *newmark->values);
+    stepping->method = newmark;
+    if (newmark == NULL)
+        return newmark_no_memory(stepping);
+    double **const arrays[] = {&newmark->inverse, &newmark->lift,  &newmark->soften,
+                               &newmark->shift,   &newmark->rates, &newmark->from,
+                               &newmark->end,     &newmark->force, &newmark->left,
+                               &newmark->right,   &newmark->bare};
+    double *at = newmark->values;
     for (size_t i = 0; i < COUNT(sizes); i++) {
         *arrays[i] = at;
         at += sizes[i];
     }
     for (size_t d = 0; d < m; d++)
-        own->shift[d] = state->damper[d].base_coupling -
-                        modal_state_dot(state->damper[d].shape, state->modes->participation, n);
+        newmark->shift[d] = state->damper[d].base_coupling -
+                            modal_state_dot(state->damper[d].shape, state->modes->participation, n);
     return STATUS_OK;
 }
 
-static void newmark_clear(Steps *steps) {
-    Newmark *own = steps->own;
-    if (own != NULL)
-        free(own->block);
-    free(own);
-    steps->own = NULL;
-}
-
-// left x = right by Gauss with pivots, for `columns` right sides, which stand in rows of so many
-// values; the answers take their place.
-static bool eliminate(double *left, double *right, size_t n, size_t columns) {
+// Solves left x = right by Gaussian elimination with pivoting. `right` has rows of `columns` values
+// and is overwritten by x. False: singular.
+static bool newmark_eliminate(double *left, double *right, size_t n, size_t columns) {
     for (size_t k = 0; k < n; k++) {
         size_t pivot = k;
         for (size_t i = k + 1; i < n; i++)
@@ -88,9 +83,9 @@ static bool eliminate(double *left, double *right, size_t n, size_t columns) {
         if (!(fabs(left[pivot * n + k]) > 0) || !isfinite(left[pivot * n + k]))
             return false;
         for (size_t j = k; j < n && pivot != k; j++)
-            swap(&left[k * n + j], &left[pivot * n + j]);
+            newmark_swap(&left[k * n + j], &left[pivot * n + j]);
         for (size_t j = 0; j < columns && pivot != k; j++)
-            swap(&right[k * columns + j], &right[pivot * columns + j]);
+            newmark_swap(&right[k * columns + j], &right[pivot * columns + j]);
         for (size_t i = k + 1; i < n; i++) {
             const double factor = left[i * n + k] / left[k * n + k];
             for (size_t j = k; j < n && factor != 0; j++)
@@ -110,26 +105,26 @@ static bool eliminate(double *left, double *right, size_t n, size_t columns) {
     return true;
 }
 
-static Status invert(const Steps *steps, double length) {
-    const Newmark *own = steps->own;
-    const ModalState *state = &steps->state;
+static Status newmark_invert(const TimeStepping *stepping, double length) {
+    const Newmark *newmark = stepping->method;
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count;
     const double half = length / 2, quarter = length * length / 4;
     if (state->diagonal != NULL) {
         for (size_t i = 0; i < n; i++)
-            own->inverse[i] = 1 / (1 + half * state->diagonal[i] + quarter * state->omega2[i]);
+            newmark->inverse[i] = 1 / (1 + half * state->diagonal[i] + quarter * state->omega2[i]);
         return STATUS_OK;
     }
     double *G = malloc(n * n * sizeof *G);
     if (G == NULL)
-        return no_memory(steps);
+        return newmark_no_memory(stepping);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             G[i * n + j] =
                 half * state->damping[i * n + j] + (i == j ? 1 + quarter * state->omega2[i] : 0);
-            own->inverse[i * n + j] = i == j;
+            newmark->inverse[i * n + j] = i == j;
         }
-    const bool is_found = eliminate(G, own->inverse, n, n);
+    const bool is_found = newmark_eliminate(G, newmark->inverse, n, n);
     free(G);
     return is_found ? STATUS_OK
                     : problem_set(state->problem, STATUS_UNSTABLE,
@@ -139,34 +134,36 @@ static Status invert(const Steps *steps, double length) {
 }
 
 // out = G^-1 in.
-static void solve(const Steps *steps, const double *in, double *restrict out) {
-    const Newmark *own = steps->own;
-    const size_t n = steps->state.mode_count;
+static void newmark_solve(const TimeStepping *stepping, const double *in, double *restrict out) {
+    const Newmark *newmark = stepping->method;
+    const size_t n = stepping->state.mode_count;
     for (size_t i = 0; i < n; i++)
-        out[i] = steps->state.diagonal != NULL ? own->inverse[i] * in[i]
-                                               : modal_state_dot(own->inverse + i * n, in, n);
+        out[i] = stepping->state.diagonal != NULL
+                     ? newmark->inverse[i] * in[i]
+                     : modal_state_dot(newmark->inverse + i * n, in, n);
 }
 
-static Status make_tables(Steps *steps, double length) {
-    Newmark *own = steps->own;
-    const ModalState *state = &steps->state;
+static Status newmark_make_tables(TimeStepping *stepping, double length) {
+    Newmark *newmark = stepping->method;
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    TRY(invert(steps, length));
-    own->length = length;
+    TRY(newmark_invert(stepping, length));
+    newmark->length = length;
     for (size_t d = 0; d < m; d++) {
-        solve(steps, state->damper[d].shape, own->lift + d * n);
+        newmark_solve(stepping, state->damper[d].shape, newmark->lift + d * n);
         for (size_t e = 0; e < m; e++)
-            own->soften[e * m + d] = modal_state_dot(state->damper[e].shape, own->lift + d * n, n) +
-                                     (d == e ? 1 / state->damper[d].plan->mass : 0);
+            newmark->soften[e * m + d] =
+                modal_state_dot(state->damper[e].shape, newmark->lift + d * n, n) +
+                (d == e ? 1 / state->damper[d].plan->mass : 0);
     }
     return STATUS_OK;
 }
 
-// Contact forces at the step's end, from those at its start; `r` and `w` are as they would be there
-// with r'' = 0 at the end, `bare` is r'' without any force.
-static Status find_forces(Steps *steps, double length, const double *r, const double *w) {
-    const Newmark *own = steps->own;
-    const ModalState *state = &steps->state;
+// Finds the contact forces at the step's end. `r` and `w` are the predictions with r'' = 0 there.
+static Status newmark_find_forces(TimeStepping *stepping, double length, const double *r,
+                                  const double *w) {
+    const Newmark *newmark = stepping->method;
+    const ModalState *state = &stepping->state;
     const size_t m = state->dampers;
     const double half = length / 2, quarter = length * length / 4;
     const bool is_linear = state->plan->form == CONTACT_LINEAR;
@@ -175,27 +172,28 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
         is_any = is_any || state->damper[d].phase == PHASE_CONTACT;
     for (int round = 0; is_any && round < NEWTON_MAX; round++) {
         for (size_t d = 0; d < m; d++) {
-            double pull = own->bare[d];
+            double pull = newmark->bare[d];
             for (size_t e = 0; e < m; e++) {
-                pull -= own->soften[d * m + e] * own->force[e];
-                own->left[d * m + e] = d == e;
+                pull -= newmark->soften[d * m + e] * newmark->force[e];
+                newmark->left[d * m + e] = d == e;
             }
-            own->right[d] = 0;
+            newmark->right[d] = 0;
             if (state->damper[d].phase != PHASE_CONTACT)
                 continue;
             const ContactForce law =
-                steps_contact(state, d, r[d] + quarter * pull, w[d] + half * pull);
-            own->right[d] = law.value - own->force[d];
+                step_contact_force(state, d, r[d] + quarter * pull, w[d] + half * pull);
+            newmark->right[d] = law.value - newmark->force[d];
             const double yielding = quarter * law.by_penetration + half * law.by_speed;
             for (size_t e = 0; e < m; e++)
-                own->left[d * m + e] += yielding * own->soften[d * m + e];
+                newmark->left[d * m + e] += yielding * newmark->soften[d * m + e];
         }
-        if (!eliminate(own->left, own->right, m, 1))
+        if (!newmark_eliminate(newmark->left, newmark->right, m, 1))
             break;
         bool is_done = true;
         for (size_t d = 0; d < m; d++) {
-            own->force[d] += own->right[d];
-            is_done = is_done && fabs(own->right[d]) <= 1e-13 * fabs(own->force[d]) + DBL_MIN;
+            newmark->force[d] += newmark->right[d];
+            is_done =
+                is_done && fabs(newmark->right[d]) <= 1e-13 * fabs(newmark->force[d]) + DBL_MIN;
         }
         if (is_done || (is_linear && round == 1))
             return STATUS_OK;
@@ -207,82 +205,83 @@ static Status find_forces(Steps *steps, double length, const double *r, const do
                                  modal_state_time(state), length, length / 10);
 }
 
-static Status newmark_step(Steps *steps, double length) {
-    Newmark *own = steps->own;
-    const ModalState *state = &steps->state;
+static Status newmark_step(TimeStepping *stepping, double length) {
+    Newmark *newmark = stepping->method;
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    const double half = length / 2, quarter = length * length / 4, ground = steps->ground[2];
-    if (length != own->length)
-        TRY(make_tables(steps, length));
-    double *q = steps->y, *p = q + n, *r = p + n, *w = r + m;
-    memcpy(own->from, steps->y, steps->size * sizeof *own->from);
+    const double half = length / 2, quarter = length * length / 4, ground = stepping->ground[2];
+    if (length != newmark->length)
+        TRY(newmark_make_tables(stepping, length));
+    double *q = stepping->y, *p = q + n, *r = p + n, *w = r + m;
+    memcpy(newmark->from, stepping->y, stepping->size * sizeof *newmark->from);
     for (size_t d = 0; d < m; d++)
-        own->force[d] =
-            state->damper[d].phase == PHASE_CONTACT ? steps_contact(state, d, r[d], w[d]).value : 0;
-    steps_rate(steps, steps->y, steps->ground[0], own->force, own->rates);
-    // As it would be without an acceleration at the end.
+        newmark->force[d] = state->damper[d].phase == PHASE_CONTACT
+                                ? step_contact_force(state, d, r[d], w[d]).value
+                                : 0;
+    time_stepping_rate(stepping, stepping->y, stepping->ground[0], newmark->force, newmark->rates);
+    // Predict the end without its acceleration.
     for (size_t i = 0; i < n + m; i++) {
         double *place = i < n ? q + i : r + (i - n), *speed = i < n ? p + i : w + (i - n);
-        const double a = i < n ? own->rates[n + i] : own->rates[2 * n + m + (i - n)];
+        const double a = i < n ? newmark->rates[n + i] : newmark->rates[2 * n + m + (i - n)];
         *place += length * *speed + quarter * a;
         *speed += half * a;
     }
-    steps_elastic(state, q, p, steps->elastic);
+    time_stepping_elastic(state, q, p, stepping->elastic);
     for (size_t i = 0; i < n; i++)
-        steps->elastic[i] = -steps->elastic[i] - state->modes->participation[i] * ground;
-    solve(steps, steps->elastic, own->end);
+        stepping->elastic[i] = -stepping->elastic[i] - state->modes->participation[i] * ground;
+    newmark_solve(stepping, stepping->elastic, newmark->end);
     for (size_t d = 0; d < m; d++)
-        own->bare[d] =
-            own->shift[d] * ground - modal_state_dot(state->damper[d].shape, own->end, n);
-    TRY(find_forces(steps, length, r, w));
+        newmark->bare[d] =
+            newmark->shift[d] * ground - modal_state_dot(state->damper[d].shape, newmark->end, n);
+    TRY(newmark_find_forces(stepping, length, r, w));
     for (size_t d = 0; d < m; d++) {
-        double pull = own->bare[d];
+        double pull = newmark->bare[d];
         for (size_t e = 0; e < m; e++)
-            pull -= own->soften[d * m + e] * own->force[e];
+            pull -= newmark->soften[d * m + e] * newmark->force[e];
         r[d] += quarter * pull;
         w[d] += half * pull;
-        for (size_t i = 0; i < n && own->force[d] != 0; i++)
-            own->end[i] += own->lift[d * n + i] * own->force[d];
+        for (size_t i = 0; i < n && newmark->force[d] != 0; i++)
+            newmark->end[i] += newmark->lift[d * n + i] * newmark->force[d];
     }
     for (size_t i = 0; i < n; i++) {
-        q[i] += quarter * own->end[i];
-        p[i] += half * own->end[i];
+        q[i] += quarter * newmark->end[i];
+        p[i] += half * newmark->end[i];
     }
-    steps_sum(steps, own->from, steps->y, length, false);
+    time_stepping_integrate(stepping, newmark->from, stepping->y, length, false);
     return STATUS_OK;
 }
 
-static double newmark_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+static double newmark_step_cost(size_t modes, size_t dampers, bool is_coupled, double *setup) {
     const double n = (double)modes, m = (double)dampers;
-    *making = is_coupled ? n * n * n / 20 : 0;
+    *setup = is_coupled ? n * n * n / 20 : 0;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }
 
-static const Stepper stepper = {.name = "newmark",
-                                .between = "it is of order 2",
-                                .order = 2,
-                                .make = newmark_make,
-                                .step = newmark_step,
-                                .clear = newmark_clear,
-                                .cost = newmark_cost};
+static const Stepper newmark_stepper = {.name = "newmark",
+                                        .order = 2,
+                                        .between = "it is of order 2",
+                                        .make = newmark_make,
+                                        .step = newmark_step,
+                                        .cost = newmark_step_cost};
 
-static Status run_all(Run *run, Response *response, Problem *problem) {
-    return steps_run(run, &stepper, response, problem);
+static Status newmark_run(Run *run, Response *response, Problem *problem) {
+    return time_stepping_run(&newmark_stepper, run, response, problem);
 }
 
-static Status decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
-    return steps_decide(accuracy, &stepper, base_interval, plan, problem);
+static Status newmark_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
+                             Problem *problem) {
+    return time_stepping_decide(&newmark_stepper, accuracy, base_interval, plan, problem);
 }
 
-static double cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return steps_cost(accuracy, &stepper, base_interval, plan);
+static double newmark_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
+    return time_stepping_cost(&newmark_stepper, accuracy, base_interval, plan);
 }
 
 const Solver solver_newmark = {
     .kind = {"newmark",
              "Newmark's method with the average acceleration, contacts switched at step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = run_all,
-    .decide = decide,
-    .cost = cost,
+    .run = newmark_run,
+    .decide = newmark_decide,
+    .cost = newmark_cost,
 };

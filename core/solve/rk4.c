@@ -1,46 +1,38 @@
-// The classical Runge-Kutta method of order 4. The contact force is looked up wherever a range
-// lies, so that it serves every law that has one; where a contact begins or ends inside a step the
-// force jumps or bends between the stages, and the order is the first.
+// The classical Runge-Kutta method of order 4. Each stage derives the contact force from the
+// penetration there, which serves every contact law with a force. Where a contact begins or ends
+// inside a step, the force jumps or bends between the stages and the order drops to one.
 #include <stdlib.h>
 
 #include "core/plan/contact_setup.h"
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 
 enum { STAGES = 4, TOTALS = 2 };
 
 typedef struct Rk4 {
-    double *at;     // a range's state
-    double *slopes; // of all stages, each with its powers behind it
+    double *stage;  // the state at a stage
+    double *slopes; // of all stages: y', work of the base, loss, and each damper's N and N r'
     double *force;
-    size_t row; // from one range's slopes to the next
+    size_t row; // from one stage's slopes to the next
+    double values[];
 } Rk4;
 
-static Status rk4_make(Steps *steps) {
-    const size_t size = steps->size, m = steps->state.dampers;
-    Rk4 *own = malloc(sizeof *own);
-    steps->own = own;
-    if (own == NULL)
-        return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run");
-    own->row = size + TOTALS + 2 * m;
-    own->at = calloc(size + STAGES * own->row + m, sizeof *own->at);
-    if (own->at == NULL)
-        return problem_set(steps->state.problem, STATUS_NO_MEMORY, "no memory for a run");
-    own->slopes = own->at + size;
-    own->force = own->slopes + STAGES * own->row;
+static Status rk4_make(TimeStepping *stepping) {
+    const size_t size = stepping->size, m = stepping->state.dampers, row = size + TOTALS + 2 * m;
+    Rk4 *rk4 = calloc(1, sizeof *rk4 + (size + STAGES * row + m) * sizeof *rk4->values);
+    if (rk4 == NULL)
+        return problem_set(stepping->state.problem, STATUS_NO_MEMORY, "no memory for a run");
+    rk4->row = row;
+    rk4->stage = rk4->values;
+    rk4->slopes = rk4->stage + size;
+    rk4->force = rk4->slopes + STAGES * row;
+    stepping->method = rk4;
     return STATUS_OK;
 }
 
-static void rk4_clear(Steps *steps) {
-    Rk4 *own = steps->own;
-    if (own != NULL)
-        free(own->at);
-    free(own);
-    steps->own = NULL;
-}
-
-// N at r and r'. A mass that flies when the step begins meets its stop with the speed `approach`.
-static double feel(const Steps *steps, size_t d, double r, double w, double approach) {
-    const ModalState *state = &steps->state;
+// N at r and r'. A mass in flight at the step's start meets its stop with the speed `approach`.
+static double rk4_force(const TimeStepping *stepping, size_t d, double r, double w,
+                        double approach) {
+    const ModalState *state = &stepping->state;
     DamperState *damper = &state->damper[d];
     if (state->plan->form == CONTACT_IMPULSIVE)
         return 0;
@@ -52,96 +44,101 @@ static double feel(const Steps *steps, size_t d, double r, double w, double appr
         return 0;
     if (damper->phase == PHASE_FLIGHT || damper->side != side) {
         if (damper->phase != PHASE_FLIGHT)
-            return 0; // through all the clearance: the next step sees to it
+            return 0; // it crossed all the clearance: the next step begins that contact
         damper->side = side;
         damper->contact = stops_freeze(&damper->plan->stops[side], approach);
     }
-    const double force = steps_contact(state, d, sign * p, w).value;
+    const double force = step_contact_force(state, d, sign * p, w).value;
     return state->plan->separation == SEPARATION_ZERO_FORCE && sign * force < 0 ? 0 : force;
 }
 
-static void slope(Steps *steps, const double *y, double ground, double *restrict out) {
-    const Rk4 *own = steps->own;
-    const ModalState *state = &steps->state;
+static void rk4_slope(TimeStepping *stepping, const double *y, double ground,
+                      double *restrict out) {
+    const Rk4 *rk4 = stepping->method;
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n, *r = y + 2 * n, *w = r + m, *approach = steps->y + 2 * n + m;
-    double *totals = out + steps->size, momentum = modal_state_dot(state->momentum_weights, p, n),
-           loss = 0;
+    const double *p = y + n, *r = y + 2 * n, *w = r + m, *approach = stepping->y + 2 * n + m;
+    double *totals = out + stepping->size,
+           momentum = modal_state_dot(state->momentum_weights, p, n), loss = 0;
     for (size_t d = 0; d < m; d++) {
-        own->force[d] = feel(steps, d, r[d], w[d], approach[d] < 0 ? -approach[d] : approach[d]);
+        rk4->force[d] =
+            rk4_force(stepping, d, r[d], w[d], approach[d] < 0 ? -approach[d] : approach[d]);
         momentum += state->damper[d].plan->mass * w[d];
-        totals[TOTALS + d] = own->force[d];
-        totals[TOTALS + m + d] = own->force[d] * w[d];
+        totals[TOTALS + d] = rk4->force[d];
+        totals[TOTALS + m + d] = rk4->force[d] * w[d];
     }
-    steps_rate(steps, y, ground, own->force, out);
+    time_stepping_rate(stepping, y, ground, rk4->force, out);
     for (size_t i = 0; i < n; i++)
-        loss += (steps->elastic[i] - state->omega2[i] * y[i]) * p[i];
+        loss += (stepping->elastic[i] - state->omega2[i] * y[i]) * p[i];
     totals[0] = -ground * momentum;
     totals[1] = loss;
 }
 
-static Status rk4_step(Steps *steps, double length) {
+// The step times the stages' weighted mean of slope i; `sixth` is a sixth of the step.
+static double rk4_gain(const Rk4 *rk4, size_t i, double sixth) {
+    const double *s = rk4->slopes + i;
+    const size_t row = rk4->row;
+    return sixth * (s[0] + 2 * (s[row] + s[2 * row]) + s[3 * row]);
+}
+
+static Status rk4_step(TimeStepping *stepping, double length) {
     static const double nodes[STAGES] = {0, 0.5, 0.5, 1};
-    const Rk4 *own = steps->own;
-    const size_t size = steps->size, row = own->row, n = steps->state.mode_count,
-                 m = steps->state.dampers;
+    const Rk4 *rk4 = stepping->method;
+    const size_t size = stepping->size, n = stepping->state.mode_count, m = stepping->state.dampers;
     for (size_t k = 0; k < STAGES; k++) {
-        const double *last = own->slopes + (k - 1) * row, part = nodes[k] * length;
+        const double *last = rk4->slopes + (k - 1) * rk4->row, part = nodes[k] * length;
         for (size_t i = 0; i < size; i++)
-            own->at[i] = k == 0 ? steps->y[i] : steps->y[i] + part * last[i];
-        slope(steps, own->at, steps->ground[(k + 1) / 2], own->slopes + k * row);
+            rk4->stage[i] = k == 0 ? stepping->y[i] : stepping->y[i] + part * last[i];
+        rk4_slope(stepping, rk4->stage, stepping->ground[(k + 1) / 2], rk4->slopes + k * rk4->row);
     }
-    const double *const s = own->slopes, sixth = length / 6;
-    const double *const totals = s + size;
-#define MEAN(a, i)                                                                                 \
-    (sixth * ((a)[i] + 2 * ((a)[row + (i)] + (a)[2 * row + (i)]) + (a)[3 * row + (i)]))
-    steps->sums.input = MEAN(totals, 0);
-    steps->sums.damping = MEAN(totals, 1);
+    const double sixth = length / 6;
+    stepping->input = rk4_gain(rk4, size, sixth);
+    stepping->damping = rk4_gain(rk4, size + 1, sixth);
     for (size_t d = 0; d < m; d++) {
-        steps->sums.impulse[d] = MEAN(totals, TOTALS + d);
-        steps->sums.work[d] = MEAN(totals, TOTALS + m + d);
-        const double w = steps->y[2 * n + m + d], approach = w < 0 ? -w : w;
-        // Where the step ends may be deeper than any range.
-        (void)feel(steps, d, steps->y[2 * n + d] + MEAN(s, 2 * n + d), w, approach);
+        stepping->contact.impulse[d] = rk4_gain(rk4, size + TOTALS + d, sixth);
+        stepping->contact.work[d] = rk4_gain(rk4, size + TOTALS + m + d, sixth);
+        const double w = stepping->y[2 * n + m + d], approach = w < 0 ? -w : w;
+        // The step's end may be the first point inside a stop: this freezes the parameters there.
+        (void)rk4_force(stepping, d, stepping->y[2 * n + d] + rk4_gain(rk4, 2 * n + d, sixth), w,
+                        approach);
     }
     for (size_t i = 0; i < size; i++)
-        steps->y[i] += MEAN(s, i);
-#undef MEAN
+        stepping->y[i] += rk4_gain(rk4, i, sixth);
     return STATUS_OK;
 }
 
-static double rk4_cost(size_t modes, size_t dampers, bool is_coupled, double *making) {
+static double rk4_step_cost(size_t modes, size_t dampers, bool is_coupled, double *setup) {
     const double n = (double)modes, m = (double)dampers;
-    *making = 0;
+    *setup = 0;
     return 4 + 0.15 * n * (1 + m) + (is_coupled ? 0.02 : 0.008) * n * n;
 }
 
-static const Stepper stepper = {.name = "rk4",
-                                .between = "it is of order 4",
-                                .order = 4,
-                                .is_by_place = true,
-                                .stability_limit = 2.785,
-                                .make = rk4_make,
-                                .step = rk4_step,
-                                .clear = rk4_clear,
-                                .cost = rk4_cost};
+static const Stepper rk4_stepper = {.name = "rk4",
+                                    .order = 4,
+                                    .between = "it is of order 4",
+                                    .is_by_place = true,
+                                    .stability_limit = 2.785,
+                                    .make = rk4_make,
+                                    .step = rk4_step,
+                                    .cost = rk4_step_cost};
 
-static Status run_all(Run *run, Response *response, Problem *problem) {
-    return steps_run(run, &stepper, response, problem);
+static Status rk4_run(Run *run, Response *response, Problem *problem) {
+    return time_stepping_run(&rk4_stepper, run, response, problem);
 }
 
-static Status decide(const Accuracy *accuracy, double base_interval, Plan *plan, Problem *problem) {
-    return steps_decide(accuracy, &stepper, base_interval, plan, problem);
+static Status rk4_decide(const Accuracy *accuracy, double base_interval, Plan *plan,
+                         Problem *problem) {
+    return time_stepping_decide(&rk4_stepper, accuracy, base_interval, plan, problem);
 }
 
-static double cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
-    return steps_cost(accuracy, &stepper, base_interval, plan);
+static double rk4_cost(const Accuracy *accuracy, double base_interval, const Plan *plan) {
+    return time_stepping_cost(&rk4_stepper, accuracy, base_interval, plan);
 }
 
 const Solver solver_rk4 = {
     .kind = {"rk4", "the classical Runge-Kutta method of order 4, contacts switched at step ends",
              accuracy_step_fields, sizeof(AccuracyStep)},
-    .run = run_all,
-    .decide = decide,
-    .cost = cost,
+    .run = rk4_run,
+    .decide = rk4_decide,
+    .cost = rk4_cost,
 };

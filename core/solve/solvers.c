@@ -3,13 +3,6 @@
 #include "core/result/metric.h"
 
 // clang-format off
-const Field accuracy_fields[] = {
-    FIELD_COUNT(Accuracy, modes, NULL, AT_MIN(1), OPTIONAL, "natural modes of a structure with several storeys that move, the slowest; all if absent"),
-    FIELD_END
-};
-// clang-format on
-
-// clang-format off
 static const Field auto_fields[] = {
     FIELD_BASE(AccuracyAuto, accuracy, accuracy_fields),
     FIELD_REAL(AccuracyAuto, target, NULL, WITHIN(1e-15, 1), OPTIONAL, "relative error wanted: the cheapest way foretold to keep it is taken, and the answer says what error it came to; if absent all that double precision gives"),

@@ -1,6 +1,6 @@
-// What a step's end does to contacts. Nothing is located: a contact begins with the penetration in
-// which a step ends, and ends with that beyond its zero, which makes the method one of first order
-// across contacts whatever it is between them.
+// Contact state changes at step ends. No event is located in time: a contact begins with the
+// penetration at the end of a step and ends with the overshoot past zero. Across contacts any
+// method is therefore of first order.
 //
 //              p > 0                          p <= 0 (or, under zero force, N <= 0 and p <= 0)
 //     FLIGHT ----------> CONTACT(side) ---------------------------------> FLIGHT
@@ -8,140 +8,168 @@
 //        |        N <= 0,  |  |               p <= 0                        |
 //        |         p > 0   +-> INSIDE(side) --------------------------------+
 //        |   p >= 0, u' inwards: to the stop, u' -> -e u'
-//        +--(impulse)--> FLIGHT, or RESTING(side) where the flight to come is over within a step
+//        +--(impulse)--> FLIGHT, or RESTING(side) where the next flight lasts less than a step
 //
-// A resting mass moves freely for a step and is then put back to its stop by an impulse, together
-// with all others that press or are met; it leaves where a step takes it away from the stop.
+// p is the penetration and N the contact force. A resting mass moves freely during a step; then an
+// impulse returns it to its stop, simultaneously with all other dampers in collision. It leaves
+// when a step moves it away from the stop.
+#include "core/solve/step_contact.h"
+
 #include <math.h>
+#include <string.h>
 
 #include "core/plan/contact_setup.h"
 #include "core/solve/collision.h"
-#include "core/solve/time_stepping.h"
 
-static double strain(const ModalState *state, size_t d) {
+ContactForce step_contact_force(const ModalState *state, size_t d, double r, double w) {
     const DamperState *damper = &state->damper[d];
-    return damper->phase == PHASE_CONTACT ? steps_contact(state, d, damper->r, 0).strain : 0;
+    const double sign = modal_state_sign(damper->side);
+    if (state->plan->form == CONTACT_POWER) {
+        ContactForce force = state->plan->law->force(&damper->contact, sign * r, sign * w);
+        force.value *= sign;
+        return force;
+    }
+    const double k = damper->contact.stiffness, c = damper->contact.damping;
+    return (ContactForce){
+        .value = k * r + c * w, .by_penetration = k, .by_speed = c, .strain = 0.5 * k * r * r};
 }
 
-// Into the stop: at most one of the two, for between them there is room or none at all.
-static double depth(const DamperState *damper, Side side) {
+static double step_contact_strain(const ModalState *state, size_t d) {
+    const DamperState *damper = &state->damper[d];
+    return damper->phase == PHASE_CONTACT ? step_contact_force(state, d, damper->r, 0).strain : 0;
+}
+
+static double step_contact_magnitude(const ModalState *state, size_t d) {
+    return fabs(step_contact_force(state, d, state->damper[d].r, state->damper[d].w).value);
+}
+
+void step_contact_begin(const ModalState *state, StepContact *contact) {
+    const size_t m = state->dampers;
+    memset(contact->impulse, 0, m * sizeof *contact->impulse);
+    memset(contact->work, 0, m * sizeof *contact->work);
+    for (size_t d = 0; d < m && state->has_stops; d++)
+        contact->strain_before[d] = step_contact_strain(state, d);
+}
+
+// Penetration of a stop [m]. At most one of the two is positive, for the clearance is not negative.
+static double step_contact_depth(const DamperState *damper, Side side) {
     return modal_state_sign(side) * damper->r - modal_state_room(damper, side);
 }
 
-static ContactPhase next_phase(const ModalState *state, size_t d, Side *side) {
+static ContactPhase step_contact_next_phase(const ModalState *state, size_t d, Side *side) {
     const DamperState *damper = &state->damper[d];
-    const double p = depth(damper, *side);
+    const double p = step_contact_depth(damper, *side);
     if (damper->phase == PHASE_FLIGHT) {
-        *side = depth(damper, SIDE_RIGHT) > depth(damper, SIDE_LEFT) ? SIDE_RIGHT : SIDE_LEFT;
-        return depth(damper, *side) > 0 ? PHASE_CONTACT : PHASE_FLIGHT;
+        *side = step_contact_depth(damper, SIDE_RIGHT) > step_contact_depth(damper, SIDE_LEFT)
+                    ? SIDE_RIGHT
+                    : SIDE_LEFT;
+        return step_contact_depth(damper, *side) > 0 ? PHASE_CONTACT : PHASE_FLIGHT;
     }
     if (!(p > 0))
         return PHASE_FLIGHT;
     if (state->plan->separation != SEPARATION_ZERO_FORCE || state->plan->form != CONTACT_LINEAR)
         return PHASE_CONTACT;
     const double push =
-        modal_state_sign(*side) * steps_contact(state, d, damper->r, damper->w).value;
+        modal_state_sign(*side) * step_contact_force(state, d, damper->r, damper->w).value;
     return push > 0 ? PHASE_CONTACT : PHASE_INSIDE;
 }
 
-// r is counted from that stop from now on.
-static void place(DamperState *damper, Side side) {
-    const double p = depth(damper, side);
+// Moves the origin of r to a stop.
+static void step_contact_set_origin(DamperState *damper, Side side) {
+    const double p = step_contact_depth(damper, side);
     damper->side = side;
     damper->origin = (ContactOrigin)side;
     damper->r = modal_state_sign(side) * p;
 }
 
-static void open_row(ModalState *state, size_t d, double ago) {
+static void step_contact_open_row(ModalState *state, size_t d, double ago) {
     DamperState *damper = &state->damper[d];
     impact_log_open(&damper->row, IMPACT_IMPACT, modal_state_time(state) - ago, d, damper->side,
                     fmax(modal_state_sign(damper->side) * damper->w, 0));
 }
 
-static void close_row(ModalState *state, size_t d) {
+static void step_contact_close_row(ModalState *state, size_t d) {
     DamperState *damper = &state->damper[d];
     impact_log_close(&state->impacts, &damper->row, modal_state_time(state),
                      fmax(-modal_state_sign(damper->side) * damper->w, 0));
 }
 
-static void enter(Steps *steps, size_t d, Side side) {
-    ModalState *state = &steps->state;
+static void step_contact_enter(ModalState *state, size_t d, Side side, bool is_by_place) {
     DamperState *damper = &state->damper[d];
     const bool is_new = damper->phase == PHASE_FLIGHT;
-    place(damper, side);
+    step_contact_set_origin(damper, side);
     damper->phase = PHASE_CONTACT;
-    if (is_new && !steps->stepper->is_by_place)
+    if (is_new && !is_by_place)
         damper->contact = stops_freeze(&damper->plan->stops[side], fabs(damper->w));
-    open_row(state, d, 0);
+    step_contact_open_row(state, d, 0);
     damper->row.impact.is_resumed = !is_new;
 }
 
-// A stretch of contact lies behind.
-static void book(Steps *steps, size_t d, double length) {
-    ModalState *state = &steps->state;
+// Adds `length` seconds of contact to the log.
+static void step_contact_log(ModalState *state, const StepContact *contact, size_t d,
+                             double length) {
     DamperState *damper = &state->damper[d];
-    impact_log_stretch(&state->impacts, &damper->row, length, steps->sums.impulse[d],
-                       steps->sums.work[d] - (strain(state, d) - steps->before[d]));
+    impact_log_stretch(&state->impacts, &damper->row, length, contact->impulse[d],
+                       contact->work[d] -
+                           (step_contact_strain(state, d) - contact->strain_before[d]));
     if (damper->phase == PHASE_CONTACT)
-        impact_log_force(&state->impacts, &damper->row,
-                         fabs(steps_contact(state, d, damper->r, damper->w).value));
+        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
 }
 
-// The force followed the phase all through the step.
-static void turn_by_phase(Steps *steps, size_t d, ContactPhase next, Side side, double length) {
-    ModalState *state = &steps->state;
+// Of a method whose contacts last for whole steps.
+static void step_contact_switch_by_phase(ModalState *state, const StepContact *contact, size_t d,
+                                         ContactPhase next, Side side, double length) {
     DamperState *damper = &state->damper[d];
     if (damper->phase == PHASE_CONTACT)
-        book(steps, d, length);
+        step_contact_log(state, contact, d, length);
     if (damper->phase == next)
         return;
     if (next == PHASE_CONTACT) {
         const bool is_resumed = damper->phase == PHASE_INSIDE;
-        enter(steps, d, side);
+        step_contact_enter(state, d, side, contact->is_by_place);
         if (is_resumed)
-            impact_log_stretch(&state->impacts, &damper->row, 0, 0, -strain(state, d));
-        impact_log_force(&state->impacts, &damper->row,
-                         fabs(steps_contact(state, d, damper->r, damper->w).value));
+            impact_log_stretch(&state->impacts, &damper->row, 0, 0, -step_contact_strain(state, d));
+        impact_log_force(&state->impacts, &damper->row, step_contact_magnitude(state, d));
         return;
     }
     if (damper->phase == PHASE_CONTACT) {
-        if (next == PHASE_INSIDE) // what is left in the spring
-            impact_log_stretch(&state->impacts, &damper->row, 0, 0, strain(state, d));
-        close_row(state, d);
+        if (next == PHASE_INSIDE) // the strain energy left in the buffer
+            impact_log_stretch(&state->impacts, &damper->row, 0, 0, step_contact_strain(state, d));
+        step_contact_close_row(state, d);
     }
     damper->phase = next;
 }
 
-// The force followed the place: a step in which a contact begins or ends has a part of it.
-static void turn_by_place(Steps *steps, size_t d, ContactPhase next, Side side, double length) {
-    ModalState *state = &steps->state;
+// Of a method whose stages follow the penetration: the integrals of a step in which a contact
+// begins or ends cover the contact's part of it.
+static void step_contact_switch_by_place(ModalState *state, const StepContact *contact, size_t d,
+                                         ContactPhase next, Side side, double length) {
     DamperState *damper = &state->damper[d];
     const ContactPhase last = damper->phase;
     if (last == PHASE_CONTACT) {
         damper->phase = next;
-        book(steps, d, length);
+        step_contact_log(state, contact, d, length);
         if (next != PHASE_CONTACT)
-            close_row(state, d);
+            step_contact_close_row(state, d);
     } else if (next == PHASE_CONTACT) {
-        enter(steps, d, side);
-        book(steps, d, 0);
-    } else if (steps->sums.impulse[d] != 0) { // begun and over
-        damper->side = steps->sums.impulse[d] > 0 ? SIDE_RIGHT : SIDE_LEFT;
-        open_row(state, d, length);
+        step_contact_enter(state, d, side, contact->is_by_place);
+        step_contact_log(state, contact, d, 0);
+    } else if (contact->impulse[d] != 0) { // it began and ended within the step
+        damper->side = contact->impulse[d] > 0 ? SIDE_RIGHT : SIDE_LEFT;
+        step_contact_open_row(state, d, length);
         damper->row.impact.approach_speed = fabs(damper->w);
         damper->phase = PHASE_FLIGHT;
-        book(steps, d, length);
-        impact_log_force(&state->impacts, &damper->row, fabs(steps->sums.impulse[d]) / length);
-        close_row(state, d);
+        step_contact_log(state, contact, d, length);
+        impact_log_force(&state->impacts, &damper->row, fabs(contact->impulse[d]) / length);
+        step_contact_close_row(state, d);
         damper->phase = next;
     } else {
         damper->phase = next;
     }
 }
 
-// Which dampers are met at their stops, and how fast each must part.
-static bool meet(Steps *steps, double length) {
-    ModalState *state = &steps->state;
+// Selects the dampers that collide under the impulse law, and sets the separation speed of each.
+static bool step_contact_select(ModalState *state, double length) {
     bool is_any = false;
     modal_state_forces(state);
     for (size_t d = 0; d < state->dampers; d++) {
@@ -153,19 +181,21 @@ static bool meet(Steps *steps, double length) {
         if (!is_resting || is_pair)
             damper->side = damper->w > 0 ? SIDE_RIGHT : SIDE_LEFT;
         const double sign = modal_state_sign(damper->side), closing = sign * damper->w;
-        if (!is_pair && (depth(damper, damper->side) < 0 || (!is_resting && !(closing > 0))))
+        if (!is_pair &&
+            (step_contact_depth(damper, damper->side) < 0 || (!is_resting && !(closing > 0))))
             continue;
         is_any = damper->in_collision = true;
         damper->approach_speed = fmax(closing, 0);
         if (is_resting || is_pair)
             continue;
         damper->contact = stops_freeze(&damper->plan->stops[damper->side], closing);
-        // The speed at the stop, without what has been gained beyond it: or bounces would not die
-        // away. `closing` is that of now, for momentum is kept.
+        // Restitution applies to the speed at the stop. The speed gained past the stop is removed,
+        // or bounces would not decay; `closing` keeps it, because momentum is conserved.
         const double pull = sign * modal_state_acceleration(state, d);
-        const double square = closing * closing - 2 * pull * depth(damper, damper->side);
+        const double square =
+            closing * closing - 2 * pull * step_contact_depth(damper, damper->side);
         const double parting = damper->contact.restitution * sqrt(fmax(square, 0));
-        // A flight that is over within a step: it rests from now on.
+        // The next flight would last less than a step: the mass rests.
         damper->just_begun = 2 * parting < pull * length;
         damper->is_bounced = true;
         damper->separation_speed = damper->just_begun ? 0 : parting;
@@ -173,15 +203,14 @@ static bool meet(Steps *steps, double length) {
     return is_any;
 }
 
-static void rest(Steps *steps, size_t d, double length) {
-    ModalState *state = &steps->state;
+static void step_contact_rest(ModalState *state, size_t d, double length) {
     DamperState *damper = &state->damper[d];
     const double impulse = modal_state_sign(damper->side) * damper->impulse;
     const Side side = impulse < 0 ? SIDE_LEFT : SIDE_RIGHT;
     if (damper->row.is_open && damper->impulse != 0 && (Side)damper->row.impact.side != side)
         impact_log_close(&state->impacts, &damper->row, modal_state_time(state) - length,
                          (double)NAN);
-    if (!damper->row.is_open) // between stops without clearance the step before belongs to it
+    if (!damper->row.is_open) // between stops without clearance it includes the step before
         impact_log_open(&damper->row, IMPACT_RESTING, modal_state_time(state) - length, d, side,
                         (double)NAN);
     impact_log_stretch(&state->impacts, &damper->row, length, impulse,
@@ -189,8 +218,7 @@ static void rest(Steps *steps, size_t d, double length) {
     impact_log_force(&state->impacts, &damper->row, fabs(damper->impulse) / length);
 }
 
-static void bounce(Steps *steps, size_t d) {
-    ModalState *state = &steps->state;
+static void step_contact_bounce(ModalState *state, size_t d) {
     DamperState *damper = &state->damper[d];
     const double both = damper->approach_speed + damper->separation_speed;
     impact_log_bounce(&state->impacts, modal_state_time(state), d, damper->side,
@@ -202,27 +230,25 @@ static void bounce(Steps *steps, size_t d) {
                     (double)NAN);
 }
 
-static void collide(Steps *steps, double length) {
-    ModalState *state = &steps->state;
-    const bool is_any = meet(steps, length);
+static void step_contact_collide(ModalState *state, double length) {
     bool is_changed = false;
-    if (is_any)
+    if (step_contact_select(state, length))
         collision_resolve(state);
     for (size_t d = 0; d < state->dampers; d++) {
         DamperState *damper = &state->damper[d];
         const ContactPhase last = damper->phase;
         const bool is_pressed = damper->in_collision && damper->impulse != 0;
         if (is_pressed) {
-            place(damper, damper->side);
+            step_contact_set_origin(damper, damper->side);
             damper->r = 0;
         }
         if (damper->plan->clearance == 0) {
             damper->phase = PHASE_RESTING;
-            rest(steps, d, length);
+            step_contact_rest(state, d, length);
         } else if (is_pressed && damper->is_bounced) {
-            bounce(steps, d);
+            step_contact_bounce(state, d);
         } else if (last == PHASE_RESTING && is_pressed) {
-            rest(steps, d, length);
+            step_contact_rest(state, d, length);
         } else if (last == PHASE_RESTING) {
             damper->phase = PHASE_FLIGHT;
             impact_log_close(&state->impacts, &damper->row, modal_state_time(state), (double)NAN);
@@ -233,19 +259,18 @@ static void collide(Steps *steps, double length) {
         modal_state_constrain(state);
 }
 
-void steps_turn(Steps *steps, double length) {
-    ModalState *state = &steps->state;
+void step_contact_end(ModalState *state, const StepContact *contact, double length) {
     if (state->plan->form == CONTACT_IMPULSIVE) {
         if (state->dampers > 0)
-            collide(steps, length);
+            step_contact_collide(state, length);
         return;
     }
     for (size_t d = 0; d < state->dampers; d++) {
         Side side = state->damper[d].side;
-        const ContactPhase next = next_phase(state, d, &side);
-        if (steps->stepper->is_by_place)
-            turn_by_place(steps, d, next, side, length);
+        const ContactPhase next = step_contact_next_phase(state, d, &side);
+        if (contact->is_by_place)
+            step_contact_switch_by_place(state, contact, d, next, side, length);
         else
-            turn_by_phase(steps, d, next, side, length);
+            step_contact_switch_by_phase(state, contact, d, next, side, length);
     }
 }

@@ -1,19 +1,42 @@
-// Between two samples lies a whole number of steps. What the ledgers get of a step are integrals by
-// a rule of the method's own order, so that the energy balance tells of the method's error.
+// A sample interval holds a whole number of steps. The energy integrals of a step use a rule of the
+// method's own order, so that the energy balance measures the method's error.
+//
+// The companion takes steps up to twice as long that end at samples too, but at no other instant of
+// the run. A run with one step per sample interval has a companion with one step per two intervals.
+// Without contacts the error is proportional to the step to the method's order, so the difference
+// of the two runs gives the run's error. Across contacts the error depends on where in a stop the
+// steps happen to end; it may be a few times the difference, or as large as the energy error. A run
+// with error control has a companion with half the maximum step and a tenth of the tolerance, which
+// is the more accurate of the two, because samples and kinks limit longer steps.
 #include "core/solve/time_stepping.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-static const double WATCH_WORK = 1e6; // multiplications, about, between looks at the progress
+#include "core/plan/contact_setup.h"
 
-// Energy that neither start nor base gave, over what they did: no error of a sound run.
-static const double GROWN = 1e6;
-static const double POWER_STEPS = 8;
+static const double CHECK_COST = 1e6;        // multiplications between two checks, about
+static const double ENERGY_GROWTH_MAX = 1e6; // energy over that of start and base; no sound run
+static const double POWER_STEPS = 8;         // solver steps of a contact force under a power law
+static const double PARTS = 30; // of the fastest period and the shortest contact, per step
+static const double SHARE_MAX = 1e12;
+static const double COMPANION_FINER = 10;  // tolerance of the run over that of the companion
+static const double TOLERANCE_MIN = 1e-14; // near the rounding error of a step
+static const double CONTACT_FACTOR = 6;    // error over difference of the two runs, with contacts
+static const double TWO_PI = 6.28318530717958647693;
 
-void steps_elastic(const ModalState *state, const double *q, const double *p,
-                   double *restrict out) {
+// clang-format off
+const Field accuracy_step_fields[] = {
+    FIELD_BASE(AccuracyStep, accuracy, accuracy_fields),
+    FIELD_REAL(AccuracyStep, step, "s", ABOVE(0), OPTIONAL, "length of a step, made a whole fraction of the sample interval; if absent a 30th of the fastest mode's period and of the shortest contact, at most the sample interval"),
+    FIELD_END
+};
+// clang-format on
+
+void time_stepping_elastic(const ModalState *state, const double *q, const double *p,
+                           double *restrict out) {
     const size_t n = state->mode_count;
     for (size_t i = 0; i < n; i++)
         out[i] = state->omega2[i] * q[i];
@@ -26,19 +49,19 @@ void steps_elastic(const ModalState *state, const double *q, const double *p,
         out[i] += modal_state_dot(state->damping + i * n, p, n);
 }
 
-void steps_rate(Steps *steps, const double *y, double ground, const double *force,
-                double *restrict out) {
-    const ModalState *state = &steps->state;
+void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, const double *force,
+                        double *restrict out) {
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
     double *p1 = out + n, *w1 = out + 2 * n + m;
-    steps_elastic(state, y, y + n, steps->elastic);
+    time_stepping_elastic(state, y, y + n, stepping->elastic);
     memcpy(out, y + n, n * sizeof *y);
     memcpy(out + 2 * n, y + 2 * n + m, m * sizeof *y);
     for (size_t i = 0; i < n; i++)
-        p1[i] = -steps->elastic[i] - state->modes->participation[i] * ground;
+        p1[i] = -stepping->elastic[i] - state->modes->participation[i] * ground;
     for (size_t d = 0; d < m; d++)
         w1[d] = state->damper[d].base_coupling * ground +
-                modal_state_dot(state->damper[d].shape, steps->elastic, n);
+                modal_state_dot(state->damper[d].shape, stepping->elastic, n);
     for (size_t d = 0; d < m; d++) {
         if (force[d] == 0)
             continue;
@@ -49,98 +72,70 @@ void steps_rate(Steps *steps, const double *y, double ground, const double *forc
     }
 }
 
-ContactForce steps_contact(const ModalState *state, size_t d, double r, double w) {
-    const DamperState *damper = &state->damper[d];
-    const double sign = modal_state_sign(damper->side);
-    if (state->plan->form == CONTACT_POWER) {
-        ContactForce force = state->plan->law->force(&damper->contact, sign * r, sign * w);
-        force.value *= sign;
-        return force;
-    }
-    const double k = damper->contact.stiffness, c = damper->contact.damping;
-    return (ContactForce){
-        .value = k * r + c * w, .by_penetration = k, .by_speed = c, .strain = 0.5 * k * r * r};
-}
-
-// Powers at one end of a step, and how they change.
-typedef struct End {
-    double input, damping, input_rate, damping_rate;
-} End;
-
-static End look(Steps *steps, const double *y, double ground, double slope, double *forces,
-                double *rates) {
-    const ModalState *state = &steps->state;
+void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
+                             double length, bool is_corrected) {
+    const ModalState *state = &stepping->state;
     const size_t n = state->mode_count, m = state->dampers;
-    const double *p = y + n, *r = y + 2 * n, *w = r + m;
-    for (size_t d = 0; d < m; d++)
-        forces[d] =
-            state->damper[d].phase == PHASE_CONTACT ? steps_contact(state, d, r[d], w[d]).value : 0;
-    steps_rate(steps, y, ground, forces, rates);
-    double momentum = modal_state_dot(state->momentum_weights, p, n),
-           gained = modal_state_dot(state->momentum_weights, rates + n, n);
-    for (size_t d = 0; d < m; d++) {
-        momentum += state->damper[d].plan->mass * w[d];
-        gained += state->damper[d].plan->mass * rates[2 * n + m + d];
-    }
-    End end = {.input = -ground * momentum, .input_rate = -slope * momentum - ground * gained};
-    for (size_t i = 0; i < n; i++) { // D need not be symmetric
-        const double drag = steps->elastic[i] - state->omega2[i] * y[i];
-        const double dragged = state->diagonal != NULL
-                                   ? state->diagonal[i] * rates[n + i]
-                                   : modal_state_dot(state->damping + i * n, rates + n, n);
-        end.damping += drag * p[i];
-        end.damping_rate += drag * rates[n + i] + dragged * p[i];
-    }
-    return end;
-}
-
-void steps_sum(Steps *steps, const double *from, const double *to, double length,
-               bool is_corrected) {
-    const ModalState *state = &steps->state;
-    const size_t n = state->mode_count, m = state->dampers;
-    const double slope = (steps->ground[2] - steps->ground[0]) / length;
+    const double ground_slope = (stepping->ground[2] - stepping->ground[0]) / length;
     const double half = length / 2, twelfth = is_corrected ? length * length / 12 : 0;
-    const double *const states[2] = {from, to};
-    double *rates = steps->force + m;
-    StepSums *sums = &steps->sums;
+    double *N = stepping->force, *rates = N + m;
     for (int k = 0; k < 2; k++) {
-        const double correction = k == 0 ? twelfth : -twelfth;
-        const double *r = states[k] + 2 * n, *w = r + m;
-        const End end =
-            look(steps, states[k], steps->ground[k == 0 ? 0 : 2], slope, steps->force, rates);
-        sums->input += half * end.input + correction * end.input_rate;
-        sums->damping += half * end.damping + correction * end.damping_rate;
+        const double *y = k == 0 ? from : to, *p = y + n, *r = p + n, *w = r + m;
+        const double ground = stepping->ground[2 * k], correction = k == 0 ? twelfth : -twelfth;
+        for (size_t d = 0; d < m; d++)
+            N[d] = state->damper[d].phase == PHASE_CONTACT
+                       ? step_contact_force(state, d, r[d], w[d]).value
+                       : 0;
+        time_stepping_rate(stepping, y, ground, N, rates);
+        double momentum = modal_state_dot(state->momentum_weights, p, n),
+               momentum_rate = modal_state_dot(state->momentum_weights, rates + n, n);
+        for (size_t d = 0; d < m; d++) {
+            momentum += state->damper[d].plan->mass * w[d];
+            momentum_rate += state->damper[d].plan->mass * rates[2 * n + m + d];
+        }
+        double loss = 0, loss_rate = 0;
+        for (size_t i = 0; i < n; i++) { // D need not be symmetric
+            const double drag = stepping->elastic[i] - state->omega2[i] * y[i];
+            const double drag_rate = state->diagonal != NULL
+                                         ? state->diagonal[i] * rates[n + i]
+                                         : modal_state_dot(state->damping + i * n, rates + n, n);
+            loss += drag * p[i];
+            loss_rate += drag * rates[n + i] + drag_rate * p[i];
+        }
+        stepping->input += half * (-ground * momentum) +
+                           correction * (-ground_slope * momentum - ground * momentum_rate);
+        stepping->damping += half * loss + correction * loss_rate;
         for (size_t d = 0; d < m; d++) {
             if (state->damper[d].phase != PHASE_CONTACT)
                 continue;
-            const ContactForce force = steps_contact(state, d, r[d], w[d]);
-            const double sped = rates[2 * n + m + d];
-            const double grown = force.by_penetration * w[d] + force.by_speed * sped;
-            sums->impulse[d] += half * force.value + correction * grown;
-            sums->work[d] +=
-                half * force.value * w[d] + correction * (grown * w[d] + force.value * sped);
+            const ContactForce force = step_contact_force(state, d, r[d], w[d]);
+            const double w1 = rates[2 * n + m + d];
+            const double N1 = force.by_penetration * w[d] + force.by_speed * w1;
+            stepping->contact.impulse[d] += half * force.value + correction * N1;
+            stepping->contact.work[d] +=
+                half * force.value * w[d] + correction * (N1 * w[d] + force.value * w1);
         }
     }
 }
 
-static void read_base(Steps *steps, double length) {
-    const ModalState *state = &steps->state;
+static void time_stepping_read_base(TimeStepping *stepping, double length) {
+    const ModalState *state = &stepping->state;
     Slice slice;
     const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
-    steps->ground[0] = slice.value;
+    stepping->ground[0] = slice.value;
     for (int k = 1; k <= 2; k++) {
         const double at = k * length / 2;
         if (knot < at * (1 - 1e-9)) {
             (void)base_cursor_slice(&state->base, state->sample, state->offset + at, &slice);
-            steps->ground[k] = slice.value;
+            stepping->ground[k] = slice.value;
         } else {
-            steps->ground[k] = slice_at(&slice, at);
+            stepping->ground[k] = slice_at(&slice, at);
         }
     }
 }
 
-// What the base gains in speed over a step, piece by piece.
-static double base_gain(const ModalState *state, double length) {
+// Ground velocity gained in a step, integrated exactly [m/s].
+static double time_stepping_ground_gain(const ModalState *state, double length) {
     double gain = 0, done = 0;
     while (length - done > 1e-12 * length) {
         Slice slice;
@@ -155,71 +150,68 @@ static double base_gain(const ModalState *state, double length) {
     return gain;
 }
 
-// A pulse shorter than a step may lie between all instants at which steps look at the base, those
-// of a neighbour too.
-static void look_for_unseen(Steps *steps, double length, double seen) {
-    const ModalState *state = &steps->state;
+// A pulse shorter than a step may lie between all instants at which the run and its companion
+// evaluate the base.
+static void time_stepping_find_missed(TimeStepping *stepping, double length, double seen) {
+    const ModalState *state = &stepping->state;
     Slice slice;
     if (state->base.base->form != BASE_PIECES ||
         !(base_cursor_slice(&state->base, state->sample, state->offset, &slice) < length))
         return;
-    if (steps->most_unseen == 0)
-        steps->unseen_since = modal_state_time(state);
-    steps->unseen += base_gain(state, length) - seen;
-    steps->most_unseen = fmax(steps->most_unseen, fabs(steps->unseen));
+    if (stepping->max_missed_velocity == 0)
+        stepping->missed_since = modal_state_time(state);
+    stepping->missed_velocity += time_stepping_ground_gain(state, length) - seen;
+    stepping->max_missed_velocity =
+        fmax(stepping->max_missed_velocity, fabs(stepping->missed_velocity));
 }
 
-static Status unstable(const Steps *steps) {
-    const ModalState *state = &steps->state;
-    return problem_set(state->problem, STATUS_UNSTABLE,
-                       "%s leaves all bounds at t = %.6g s with a step of %.4g s: the motion has a "
-                       "rate of %.4g 1/s, take a step of %.2g s or less, or the solver \"exact\"",
-                       steps->stepper->name, modal_state_time(state), steps->length,
-                       modal_state_rate(state),
-                       fmin(0.2 / modal_state_rate(state), steps->length / 4));
-}
-
-Status steps_check(Steps *steps) {
-    ModalState *state = &steps->state;
+// STATUS_LIMIT, STATUS_CANCELLED or the status of the impact log.
+static Status time_stepping_check(TimeStepping *stepping) {
+    ModalState *state = &stepping->state;
     const Run *run = state->run;
-    steps->watched = 0;
+    stepping->unchecked_cost = 0;
     if (run->steps_max > 0 && run->steps > run->steps_max)
         return problem_set(state->problem, STATUS_LIMIT,
                            SOLVER_STOPPED "t = %.6g s of %.6g s, by steps of %.4g s",
                            run->steps_max, run->steps_max * SOLVER_STEP, modal_state_time(state),
-                           state->plan->duration, steps->length);
+                           state->plan->duration, stepping->length);
     if (!progress_advance(run->progress, modal_state_time(state) / state->plan->duration))
         return problem_set(state->problem, STATUS_CANCELLED, "cancelled at t = %.6g s",
                            modal_state_time(state));
     return impact_log_status(&state->impacts, state->problem);
 }
 
-// Takes peaks and the balance at a step's end, and tells a motion without bounds.
-static Status note(Steps *steps) {
-    ModalState *state = &steps->state;
+static Status time_stepping_unstable(const TimeStepping *stepping) {
+    const ModalState *state = &stepping->state;
+    const double rate = modal_state_rate(state);
+    return problem_set(state->problem, STATUS_UNSTABLE,
+                       "%s leaves all bounds at t = %.6g s with a step of %.4g s: the motion has a "
+                       "rate of %.4g 1/s, take a step of %.2g s or less, or the solver \"exact\"",
+                       stepping->stepper->name, modal_state_time(state), stepping->length, rate,
+                       fmin(0.2 / rate, stepping->length / 4));
+}
+
+Status time_stepping_note(TimeStepping *stepping, double cost) {
+    ModalState *state = &stepping->state;
     modal_state_forces(state);
     const EnergyState energy = modal_state_energy(state);
     const double held = energy.kinetic + energy.strain;
-    steps->largest_in = fmax(steps->largest_in, fabs(state->impacts.energy.input));
-    const double most = GROWN * (steps->largest_in + state->impacts.energy.initial);
-    if (!(held <= most) || !isfinite(held))
-        return unstable(steps);
-    if (state->is_shadow)
-        return STATUS_OK;
-    recorder_peaks(state);
-    impact_log_balance(&state->impacts, &energy);
-    return STATUS_OK;
+    stepping->largest_input = fmax(stepping->largest_input, fabs(state->impacts.energy.input));
+    const double max =
+        ENERGY_GROWTH_MAX * (stepping->largest_input + state->impacts.energy.initial);
+    if (!(held <= max) || !isfinite(held))
+        return time_stepping_unstable(stepping);
+    if (!state->is_shadow) {
+        recorder_peaks(state);
+        impact_log_balance(&state->impacts, &energy);
+    }
+    state->run->work.steps++;
+    state->run->steps += cost;
+    stepping->unchecked_cost += 20 * cost;
+    return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-Status steps_note(Steps *steps, double cost) {
-    TRY(note(steps));
-    steps->state.run->work.steps++;
-    steps->state.run->steps += cost;
-    steps->watched += 20 * cost;
-    return steps->watched > WATCH_WORK ? steps_check(steps) : STATUS_OK;
-}
-
-static void gather(const ModalState *state, double *y) {
+static void time_stepping_gather(const ModalState *state, double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(y, state->q, n * sizeof *y);
     memcpy(y + n, state->p, n * sizeof *y);
@@ -229,7 +221,7 @@ static void gather(const ModalState *state, double *y) {
     }
 }
 
-static void scatter(ModalState *state, const double *y) {
+static void time_stepping_scatter(ModalState *state, const double *y) {
     const size_t n = state->mode_count, m = state->dampers;
     memcpy(state->q, y, n * sizeof *y);
     memcpy(state->p, y + n, n * sizeof *y);
@@ -239,84 +231,533 @@ static void scatter(ModalState *state, const double *y) {
     }
 }
 
-// Forces under a power law take several powers a step.
-static double contact_cost(const Steps *steps) {
-    const ModalState *state = &steps->state;
+static double time_stepping_step_cost(const TimeStepping *stepping) {
+    const ModalState *state = &stepping->state;
     size_t touching = 0;
+    double setup;
     for (size_t d = 0; d < state->dampers && state->plan->form == CONTACT_POWER; d++)
         touching += state->damper[d].phase == PHASE_CONTACT;
-    return POWER_STEPS * (double)touching;
+    return stepping->stepper->cost(state->mode_count, state->dampers, state->diagonal == NULL,
+                                   &setup) +
+           POWER_STEPS * (double)touching;
 }
 
-// `offset`: of the step's end.
-static Status step(Steps *steps, double length, double offset) {
-    ModalState *state = &steps->state;
-    const size_t m = state->dampers;
-    double making;
-    const double cost =
-        steps->stepper->cost(state->mode_count, m, state->diagonal == NULL, &making);
-    StepSums *sums = &steps->sums;
-    read_base(steps, length);
-    gather(state, steps->y);
-    sums->input = sums->damping = 0;
-    memset(sums->impulse, 0, 2 * m * sizeof *sums->impulse);
-    for (size_t d = 0; d < m && state->has_stops; d++)
-        steps->before[d] = state->damper[d].phase == PHASE_CONTACT
-                               ? steps_contact(state, d, state->damper[d].r, 0).strain
-                               : 0;
-    const double gain = length / 6 * (steps->ground[0] + 4 * steps->ground[1] + steps->ground[2]);
-    look_for_unseen(steps, length, gain);
-    TRY(steps->stepper->step(steps, length));
-    scatter(state, steps->y);
+// `offset`: the step's end, from the last sample [s].
+static Status time_stepping_step(TimeStepping *stepping, double length, double offset) {
+    ModalState *state = &stepping->state;
+    const double *ground = stepping->ground;
+    time_stepping_read_base(stepping, length);
+    time_stepping_gather(state, stepping->y);
+    stepping->input = stepping->damping = 0;
+    step_contact_begin(state, &stepping->contact);
+    const double gain = length / 6 * (ground[0] + 4 * ground[1] + ground[2]);
+    time_stepping_find_missed(stepping, length, gain);
+    TRY(stepping->stepper->step(stepping, length));
+    time_stepping_scatter(state, stepping->y);
     state->offset = offset;
-    state->base_acceleration = steps->ground[2];
-    impact_log_work(&state->impacts, sums->input, sums->damping);
-    steps->record.base_speed += gain;
+    state->base_acceleration = ground[2];
+    impact_log_work(&state->impacts, stepping->input, stepping->damping);
+    stepping->recorder.base_speed += gain;
     if (state->has_stops) {
         state->run->work.stop_searches++;
-        steps_turn(steps, length);
+        step_contact_end(state, &stepping->contact, length);
     }
-    return steps_note(steps, cost + contact_cost(steps));
+    return time_stepping_note(stepping, time_stepping_step_cost(stepping));
 }
 
-void steps_take_sample(Steps *steps) {
-    ModalState *state = &steps->state;
+static void time_stepping_record(TimeStepping *stepping) {
+    ModalState *state = &stepping->state;
     if (state->is_shadow)
         return;
     state->base_acceleration = base_cursor_at(&state->base, state->sample);
     modal_state_forces(state);
-    if (state->sample == steps->record.statistics_start && state->sample > 0)
+    if (state->sample == stepping->recorder.statistics_start && state->sample > 0)
         recorder_forget(state);
-    flight_buffer_take(&steps->trail, state, steps->record.base_speed);
-    recorder_take(&steps->record, state, 1);
+    flight_buffer_take(&stepping->samples, state, stepping->recorder.base_speed);
+    recorder_take(&stepping->recorder, state, 1);
     recorder_peaks(state);
 }
 
-Status steps_interval(Steps *steps) {
-    ModalState *state = &steps->state;
-    if (steps->stepper->cross != NULL)
-        TRY(steps->stepper->cross(steps, state->interval));
-    for (size_t k = 1; k <= steps->share && steps->stepper->cross == NULL; k++)
-        TRY(step(steps, steps->length, (double)k * steps->length));
+// Advances to the next sample and records it.
+static Status time_stepping_interval(TimeStepping *stepping) {
+    ModalState *state = &stepping->state;
+    if (stepping->stepper->interval != NULL)
+        TRY(stepping->stepper->interval(stepping, state->interval));
+    for (size_t k = 1; k <= stepping->share && stepping->stepper->interval == NULL; k++)
+        TRY(time_stepping_step(stepping, stepping->length, (double)k * stepping->length));
     state->sample++;
     state->offset = 0;
     state->run->work.mode_samples += state->mode_count;
-    steps_take_sample(steps);
+    time_stepping_record(stepping);
     return STATUS_OK;
 }
 
-Status steps_finish(Steps *steps, double length) {
-    const double clock = 8 * DBL_EPSILON * steps->state.plan->duration; // less is rounding
-    const double whole = floor(length / steps->length * (1 + 1e-9));
-    if (steps->stepper->cross != NULL) {
+// Advances to the end of a run that ends `length` seconds after its last sample.
+static Status time_stepping_finish(TimeStepping *stepping, double length) {
+    const double clock = 8 * DBL_EPSILON * stepping->state.plan->duration; // less is rounding
+    const double whole = floor(length / stepping->length * (1 + 1e-9));
+    if (stepping->stepper->interval != NULL) {
         if (length > clock)
-            TRY(steps->stepper->cross(steps, length));
-        return steps_check(steps);
+            TRY(stepping->stepper->interval(stepping, length));
+        return time_stepping_check(stepping);
     }
     for (double k = 1; k <= whole; k++)
-        TRY(step(steps, steps->length, k * steps->length));
-    const double rest = length - whole * steps->length;
+        TRY(time_stepping_step(stepping, stepping->length, k * stepping->length));
+    const double rest = length - whole * stepping->length;
     if (rest > clock)
-        TRY(step(steps, rest, length));
-    return steps_check(steps);
+        TRY(time_stepping_step(stepping, rest, length));
+    return time_stepping_check(stepping);
+}
+
+// Rejects steps outside the explicit method's stability limit.
+static Status time_stepping_check_stability(const TimeStepping *stepping) {
+    const ModalState *state = &stepping->state;
+    const double limit = stepping->stepper->stability_limit, max = limit / stepping->length;
+    if (!(limit > 0))
+        return STATUS_OK;
+    if (state->rate > max)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "%s is unstable with a step of %.4g s: the structure's motion has a "
+                           "rate of up to %.4g 1/s, so a step must be at most %.3g s",
+                           stepping->stepper->name, stepping->length, state->rate,
+                           limit / state->rate);
+    double rate = 0;
+    for (size_t d = 0;
+         d < state->dampers && state->has_stops && state->plan->form == CONTACT_LINEAR; d++)
+        for (int side = 0; side < 2; side++) {
+            const double mass = state->damper[d].effective_mass;
+            const PlanStop *stop = &state->damper[d].plan->stops[side];
+            const ContactRows *rows = &stop->contact.numbers.rows;
+            for (size_t i = 0; i < (rows->count > 0 ? rows->count : 1); i++) {
+                const ContactParameters at =
+                    stops_freeze(stop, rows->count > 0 ? rows->at[i].approach_speed : 1);
+                rate = fmax(rate, fmax(sqrt(state->stiff + at.stiffness / mass),
+                                       state->viscous + at.damping / mass));
+            }
+        }
+    if (rate > max)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "%s is unstable with a step of %.4g s: a contact has a rate of up to "
+                           "%.4g 1/s, so a step must be at most %.3g s",
+                           stepping->stepper->name, stepping->length, rate, limit / rate);
+    return STATUS_OK;
+}
+
+static Status time_stepping_allocate(TimeStepping *stepping) {
+    const size_t n = stepping->state.mode_count, m = stepping->state.dampers;
+    stepping->size = 2 * (n + m);
+    // y; impulse, work and strain; force and a derivative of y; elastic
+    stepping->block = calloc(2 * stepping->size + 4 * m + n + 1, sizeof *stepping->block);
+    if (stepping->block == NULL)
+        return problem_set(stepping->state.problem, STATUS_NO_MEMORY,
+                           "no memory for a run of %zu modes", n);
+    stepping->y = stepping->block;
+    stepping->contact.impulse = stepping->y + stepping->size;
+    stepping->contact.work = stepping->contact.impulse + m;
+    stepping->contact.strain_before = stepping->contact.work + m;
+    stepping->contact.is_by_place = stepping->stepper->is_by_place;
+    stepping->force = stepping->contact.strain_before + m;
+    stepping->elastic = stepping->force + m + stepping->size;
+    return STATUS_OK;
+}
+
+// `is_shadow`: nothing is recorded. Cleared by time_stepping_clear, also after a failure.
+static Status time_stepping_make(TimeStepping *stepping, const Stepper *stepper, Run *run,
+                                 size_t share, double tolerance, bool is_shadow, Response *response,
+                                 Problem *problem) {
+    ModalState *state = &stepping->state;
+    memset(stepping, 0, sizeof *stepping);
+    stepping->stepper = stepper;
+    stepping->tolerance = tolerance;
+    TRY(modal_state_make(state, run, problem));
+    state->is_shadow = is_shadow;
+    stepping->share = share;
+    stepping->length = state->interval / (double)share;
+    TRY(time_stepping_allocate(stepping));
+    TRY(time_stepping_check_stability(stepping));
+    if (!is_shadow) {
+        TRY(flight_buffer_make(&stepping->samples, state, problem));
+        TRY(recorder_start(&stepping->recorder, &stepping->samples, state, response, problem));
+    }
+    const EnergyState energy = modal_state_energy(state);
+    impact_log_start(&state->impacts, response, run->impacts_max, &energy);
+    double setup = 0;
+    (void)stepping->stepper->cost(state->mode_count, state->dampers, state->diagonal == NULL,
+                                  &setup);
+    run->steps += setup;
+    return stepping->stepper->make(stepping);
+}
+
+static void time_stepping_clear(TimeStepping *stepping) {
+    if (stepping->method != NULL && stepping->stepper->clear != NULL)
+        stepping->stepper->clear(stepping);
+    free(stepping->method);
+    recorder_clear(&stepping->recorder);
+    flight_buffer_clear(&stepping->samples);
+    modal_state_clear(&stepping->state);
+    free(stepping->block);
+}
+
+// Duration of an isolated contact; under a power law of one with an approach speed of 1 m/s [s].
+static double time_stepping_contact_time_at(const PlanDamper *damper, const PlanStop *stop,
+                                            double speed) {
+    const ContactParameters at = stops_freeze(stop, speed);
+    const double mass = damper->effective_mass;
+    if (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER)
+        return stop->contact.duration *
+               pow(mass * speed * speed / at.stiffness, 1 / (at.exponent + 1)) / speed;
+    const Identified found =
+        identify_given(mass, at.stiffness, at.damping, (Separation)stop->contact.separation);
+    // The damping sets the rate of an overdamped one.
+    return isfinite(found.contact_time) ? found.contact_time : mass / at.damping;
+}
+
+// The shortest of all contacts [s]; INFINITY without any.
+static double time_stepping_contact_time(const Plan *plan) {
+    double min = INFINITY;
+    for (size_t d = 0; d < plan->damper_count && plan->form != CONTACT_IMPULSIVE; d++)
+        for (int side = 0; side < 2; side++) {
+            const PlanStop *stop = &plan->dampers[d].stops[side];
+            const ContactRows *rows = &stop->contact.numbers.rows;
+            for (size_t i = 0; i < (rows->count > 0 ? rows->count : 1); i++)
+                min = fmin(min, time_stepping_contact_time_at(
+                                    &plan->dampers[d], stop,
+                                    rows->count > 0 ? rows->at[i].approach_speed : 1));
+        }
+    return min;
+}
+
+double time_stepping_mode_time(const Plan *plan) {
+    const Modes *modes = &plan->modes;
+    double fastest = 0;
+    if (modes->count == 0 && plan->storeys > 1)
+        return TWO_PI / plan->fastest;
+    if (modes->count == 0)
+        return TWO_PI /
+               fmax(sqrt(plan->stiffness[0] / plan->mass[0]), plan->damping[0] / plan->mass[0]);
+    for (size_t i = 0; i < modes->count; i++)
+        fastest = fmax(fastest, fmax(modes->omega[i], modes->damping[i * modes->count + i]));
+    return TWO_PI / fastest;
+}
+
+bool time_stepping_may_couple(const Plan *plan) {
+    return plan->storeys > 1 && !plan->modes.is_classical;
+}
+
+typedef struct StepChoice {
+    double share; // steps in a sample interval
+    double kinks; // of the base in a sample interval, that are step ends; at least 1
+    const char *chose, *why;
+} StepChoice;
+
+static StepChoice time_stepping_choose(const Plan *plan, const Accuracy *accuracy,
+                                       double base_interval) {
+    const double interval = 1 / plan->sample_rate, near = 1e-9 * interval;
+    double step =
+        accuracy == NULL ? (double)NAN : ((const AccuracyStep *)(const void *)accuracy)->step;
+    const bool is_asked = !isnan(step);
+    StepChoice choice = {1, 1, "asked", "the scene asks for it"};
+    if (!is_asked) {
+        const double mode = time_stepping_mode_time(plan) / PARTS,
+                     contact = time_stepping_contact_time(plan) / PARTS;
+        choice.chose = mode < contact ? "mode" : "contact";
+        choice.why = mode < contact ? "a 30th of the period of the fastest mode"
+                                    : "a 30th of the shortest contact";
+        step = fmin(mode, contact);
+        if (!(step < interval)) {
+            choice.chose = "sample";
+            choice.why = "the sample interval, for all motion is slower";
+        }
+    }
+    choice.share = fmax(ceil(interval / step * (1 - 1e-9)), 1);
+    if (is_asked && fabs(step * choice.share - interval) > near)
+        choice.why = "the scene asks for a longer one, but a step ends at every sample";
+    // Where the base's grid divides the sample grid, a step ends at every kink of the base.
+    const double kinks = base_interval > 0 ? nearbyint(interval / base_interval) : 0;
+    if (!(kinks > 1 && fabs(interval / base_interval - kinks) <= 1e-9 * kinks))
+        return choice;
+    choice.kinks = kinks;
+    if (fmod(choice.share, kinks) != 0) {
+        choice.share = ceil(choice.share / kinks) * kinks;
+        choice.why = "a step ends at every sample of the base";
+    }
+    return choice;
+}
+
+Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+                            Plan *plan, Problem *problem) {
+    const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
+    Decisions *decisions = &plan->report.decisions;
+    if (!(choice.share <= SHARE_MAX))
+        return problem_add_real(problem, STATUS_INVALID, "/accuracy/step",
+                                1 / (plan->sample_rate * choice.share), "s",
+                                "must be at least %.3g s, a 1e12th of the sample interval",
+                                1 / (plan->sample_rate * SHARE_MAX));
+    TRY(decisions_add(decisions, "step", choice.chose, 1 / (plan->sample_rate * choice.share), "s",
+                      "%s; %.0f to a sample interval", choice.why, choice.share));
+    if (plan->damper_count > 0)
+        TRY(decisions_add(decisions, "contact_switching", "step_ends", 1, NULL,
+                          "contacts begin and end at step ends only, so across a contact the error "
+                          "is of first order in the step; between contacts %s",
+                          stepper->between));
+    return STATUS_OK;
+}
+
+double time_stepping_cost(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+                          const Plan *plan) {
+    double setup;
+    const double each = stepper->cost(plan_mode_count(plan), plan->damper_count,
+                                      time_stepping_may_couple(plan), &setup);
+    const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
+    const double steps = choice.share * plan->duration * plan->sample_rate;
+    const double companion = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5;
+    return (1 + companion) * each * steps + 2 * setup;
+}
+
+typedef struct Pair {
+    TimeStepping run, companion;
+    Plan plan; // of the companion: a shallow copy of the run's
+    Run companion_run;
+    Response companion_response;
+    size_t stride;                 // samples of the run in one interval of the companion
+    double step_ratio;             // the companion's step over the run's
+    bool is_kinked;                // the base has kinks within steps
+    bool is_known;                 // the companion has not failed
+    bool is_finished;              // the companion is no longer needed
+    size_t compared;               // samples
+    double largest, worst;         // displacement, and difference of displacements [m]
+    double horizon;                // [s]; NAN: not reached
+    double first_contact;          // no contact has begun before [s]; NAN: none has
+    double slowest[SCENE_DAMPERS]; // approach speed of any contact, as seen at samples [m/s]
+    double *difference;            // of the modes
+} Pair;
+
+static bool pair_has_contact(const Pair *pair) {
+    const Response *response = pair->run.state.impacts.response;
+    bool has_contact = response->impact_count + response->resting_count > 0;
+    for (size_t d = 0; d < pair->run.state.dampers; d++)
+        has_contact = has_contact || pair->run.state.damper[d].row.is_open;
+    return has_contact;
+}
+
+// The run's error over the difference of the two runs.
+static double pair_factor(const Pair *pair) {
+    if (pair->run.tolerance > 0)
+        return 2;
+    if (pair_has_contact(pair))
+        return CONTACT_FACTOR;
+    // With a kink of the base inside a step, the error depends on the kink's place.
+    return pair->is_kinked ? 1 : 1 / fabs(pow(pair->step_ratio, pair->run.stepper->order) - 1);
+}
+
+static void pair_compare(Pair *pair) {
+    const ModalState *state = &pair->run.state, *companion = &pair->companion.state;
+    const size_t n = state->mode_count;
+    double difference = 0, bound = 0;
+    pair->compared++;
+    for (size_t i = 0; i < n; i++) {
+        pair->difference[i] = state->q[i] - companion->q[i];
+        bound += state->max_shape[i] * fabs(pair->difference[i]);
+    }
+    pair->largest = fmax(pair->largest, state->impacts.response->peaks.displacement);
+    if (bound <= pair->worst)
+        return;
+    for (size_t j = 0; j < state->storey_count; j++)
+        difference = fmax(difference,
+                          fabs(modal_state_dot(state->modes->shapes + j * n, pair->difference, n)));
+    pair->worst = fmax(pair->worst, difference);
+    const double error = pair_factor(pair) * difference;
+    if (isnan(pair->horizon) && !(error <= RESPONSE_PARTING * pair->largest))
+        pair->horizon = (double)(state->sample - pair->stride) / state->plan->sample_rate;
+    pair->is_finished = error > pair->largest;
+}
+
+// Advances the companion to the run's sample.
+static Status pair_follow(Pair *pair) {
+    Run *run = pair->run.state.run;
+    if (pair->is_finished || pair->run.state.sample % pair->stride != 0)
+        return STATUS_OK;
+    pair->companion_run.steps = run->steps;
+    const Status status = time_stepping_interval(&pair->companion);
+    run->steps = pair->companion_run.steps;
+    run->work.neighbour_samples += pair->stride;
+    if (status == STATUS_OK) {
+        pair_compare(pair);
+        return STATUS_OK;
+    }
+    pair->is_finished = true;
+    pair->is_known = false;
+    return time_stepping_check(&pair->run); // the cause may be the run's own limit
+}
+
+// Starts a companion with `share` steps in `stride` samples of the run.
+static Status pair_make_companion(Pair *pair, size_t stride, size_t share) {
+    const Plan *plan = pair->run.state.plan;
+    const Run *run = pair->run.state.run;
+    const double tolerance = pair->run.tolerance;
+    pair->stride = stride;
+    pair->step_ratio = (double)(pair->run.share * stride) / (double)share;
+    pair->plan = *plan;
+    pair->plan.sample_rate /= (double)stride;
+    pair->plan.count = (plan->count - 1) / stride + 1;
+    pair->companion_run = (Run){.plan = &pair->plan,
+                                .base = run->base,
+                                .progress = run->progress,
+                                .steps_max = run->steps_max,
+                                .is_clear = run->is_clear};
+    pair->companion_response.is_unlisted = true;
+    return time_stepping_make(&pair->companion, pair->run.stepper, &pair->companion_run, share,
+                              tolerance > 0 ? fmax(tolerance / COMPANION_FINER, TOLERANCE_MIN) : 0,
+                              true, &pair->companion_response, NULL);
+}
+
+static void pair_start_companion(Pair *pair, size_t kinks) {
+    const ModalState *state = &pair->run.state;
+    const Base *base = state->run->base;
+    const bool is_controlled = pair->run.tolerance > 0;
+    // Steps between two kinks of the base.
+    const size_t own = pair->run.share / kinks;
+    const size_t share = is_controlled ? 2
+                         : own > 1     ? kinks * (own > 2 ? own / 2 + 1 : 1)
+                         : kinks > 1   ? 2 * kinks // kinks exclude longer steps
+                                       : 1;
+    const size_t stride = pair->run.share > 1 || is_controlled ? 1 : 2;
+    pair->is_kinked = base->form == BASE_PIECES ||
+                      (base->form == BASE_SAMPLED && kinks == 1 && state->base.ratio == 0);
+    pair->horizon = pair->first_contact = NAN;
+    pair->difference = malloc(state->mode_count * sizeof *pair->difference);
+    Status status =
+        pair->difference == NULL ? STATUS_NO_MEMORY : pair_make_companion(pair, stride, share);
+    if (status == STATUS_UNSTABLE && share < pair->run.share * stride) {
+        // Longer steps are unstable where the run's are not: take shorter ones.
+        time_stepping_clear(&pair->companion);
+        response_clear(&pair->companion_response);
+        status = pair_make_companion(pair, 1, 2 * pair->run.share);
+    }
+    pair->is_known = status == STATUS_OK;
+    pair->is_finished = !pair->is_known;
+}
+
+// Displacement of a storey by one contact that begins a step late [m]: both runs may be equally
+// late by chance. The velocity change acts until the motion reverses.
+static double pair_delay_error(const Pair *pair, const DamperState *damper, double impulse) {
+    const ModalState *state = &pair->run.state;
+    const Peaks *peaks = &state->impacts.response->peaks;
+    const double h = pair->run.length, speed = pair->slowest[damper - state->damper];
+    double slowest = INFINITY, delay = h / 2;
+    for (size_t i = 0; i < state->mode_count; i++)
+        slowest = fmin(slowest, sqrt(state->omega2[i]));
+    // Peaks may cover the end of the run only.
+    const bool is_whole = !(state->run->statistics_from > 0);
+    const double velocity = is_whole ? peaks->velocity : pair->largest * state->rate;
+    // Of a long contact the force acts for a part of the slowest period only.
+    if (is_whole && state->plan->form != CONTACT_IMPULSIVE &&
+        peaks->contact_force < impulse * slowest)
+        impulse = peaks->contact_force / slowest;
+    // The parameters of a power law depend on the approach speed, which changes during the delay.
+    if (state->plan->form == CONTACT_POWER && speed > 0)
+        delay = fmax(delay, fmin(velocity * state->rate * h / speed, 1) *
+                                fmin(1 / slowest, state->plan->duration));
+    return impulse * damper->max_mobility * delay;
+}
+
+static double pair_max_delay_error(const Pair *pair) {
+    const ModalState *state = &pair->run.state;
+    double max = 0;
+    for (size_t d = 0; d < state->dampers && !(pair->run.tolerance > 0); d++) {
+        const DamperState *damper = &state->damper[d];
+        const double open = damper->row.is_open ? fabs(damper->row.impact.impulse) : 0;
+        max = fmax(max, pair_delay_error(pair, damper, fmax(state->impacts.impulse[d], open)));
+    }
+    return max;
+}
+
+// Bound on the displacement of a storey by the ground velocity that the steps missed [m].
+static double pair_missed_error(const Pair *pair) {
+    const ModalState *state = &pair->run.state;
+    double bound = 0;
+    for (size_t i = 0; i < state->mode_count && pair->run.max_missed_velocity > 0; i++)
+        bound += state->max_shape[i] * fabs(state->modes->participation[i]) *
+                 fmin(1 / sqrt(state->omega2[i]), state->plan->duration);
+    return bound * pair->run.max_missed_velocity;
+}
+
+static void pair_report(const Pair *pair, Response *response) {
+    const double missed = pair_missed_error(pair), delay = pair_max_delay_error(pair);
+    const double size = fmax(fmax(pair->largest, response->peaks.displacement), missed);
+    const ImpactLog *log = &pair->run.state.impacts;
+    const double balance = log->largest_energy > 0 ? log->largest_balance / log->largest_energy : 0;
+    const double error =
+        size > 0 ? fmax(fmax(pair_factor(pair) * pair->worst, delay), missed) / size : 0;
+    response->has_trust = pair->is_known && pair->compared > 0;
+    response->is_stepped = true;
+    response->error_estimate = fmin(fmax(error, balance / 2), 1);
+    response->trust_horizon = pair->horizon;
+    if (delay > RESPONSE_PARTING * size)
+        response->trust_horizon = fmin(response->trust_horizon, pair->first_contact);
+    if (missed > RESPONSE_PARTING * size)
+        response->trust_horizon = fmin(response->trust_horizon, pair->run.missed_since);
+    // The horizon was found before the displacement had grown.
+    if (response->error_estimate <= RESPONSE_PARTING)
+        response->trust_horizon = NAN;
+}
+
+static Status pair_run(Pair *pair, Response *response) {
+    ModalState *state = &pair->run.state;
+    const Plan *plan = state->plan;
+    time_stepping_record(&pair->run);
+    while (state->sample + 1 < plan->count) {
+        const double before = modal_state_time(state);
+        TRY(time_stepping_interval(&pair->run));
+        if (isnan(pair->first_contact) && pair_has_contact(pair))
+            pair->first_contact = before;
+        for (size_t d = 0; d < state->dampers; d++) {
+            const double speed = state->damper[d].contact.speed;
+            if (speed > 0 && !(pair->slowest[d] > 0 && pair->slowest[d] <= speed))
+                pair->slowest[d] = speed;
+        }
+        TRY(pair_follow(pair));
+    }
+    pair_report(pair, response);
+    // The duration may end between samples.
+    TRY(time_stepping_finish(&pair->run,
+                             plan->duration - (double)state->sample / plan->sample_rate));
+    return recorder_ledger(state);
+}
+
+Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
+                              double tolerance, Response *response, Problem *problem) {
+    Pair *pair = calloc(1, sizeof *pair);
+    if (pair == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a run");
+    Status status =
+        time_stepping_make(&pair->run, stepper, run, share, tolerance, false, response, problem);
+    if (status == STATUS_OK) {
+        pair_start_companion(pair, kinks);
+        status = pair_run(pair, response);
+    }
+    if (pair->run.recorder.block != NULL)
+        recorder_finish(&pair->run.recorder, &pair->run.state, response);
+    time_stepping_clear(&pair->run);
+    time_stepping_clear(&pair->companion);
+    response_clear(&pair->companion_response);
+    free(pair->difference);
+    free(pair);
+    return status;
+}
+
+Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, Problem *problem) {
+    const Base *base = run->base;
+    const StepChoice choice = time_stepping_choose(run->plan, run->accuracy,
+                                                   base->form == BASE_SAMPLED ? base->interval : 0);
+    if (!(choice.share <= SHARE_MAX))
+        return problem_set(problem, STATUS_LIMIT,
+                           "the scene moves too fast for %s: %.3g steps to a sample interval, at "
+                           "most %.3g are possible",
+                           stepper->name, choice.share, SHARE_MAX);
+    if (stepper->is_linear_only && run->plan->form == CONTACT_POWER)
+        return problem_set(problem, STATUS_INVALID,
+                           "%s serves linear contact and impulses, not a power law", stepper->name);
+    return time_stepping_run_pair(stepper, run, (size_t)choice.share, (size_t)choice.kinks, 0,
+                                  response, problem);
 }

@@ -1,97 +1,100 @@
-// A run by steps of one length: the state of all modes and masses, what a step adds to the ledgers,
-// and contacts that begin and end at step ends only. Not a method: that is a Stepper (rk4.c,
-// newmark.c, precise.c). Not the exact engine, which finds the instants. Used by those and
-// steps_run.c.
+// Driver of the solvers that integrate the modal state by time steps. A Stepper is one method
+// (rk4.c, newmark.c, precise_integration.c, adaptive.c); the driver chooses the step, switches
+// contacts at step ends, keeps the logs and runs a companion for the error estimate.
 #ifndef CORE_SOLVE_TIME_STEPPING_H
 #define CORE_SOLVE_TIME_STEPPING_H
 
-#include "core/solve/modal_state.h"
 #include "core/solve/recorder.h"
+#include "core/solve/step_contact.h"
 
-typedef struct Steps Steps;
+// The "accuracy" object of a solver with fixed steps.
+typedef struct AccuracyStep {
+    Accuracy accuracy;
+    double step; // [s]; NAN: chosen by time_stepping_decide
+} AccuracyStep;
+extern const Field accuracy_step_fields[];
 
-// What ONE method of steps is.
+// The "accuracy" object of a solver with error control.
+typedef struct AccuracyTolerance {
+    Accuracy accuracy;
+    double tolerance;
+} AccuracyTolerance;
+
+typedef struct TimeStepping TimeStepping;
+
+// One method. It has either `step`, for fixed steps, or `interval`.
 typedef struct Stepper {
-    const char *name;    // of its solver
-    int order;           // of its error while no contact begins or ends
-    const char *between; // what people are told of that error
-    // The contact force follows from where the masses are, whether or not a contact has begun, and
-    // the method freezes its parameters; otherwise the contacts of a step are those of its start.
-    bool is_by_place;
+    const char *name;       // of its solver
+    int order;              // of the error between contacts
+    const char *between;    // a clause for the plan's report that states this error
+    bool is_by_place;       // see StepContact
     bool is_linear_only;    // serves no power law
-    double stability_limit; // unstable where an eigenvalue times the step is larger; 0: never
-    Status (*make)(Steps *steps);
-    // From steps->y over `length` seconds: changes y and the sums of the step.
-    Status (*step)(Steps *steps, double length);
-    // In place of steps of one length: over a whole interval, from the last sample on.
-    Status (*cross)(Steps *steps, double length);
-    void (*clear)(Steps *steps);
-    // How much a step costs, in steps of the single engine, and the making of its tables.
-    double (*cost)(size_t modes, size_t dampers, bool is_coupled, double *making);
+    double stability_limit; // of |eigenvalue| times step; 0: unconditionally stable
+    // Sets `method` to an allocated block, or leaves it NULL. The driver frees it.
+    Status (*make)(TimeStepping *stepping);
+    // Advances y by `length` seconds and sets the step's integrals.
+    Status (*step)(TimeStepping *stepping, double length);
+    // Advances the state itself by `length` seconds from the last sample, with steps of its own.
+    Status (*interval)(TimeStepping *stepping, double length);
+    void (*clear)(TimeStepping *stepping); // what `method` refers to; NULL: nothing
+    // Solver steps that a step costs; *setup is the cost of the tables.
+    double (*cost)(size_t modes, size_t dampers, bool is_coupled, double *setup);
 } Stepper;
 
-// What a step adds up to.
-typedef struct StepSums {
-    double input, damping; // the base's work, and that lost in the structure [J]
-    double *impulse;       // of the dampers: integral of N [N s]
-    double *work;          // of N r' [J]
-} StepSums;
-
-struct Steps {
+struct TimeStepping {
     ModalState state;
-    FlightBuffer trail; // of one sample
-    Recorder record;
+    FlightBuffer samples; // one sample
+    Recorder recorder;
     const Stepper *stepper;
-    void *own;        // the stepper's
-    size_t share;     // steps in a sample interval
-    double length;    // of one [s]
-    double tolerance; // of a method whose steps have no fixed length
-    double watched;   // work since the progress was asked
+    void *method;          // the stepper's data
+    size_t share;          // steps in a sample interval
+    double length;         // of a step [s]
+    double tolerance;      // relative error of a step under error control, else 0
+    double unchecked_cost; // work since the last check of limits and progress [multiplications]
 
-    size_t size;      // of y
-    double *y;        // the state: q, p, r, w
-    double ground[3]; // a_g at the step's start, in its middle and at its end [m/s^2]
-    // Of the base's speed what the steps have not seen of a pulse that begins or ends within one:
-    // now, and the most so far [m/s]; and since when [s].
-    double unseen, most_unseen, unseen_since;
-    StepSums sums;
-    double *force;     // scratch: N of the dampers [N]
-    double *elastic;   // scratch
-    double *before;    // of the dampers: energy in their buffers before the step [J]
-    double largest_in; // largest energy that start and base account for [J]
+    size_t size;           // of y
+    double *y;             // q, p, r, w of all modes and dampers
+    double ground[3];      // a_g at the step's start, middle and end [m/s^2]
+    double input, damping; // work of the base and loss in the structure in one step [J]
+    StepContact contact;   // the same step's contact integrals
+    double *force;         // scratch: N of the dampers [N], then one derivative of y
+    double *elastic;       // scratch: D p + W^2 q
+    // Ground velocity that a step's quadrature misses where a pulse begins or ends within the step:
+    // now and at most so far [m/s], and the time of the first miss [s].
+    double missed_velocity, max_missed_velocity, missed_since;
+    double largest_input; // largest |work of the base| [J]
     double *block;
 };
 
-// `is_shadow`: only the motion is wanted. Cleared by steps_clear, also after a failure.
-Status steps_make(Steps *steps, const Stepper *stepper, Run *run, size_t share, double tolerance,
-                  bool is_shadow, Response *response, Problem *problem);
-void steps_clear(Steps *steps);
+// Solver.run, .decide and .cost of a solver with fixed steps.
+Status time_stepping_run(const Stepper *stepper, Run *run, Response *response, Problem *problem);
+Status time_stepping_decide(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+                            Plan *plan, Problem *problem);
+double time_stepping_cost(const Stepper *stepper, const Accuracy *accuracy, double base_interval,
+                          const Plan *plan);
 
-// To the next sample, and takes it.
-Status steps_interval(Steps *steps);
-void steps_take_sample(Steps *steps);
-// To the end of a run that ends `length` seconds after its last sample.
-Status steps_finish(Steps *steps, double length);
+// A run with `share` steps in a sample interval and its companion. `kinks` divides `share`: kinks
+// of the base in a sample interval. `tolerance` is that of error control, 0 for fixed steps.
+Status time_stepping_run_pair(const Stepper *stepper, Run *run, size_t share, size_t kinks,
+                              double tolerance, Response *response, Problem *problem);
+
+// Shortest period or decay time of a mode [s].
+double time_stepping_mode_time(const Plan *plan);
+// Whether damping couples the modes, or may couple modes that are not computed yet.
+bool time_stepping_may_couple(const Plan *plan);
 
 // out = D p + W^2 q.
-void steps_elastic(const ModalState *state, const double *q, const double *p, double *restrict out);
-// y' under forces N on the dampers' storeys; elastic becomes that of y.
-void steps_rate(Steps *steps, const double *y, double ground, const double *force,
-                double *restrict out);
-// N of a damper that is in contact, at these r and r', and its derivatives.
-ContactForce steps_contact(const ModalState *state, size_t damper, double r, double w);
-// Adds to the sums what the two ends of a step say: by the trapezoidal rule, or corrected by the
-// derivatives there, which makes it one of order 4.
-void steps_sum(Steps *steps, const double *from, const double *to, double length,
-               bool is_corrected);
-
-// After each stretch of a run: takes peaks and the energy balance, counts what it cost, asks the
-// progress.
-Status steps_note(Steps *steps, double cost);
-// Whether the limits are kept and the progress lets the run go on.
-Status steps_check(Steps *steps);
-
-// Contacts begin and end, masses bounce: steps_contact.c.
-void steps_turn(Steps *steps, double length);
+void time_stepping_elastic(const ModalState *state, const double *q, const double *p,
+                           double *restrict out);
+// out = y' under the forces N of the dampers; `elastic` becomes that of y.
+void time_stepping_rate(TimeStepping *stepping, const double *y, double ground, const double *force,
+                        double *restrict out);
+// Adds the energy integrals of a step from the states at its two ends: by the trapezoidal rule, or
+// with its end correction (Euler-Maclaurin), which is of order 4.
+void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,
+                             double length, bool is_corrected);
+// Updates peaks and energy balance after a step of `cost` solver steps. STATUS_UNSTABLE where the
+// energy has no bound; STATUS_LIMIT and STATUS_CANCELLED as for the run.
+Status time_stepping_note(TimeStepping *stepping, double cost);
 
 #endif

@@ -11,7 +11,7 @@
 #include "core/solve/event_engine.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 #include "server/base/clock.h"
 #include "tests/support/paper.h"
 

@@ -8,7 +8,7 @@
 
 #include "core/simulation/simulation.h"
 #include "core/solve/solvers.h"
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 #include "server/base/clock.h"
 #include "server/codec/read.h"
 #include "tests/support/doubles.h"

@@ -1,7 +1,6 @@
-// One storey and one free mass under a power law, once more: everything, flight too, in plain time
-// by math/ode.h (SUNDIALS) with what it finds as roots. Shares with the product its contact laws
-// and their frozen parameters alone; not as exact (about 1e-12 a contact) and slow. Used by
-// test_power.c.
+// Reference for one storey and one free mass under a power law: flight and contact are integrated in
+// plain time by GSL. It shares with the product only the contact laws and their frozen parameters.
+// Its error is about 1e-12 a contact, and it is slow.
 #ifndef TESTS_TRUTH_POWER_REFERENCE_H
 #define TESTS_TRUTH_POWER_REFERENCE_H
 

@@ -15,7 +15,7 @@
 #include "core/math/fft.h"
 #include "core/solve/exact_accuracy.h"
 #include "core/solve/solvers.h"
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 #include "tests/support/document.h"
 #include "tests/support/scenes.h"
 #include "tests/truth/drawn.h"

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/solve/solvers.h"
-#include "core/solve/steps_run.h"
+#include "core/solve/time_stepping.h"
 #include "tests/support/frames.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
