@@ -29,6 +29,9 @@ enum { NO_ROOT = -1 };
 enum { STAGES = 13, ORDER = 8, EMBEDDED_ORDER = 7 };
 enum { TOTALS = 3 };
 enum { HALVINGS = 60, RETAKES = 8, ERROR_TEST_FAILURES = 60 };
+// Memory that SUNDIALS needs at most, in values of type double: vectors, and all else of each
+// vector and of the context.
+enum { CLONES_MAX = 40, CLONE_OVERHEAD = 128, CONTEXT_SIZE = 1 << 13 };
 enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
 static const double TOLERANCE_DEFAULT = 1e-9;
 static const double OUTGROWN = 100;     // motion over that of the last error weights
@@ -683,8 +686,16 @@ static void adaptive_ignore_message(int code, const char *module, const char *fu
 
 static bool adaptive_allocate(Adaptive *adaptive) {
     const size_t m = adaptive->stepping->state.dampers, watched = WATCHED * m + 1;
-    adaptive->block = calloc(adaptive->size + 2 * m + 6 * watched, sizeof *adaptive->block);
-    if (adaptive->block == NULL || SUNContext_Create(NULL, &adaptive->context) != 0)
+    const size_t count = adaptive->size + 2 * m + 6 * watched;
+    // SUNDIALS crashes where an allocation fails, so the memory for it is reserved first and then
+    // returned to the allocator.
+    const size_t reserve = CLONES_MAX * (adaptive->size + CLONE_OVERHEAD) + CONTEXT_SIZE;
+    adaptive->block = calloc(count + reserve, sizeof *adaptive->block);
+    double *block = realloc(adaptive->block, count * sizeof *block);
+    if (block == NULL)
+        return false;
+    adaptive->block = block;
+    if (SUNContext_Create(NULL, &adaptive->context) != 0)
         return false;
     adaptive->rates = adaptive->block;
     adaptive->force = adaptive->rates + adaptive->size;
