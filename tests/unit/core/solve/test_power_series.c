@@ -81,7 +81,7 @@ static void roots_make_exponents_whole(void **state) {
     static const struct {
         double exponent, viscous;
         int root;
-        bool is_whole;
+        bool is_integer;
     } cases[] = {{1, 1, 1, true},
                  {2, 2, 1, true},
                  {1.5, 1.5, 2, true},
@@ -99,12 +99,12 @@ static void roots_make_exponents_whole(void **state) {
         SeriesLaw law;
         series_law_make(&law, &terms);
         assert_int_equal(law.root, cases[i].root);
-        assert_int_equal(law.is_whole, cases[i].is_whole);
-        assert_int_equal(law.power[law.pace], law.root - 1);
+        assert_int_equal(law.is_integer, cases[i].is_integer);
+        assert_int_equal(law.power[law.time_factor], law.root - 1);
         for (int k = 2; k < law.count; k++)
             assert_int_equal(law.power[k], law.power[law.left[k]] + law.power[law.right[k]]);
-        if (law.is_whole)
-            assert_true(fabs(law.power[law.spring] - law.root * terms.exponent) < 1e-9);
+        if (law.is_integer)
+            assert_true(fabs(law.power[law.elastic] - law.root * terms.exponent) < 1e-9);
     }
 }
 
@@ -118,7 +118,7 @@ static void the_motion_is_smooth_at_the_touch(void **state) {
     PowerContactStep step;
     power_contact_step(&pair.ode, &still, 1e3, &step);
     const PowerSeries *series = &pair.ode.series;
-    const double *Y = power_series_root(series);
+    const double *Y = power_series_leader(series);
     assert_int_equal(series->root, 2);
     // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
     for (size_t k = 0; k <= series->degree; k++)
@@ -186,7 +186,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
 
 // Steps of one order: halving them all takes 2^order off the error of a contact, as of any smooth
 // motion, though it begins and ends where N is not.
-static void the_order_is_whole_over_a_whole_contact(void **state) {
+static void the_order_is_integer_over_a_whole_contact(void **state) {
     (void)state;
     static const size_t orders[] = {8, 12};
     for (size_t i = 0; i < COUNT(orders); i++) {
@@ -201,25 +201,25 @@ static void the_order_is_whole_over_a_whole_contact(void **state) {
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
             const double one[1] = {1}, length = half ? 0.1 : 0.2;
             const SeriesScale scale = {.error = 1e-300,
-                                       .per_root = 1,
-                                       .per_time = 1,
-                                       .per_speed = one,
-                                       .per_modal = one,
-                                       .order = orders[i]};
+                                       .inverse_root = 1,
+                                       .inverse_time = 1,
+                                       .inverse_speed = one,
+                                       .inverse_modal = one,
+                                       .order_max = orders[i]};
             const Slice still = {0, 0, 0};
             series_law_make(&law, &terms);
-            series->contacts = 1;
+            series->contact_count = 1;
             series->root = 2;
             series->contact[0] = (SeriesContact){
-                .sign = 1, .terms = terms, .law = &law, .is_felt = true, .is_damped = true};
+                .sign = 1, .terms = terms, .law = &law, .has_force = true, .is_damped = true};
             double Y = 0, s = 0;
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
-                (void)power_series_make(series, &pair.frame, &still, Y, length, &scale);
-                if (root_first_crossing(power_series_root(series), series->degree, &s))
+                (void)power_series_expand(series, &pair.frame, &still, Y, length, &scale);
+                if (root_first_crossing(power_series_leader(series), series->degree, &s))
                     power_series_cut(series, s);
-                power_series_end(series, row);
-                Y = root_value(power_series_root(series), series->degree, 1);
+                power_series_at(series, 1, row);
+                Y = root_value(power_series_leader(series), series->degree, 1);
                 time += row[series->at_t];
                 pair.frame.damper[0].w = row[0];
                 pair.frame.q[0] = row[series->at_q];
@@ -277,7 +277,7 @@ int main(void) {
         cmocka_unit_test(the_motion_is_smooth_at_the_touch),
         cmocka_unit_test(a_contact_takes_few_steps_and_ends_as_it_should),
         cmocka_unit_test(a_contact_keeps_its_tolerance),
-        cmocka_unit_test(the_order_is_whole_over_a_whole_contact),
+        cmocka_unit_test(the_order_is_integer_over_a_whole_contact),
         cmocka_unit_test(a_mass_without_speed_is_pressed_in),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
