@@ -1,5 +1,5 @@
-// The series of a contact: whose coefficients they are, how fast they fall, and how steps of them
-// end a contact of two free bodies, over the tolerance.
+// Taylor series of a contact under a power law: their coefficients, their convergence, and the
+// error of a whole contact of two free bodies against closed forms, over the tolerance.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -57,8 +57,8 @@ static void pair_clear(Pair *pair) {
     plan_free(pair->plan);
 }
 
-// To the contact's end; returns how many steps that took, *time how long it lasted.
-static int pair_part(Pair *pair, double *time) {
+// Runs to the end of the contact. Returns the number of steps; *time is its duration [s].
+static int pair_run(Pair *pair, double *time) {
     const Slice still = {0, 0, 0};
     PowerContactStep step = {0};
     int count = 0;
@@ -71,7 +71,7 @@ static int pair_part(Pair *pair, double *time) {
     return count;
 }
 
-// In units of the contact: two halves of 1 kg, so that lengths are larger by (1/2)^(1/(n+1)).
+// Length of the contact's units: m_e = 1/2 makes it (1/2)^(1/(n+1)).
 static double unit_of(double exponent) {
     return pow(0.5, 1 / (exponent + 1));
 }
@@ -108,8 +108,8 @@ static void roots_make_exponents_whole(void **state) {
     }
 }
 
-// From the touch on, where N ~ t^(3/2) has no third derivative in time, coefficients fall as those
-// of an analytic function do: all the way at the same rate.
+// At the touch N ~ t^(3/2) has no third derivative in time. In transformed time the coefficients
+// still fall at a constant rate, as those of an analytic function.
 static void the_motion_is_smooth_at_the_touch(void **state) {
     (void)state;
     Pair pair;
@@ -143,7 +143,7 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
             Pair pair;
             double time;
             pair_make(&pair, contacts[l], n, factor, POWER_CONTACT_TOLERANCE);
-            const int steps = pair_part(&pair, &time);
+            const int steps = pair_run(&pair, &time);
             const double e = contacts[l]->reached(factor, n),
                          T = contacts[l]->duration(factor, n) * unit_of(n);
             assert_true(fabs(-pair.frame.damper[0].w - e) < 3e-14);
@@ -155,7 +155,8 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
         }
 }
 
-// What a contact ends with is wrong by no more than the tolerance, and looser ones are cheaper.
+// The error at the end of a contact is below the tolerance, and a larger tolerance needs fewer
+// steps.
 static void a_contact_keeps_its_tolerance(void **state) {
     (void)state;
     static const double exponents[] = {1, 1.37, 1.5, 2, 3};
@@ -171,7 +172,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
                 Pair pair;
                 double time;
                 pair_make(&pair, contacts[l], n, factor, tolerance);
-                const int steps = pair_part(&pair, &time);
+                const int steps = pair_run(&pair, &time);
                 const double error = fmax(fabs(-pair.frame.damper[0].w - e), fabs(time / T - 1));
                 worst = fmax(worst, error / tolerance);
                 assert_true(error <= tolerance);
@@ -184,8 +185,8 @@ static void a_contact_keeps_its_tolerance(void **state) {
     print_message("worst error over tolerance %.2f\n", worst);
 }
 
-// Steps of one order: halving them all takes 2^order off the error of a contact, as of any smooth
-// motion, though it begins and ends where N is not.
+// With a fixed order half the step divides the error of a contact by 2^order, as for any smooth
+// motion, though N is not smooth in time at its start and end.
 static void the_order_is_integer_over_a_whole_contact(void **state) {
     (void)state;
     static const size_t orders[] = {8, 12};
@@ -196,7 +197,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
             double time = 0;
             pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
             PowerSeries *series = &pair.ode.series;
-            // By hand: equal steps in tau, each cut where Y falls to 0.
+            // Equal steps in tau; the last is cut where Y is 0.
             SeriesLaw law;
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
             const double one[1] = {1}, length = half ? 0.1 : 0.2;
@@ -236,7 +237,7 @@ static void the_order_is_integer_over_a_whole_contact(void **state) {
     }
 }
 
-// Pressed by a push that the springs of the structure stand for, from no speed at all.
+// A constant acceleration presses the mass into the buffer from rest.
 static void a_mass_without_speed_is_pressed_in(void **state) {
     (void)state;
     static const double exponents[] = {1, 1.37, 1.5, 2.2};
@@ -259,7 +260,7 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
                 break;
             time += step.length;
             deepest = fmax(deepest, damper->r);
-            // It swings about where k p^n / m_e is the push: energy is kept.
+            // It oscillates about the equilibrium and conserves energy.
             const double p = damper->r, n = exponents[i];
             const double held = damper->w * damper->w / 2 + 2 * pow(p, n + 1) / (n + 1);
             const double most = 1e-3 * pow(1e-3 / 2 * (n + 1), 1 / n);
