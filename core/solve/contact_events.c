@@ -247,22 +247,22 @@ void contact_event_apply(ModalState *state, const ContactEvent *event) {
     recorder_note(state);
 }
 
-// The first crossing of a gap that is known not to be negative at the start.
-static void look_for(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
-                     ContactEvent *first) {
+bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
+                          ContactEvent *first) {
     gap[0] = fmax(gap[0], 0);
-    if (root_first_crossing(gap, degree, &candidate.s) && (!*is_found || candidate.s < first->s)) {
-        *is_found = true;
-        *first = candidate;
-    }
+    if (!root_first_crossing(gap, degree, &candidate.s) || (*is_found && candidate.s >= first->s))
+        return false;
+    *is_found = true;
+    *first = candidate;
+    return true;
 }
 
-static void find_touch(const ModalState *state, const TaylorStep *arc, size_t d, bool *is_found,
-                       ContactEvent *first) {
+bool contact_event_find_touch(const ModalState *state, size_t d, const double *r, size_t degree,
+                              bool *is_found, ContactEvent *first) {
     const DamperState *damper = &state->damper[d];
-    const double *r = taylor_step_r(arc, d);
+    bool is_first = false;
     double reach = 0;
-    for (size_t k = 0; k <= arc->degree; k++)
+    for (size_t k = 0; k <= degree; k++)
         reach += fabs(r[k]);
     for (int side = 0; side < 2; side++) {
         const double sign = modal_state_sign((Side)side),
@@ -270,14 +270,15 @@ static void find_touch(const ModalState *state, const TaylorStep *arc, size_t d,
         if (reach < room)
             continue;
         double gap[ROOT_DEGREE + 1];
-        for (size_t k = 0; k <= arc->degree; k++)
+        for (size_t k = 0; k <= degree; k++)
             gap[k] = -sign * r[k];
         gap[0] += room;
         for (int k = 0; k < damper->zero_gap_terms && damper->origin == (ContactOrigin)side; k++)
             gap[k] = 0;
-        look_for(gap, arc->degree, (ContactEvent){.damper = d, .side = (Side)side}, is_found,
-                 first);
+        is_first |= contact_event_locate(
+            gap, degree, (ContactEvent){.damper = d, .side = (Side)side}, is_found, first);
     }
+    return is_first;
 }
 
 // k p + c p' as coefficients, times `sign`.
@@ -296,12 +297,13 @@ static void find_inside(const ModalState *state, const TaylorStep *arc, size_t d
     spring_series(damper, arc, r, -sign, gap);
     if (damper->just_begun)
         gap[0] = 0;
-    look_for(gap, arc->degree - 1,
-             (ContactEvent){.damper = d, .side = damper->side, .is_inwards = true}, is_found,
-             first);
+    (void)contact_event_locate(
+        gap, arc->degree - 1, (ContactEvent){.damper = d, .side = damper->side, .is_inwards = true},
+        is_found, first);
     for (size_t k = 0; k <= arc->degree; k++)
         gap[k] = sign * r[k];
-    look_for(gap, arc->degree, (ContactEvent){.damper = d, .side = damper->side}, is_found, first);
+    (void)contact_event_locate(gap, arc->degree, (ContactEvent){.damper = d, .side = damper->side},
+                               is_found, first);
 }
 
 static void find_end(const ModalState *state, const TaylorStep *arc, size_t d, bool *is_found,
@@ -327,7 +329,7 @@ static void find_end(const ModalState *state, const TaylorStep *arc, size_t d, b
     // A contact that N's own zero has just begun again.
     if (damper->phase == PHASE_CONTACT && by_force && damper->just_begun && damper->r != 0)
         gap[0] = 0;
-    look_for(gap, degree, event, is_found, first);
+    (void)contact_event_locate(gap, degree, event, is_found, first);
 }
 
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event) {
@@ -337,7 +339,8 @@ bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactE
     state->run->work.stop_searches++;
     for (size_t d = 0; d < state->dampers && !(is_found && event->s == 0); d++) {
         if (state->damper[d].phase == PHASE_FLIGHT)
-            find_touch(state, arc, d, &is_found, event);
+            (void)contact_event_find_touch(state, d, taylor_step_r(arc, d), arc->degree, &is_found,
+                                           event);
         else if (state->damper[d].phase == PHASE_INSIDE)
             find_inside(state, arc, d, &is_found, event);
         else

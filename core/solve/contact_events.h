@@ -17,6 +17,15 @@ typedef struct ContactEvent {
 // Finds the first event on the arc; of several at once the one of the first damper.
 bool contact_event_find(const ModalState *state, const TaylorStep *arc, ContactEvent *event);
 
+// Locates the first zero crossing of the polynomial `gap`, whose start is not negative; a negative
+// gap[0] is set to 0. Replaces *first by the candidate if its s is smaller; returns whether it is.
+bool contact_event_locate(double *gap, size_t degree, ContactEvent candidate, bool *is_found,
+                          ContactEvent *first);
+
+// Likewise for a damper in flight that touches a stop; r is its relative displacement.
+bool contact_event_find_touch(const ModalState *state, size_t damper, const double *r,
+                              size_t degree, bool *is_found, ContactEvent *first);
+
 // Makes it happen; the state is that of its instant.
 void contact_event_apply(ModalState *state, const ContactEvent *event);
 

@@ -137,8 +137,7 @@ static Status press(EventEngine *engine, const Slice *slice, double length) {
     ModalState *state = &engine->state;
     PowerContactStep step;
     power_contact_step(&engine->ode, slice, length, &step);
-    impact_log_work(&state->impacts, step.input, step.damping);
-    engine->record.base_speed += step.ground;
+    take_work(engine, &step.work);
     const double before = state->offset;
     state->offset += step.length;
     state->base_acceleration = slice_at(slice, step.length);
@@ -152,7 +151,7 @@ static Status press(EventEngine *engine, const Slice *slice, double length) {
     else
         recorder_note(state);
     state->run->work.steps++;
-    return count_steps(engine, step.work / WORK_OF_STEP);
+    return count_steps(engine, step.cost / WORK_OF_STEP);
 }
 
 // A long step of contact. False: it must go by arcs.
@@ -193,7 +192,7 @@ static Status advance(EventEngine *engine, double length) {
     Slice slice;
     const double knot = base_cursor_slice(&state->base, state->sample, state->offset, &slice);
     state->base_acceleration = slice.value;
-    if (power_contact_serves(&engine->ode))
+    if (power_contact_is_active(&engine->ode))
         return press(engine, &slice, fmin(length, knot));
     if (hold(engine, &slice, fmin(length, knot)))
         return count_steps(engine, each(engine, STEP_WORK_HOLD));

@@ -1,7 +1,7 @@
-// CPU of contacts under power laws: what the general engine takes for each, over its tolerance,
-// beside the solver adaptive, which is SUNDIALS, and the displacement's error that each ends with
-// against the engine's own full accuracy. The flight between contacts is in all of it; the same
-// scene with impulses tells how much that is. Least of the repeats.
+// CPU time of contacts under power laws per impact, over the tolerance of the solver exact, beside
+// the solver adaptive (SUNDIALS), and the error of the displacement against full accuracy. The
+// flight between contacts is subtracted: it is that of the same scene with impulses. Minimum of
+// repeats.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,8 +35,8 @@ static const Case cases[] = {
 
 static Problem problem;
 
-static void make(const Case *from, const char *model, const char *solver, double tolerance,
-                 Simulation *simulation) {
+static void bench_make(const Case *from, const char *model, const char *solver, double tolerance,
+                       Simulation *simulation) {
     static const char *const names[] = {"displacement"};
     paper_scene(simulation, from->restitution, from->contact_time, from->duration);
     if (from->is_random)
@@ -59,26 +59,25 @@ static void make(const Case *from, const char *model, const char *solver, double
     }
 }
 
-// What a run came to.
 typedef struct Result {
     Response response;
     double *x;
     double steps;
 } Result;
 
-static void clear(Result *result) {
+static void result_clear(Result *result) {
     response_clear(&result->response);
     free(result->x);
 }
 
 // CPU of one run, without its plan [s].
-static double measure(const Case *from, const char *model, const char *solver, double tolerance,
-                      Result *result) {
+static double bench_measure(const Case *from, const char *model, const char *solver,
+                            double tolerance, Result *result) {
     Simulation simulation;
     double least = INFINITY;
     Plan *plan;
     Base base = {0};
-    make(from, model, solver, tolerance, &simulation);
+    bench_make(from, model, solver, tolerance, &simulation);
     const Excitation *excitation = scene_excitation(&simulation.scene);
     const Span span = {.duration = from->duration, .sample_rate = simulation.scene.sample_rate};
     if (plan_new(&simulation.scene, solver, solver, &plan, &problem) != STATUS_OK ||
@@ -112,23 +111,24 @@ static double measure(const Case *from, const char *model, const char *solver, d
     return least;
 }
 
-static double error_of(const Result *is, const Result *should) {
-    const double *a = is->x, *b = should->x;
+// Largest difference over the reference's peak displacement.
+static double result_error(const Result *result, const Result *reference) {
+    const double *a = result->x, *b = reference->x;
     double worst = 0;
-    for (size_t i = 0; i < is->response.count; i++)
+    for (size_t i = 0; i < result->response.count; i++)
         worst = fmax(worst, fabs(a[i] - b[i]));
-    return worst / should->response.peaks.displacement;
+    return worst / reference->response.peaks.displacement;
 }
 
-static void show(const Case *from, const char *solver, double tolerance, double flight,
-                 const Result *best) {
+static void bench_print(const Case *from, const char *solver, double tolerance, double flight,
+                        const Result *best) {
     Result result;
-    const double cpu = measure(from, from->model, solver, tolerance, &result);
+    const double cpu = bench_measure(from, from->model, solver, tolerance, &result);
     const double impacts = (double)result.response.impacts.count;
     printf("  %-9s %8.0e %10.2f %10.1f %8.1f %10.1e %10.1e\n", solver, tolerance,
            (cpu - flight) / impacts * 1e6, result.steps / impacts, cpu / result.steps * 1e9,
-           error_of(&result, best), result.response.error_estimate);
-    clear(&result);
+           result_error(&result, best), result.response.error_estimate);
+    result_clear(&result);
 }
 
 int main(int argc, char **argv) {
@@ -140,21 +140,21 @@ int main(int argc, char **argv) {
         if (argc > 1 && strstr(at->name, argv[1]) == NULL)
             continue;
         Result flown, best;
-        const double flight = measure(at, "impulse", "exact", NAN, &flown);
-        (void)measure(at, at->model, "exact", NAN, &best);
+        const double flight = bench_measure(at, "impulse", "exact", NAN, &flown);
+        (void)bench_measure(at, at->model, "exact", NAN, &best);
         printf("%s: %llu impacts, flight %.0f us\n", at->name,
                (unsigned long long)best.response.impacts.count, flight * 1e6);
-        show(at, "exact", 1e-15, flight, &best);
+        bench_print(at, "exact", 1e-15, flight, &best);
         for (double tolerance = argc > 3 ? 1e-7 : 1e-12;
              tolerance<0.5; tolerance *= argc> 3 ? 3 : 1e3)
-            show(at, "exact", tolerance, flight, &best);
-        show(at, "exact", 1e-1, flight, &best);
+            bench_print(at, "exact", tolerance, flight, &best);
+        bench_print(at, "exact", 1e-1, flight, &best);
         if (argc > 2)
             continue;
-        show(at, "adaptive", 1e-13, flight, &best);
-        show(at, "adaptive", 1e-6, flight, &best);
-        clear(&flown);
-        clear(&best);
+        bench_print(at, "adaptive", 1e-13, flight, &best);
+        bench_print(at, "adaptive", 1e-6, flight, &best);
+        result_clear(&flown);
+        result_clear(&best);
     }
     return 0;
 }

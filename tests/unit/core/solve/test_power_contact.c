@@ -1,5 +1,5 @@
-// Two free bodies that meet once, through the general engine: what was recorded of an isolated
-// contact comes back, whatever the law and the separation rule.
+// One contact of two free bodies in the event engine has the restitution and the contact time that
+// its buffer was identified from, under every law and separation rule.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -196,8 +196,8 @@ static void losses_are_those_of_the_speeds(void **state) {
     }
 }
 
-// Each impact of a run keeps to the table at its own approach speed: two free bodies meet again and
-// again, slower each time.
+// Each impact of a run has the table's values at its own approach speed. Two free bodies meet again
+// and again, slower each time.
 static void impacts_keep_to_the_table_at_their_speed(void **state) {
     (void)state;
     static const char *const models[] = {"spring_damper", "hunt_crossley", "impulse"};
@@ -259,7 +259,7 @@ static void a_rigs_contact_is_that_of_its_masses(void **state) {
     }
 }
 
-// Hertz with n = 1 is a spring without damping, whose motion the single engine knows exactly.
+// Hertz with n = 1 is a spring without damping, whose motion is exact in the linear engine.
 static void a_linear_power_law_moves_as_a_spring(void **state) {
     (void)state;
     Response responses[2];

@@ -1,5 +1,5 @@
-// The series of a contact: whose coefficients they are, how fast they fall, and how steps of them
-// end a contact of two free bodies, over the tolerance.
+// Taylor series of a contact under a power law: their coefficients, their convergence, and the
+// error of a whole contact of two free bodies against closed forms, over the tolerance.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -57,8 +57,8 @@ static void pair_clear(Pair *pair) {
     plan_free(pair->plan);
 }
 
-// To the contact's end; returns how many steps that took, *time how long it lasted.
-static int pair_part(Pair *pair, double *time) {
+// Runs to the end of the contact. Returns the number of steps; *time is its duration [s].
+static int pair_run(Pair *pair, double *time) {
     const Slice still = {0, 0, 0};
     PowerContactStep step = {0};
     int count = 0;
@@ -71,7 +71,7 @@ static int pair_part(Pair *pair, double *time) {
     return count;
 }
 
-// In units of the contact: two halves of 1 kg, so that lengths are larger by (1/2)^(1/(n+1)).
+// Length of the contact's units: m_e = 1/2 makes it (1/2)^(1/(n+1)).
 static double unit_of(double exponent) {
     return pow(0.5, 1 / (exponent + 1));
 }
@@ -81,7 +81,7 @@ static void roots_make_exponents_whole(void **state) {
     static const struct {
         double exponent, viscous;
         int root;
-        bool is_whole;
+        bool is_integer;
     } cases[] = {{1, 1, 1, true},
                  {2, 2, 1, true},
                  {1.5, 1.5, 2, true},
@@ -99,17 +99,17 @@ static void roots_make_exponents_whole(void **state) {
         SeriesLaw law;
         series_law_make(&law, &terms);
         assert_int_equal(law.root, cases[i].root);
-        assert_int_equal(law.is_whole, cases[i].is_whole);
-        assert_int_equal(law.power[law.pace], law.root - 1);
+        assert_int_equal(law.is_integer, cases[i].is_integer);
+        assert_int_equal(law.power[law.time_factor], law.root - 1);
         for (int k = 2; k < law.count; k++)
             assert_int_equal(law.power[k], law.power[law.left[k]] + law.power[law.right[k]]);
-        if (law.is_whole)
-            assert_true(fabs(law.power[law.spring] - law.root * terms.exponent) < 1e-9);
+        if (law.is_integer)
+            assert_true(fabs(law.power[law.elastic] - law.root * terms.exponent) < 1e-9);
     }
 }
 
-// From the touch on, where N ~ t^(3/2) has no third derivative in time, coefficients fall as those
-// of an analytic function do: all the way at the same rate.
+// At the touch N ~ t^(3/2) has no third derivative in time. In transformed time the coefficients
+// still fall at a constant rate, as those of an analytic function.
 static void the_motion_is_smooth_at_the_touch(void **state) {
     (void)state;
     Pair pair;
@@ -118,7 +118,7 @@ static void the_motion_is_smooth_at_the_touch(void **state) {
     PowerContactStep step;
     power_contact_step(&pair.ode, &still, 1e3, &step);
     const PowerSeries *series = &pair.ode.series;
-    const double *Y = power_series_root(series);
+    const double *Y = power_series_leader(series);
     assert_int_equal(series->root, 2);
     // Y'' = -(2 / m_e) Y^4: orders 1, 6, 11, 16, 21 and no others.
     for (size_t k = 0; k <= series->degree; k++)
@@ -143,7 +143,7 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
             Pair pair;
             double time;
             pair_make(&pair, contacts[l], n, factor, POWER_CONTACT_TOLERANCE);
-            const int steps = pair_part(&pair, &time);
+            const int steps = pair_run(&pair, &time);
             const double e = contacts[l]->reached(factor, n),
                          T = contacts[l]->duration(factor, n) * unit_of(n);
             assert_true(fabs(-pair.frame.damper[0].w - e) < 3e-14);
@@ -155,7 +155,8 @@ static void a_contact_takes_few_steps_and_ends_as_it_should(void **state) {
         }
 }
 
-// What a contact ends with is wrong by no more than the tolerance, and looser ones are cheaper.
+// The error at the end of a contact is below the tolerance, and a larger tolerance needs fewer
+// steps.
 static void a_contact_keeps_its_tolerance(void **state) {
     (void)state;
     static const double exponents[] = {1, 1.37, 1.5, 2, 3};
@@ -171,7 +172,7 @@ static void a_contact_keeps_its_tolerance(void **state) {
                 Pair pair;
                 double time;
                 pair_make(&pair, contacts[l], n, factor, tolerance);
-                const int steps = pair_part(&pair, &time);
+                const int steps = pair_run(&pair, &time);
                 const double error = fmax(fabs(-pair.frame.damper[0].w - e), fabs(time / T - 1));
                 worst = fmax(worst, error / tolerance);
                 assert_true(error <= tolerance);
@@ -184,9 +185,9 @@ static void a_contact_keeps_its_tolerance(void **state) {
     print_message("worst error over tolerance %.2f\n", worst);
 }
 
-// Steps of one order: halving them all takes 2^order off the error of a contact, as of any smooth
-// motion, though it begins and ends where N is not.
-static void the_order_is_whole_over_a_whole_contact(void **state) {
+// With a fixed order half the step divides the error of a contact by 2^order, as for any smooth
+// motion, though N is not smooth in time at its start and end.
+static void the_order_is_integer_over_a_whole_contact(void **state) {
     (void)state;
     static const size_t orders[] = {8, 12};
     for (size_t i = 0; i < COUNT(orders); i++) {
@@ -196,30 +197,30 @@ static void the_order_is_whole_over_a_whole_contact(void **state) {
             double time = 0;
             pair_make(&pair, &contact_hertz, 1.5, 0, POWER_CONTACT_TOLERANCE);
             PowerSeries *series = &pair.ode.series;
-            // By hand: equal steps in tau, each cut where Y falls to 0.
+            // Equal steps in tau; the last is cut where Y is 0.
             SeriesLaw law;
             const ContactTerms terms = {.stiffness = 1, .exponent = 1.5};
             const double one[1] = {1}, length = half ? 0.1 : 0.2;
             const SeriesScale scale = {.error = 1e-300,
-                                       .per_root = 1,
-                                       .per_time = 1,
-                                       .per_speed = one,
-                                       .per_modal = one,
-                                       .order = orders[i]};
+                                       .inverse_root = 1,
+                                       .inverse_time = 1,
+                                       .inverse_speed = one,
+                                       .inverse_modal = one,
+                                       .order_max = orders[i]};
             const Slice still = {0, 0, 0};
             series_law_make(&law, &terms);
-            series->contacts = 1;
+            series->contact_count = 1;
             series->root = 2;
             series->contact[0] = (SeriesContact){
-                .sign = 1, .terms = terms, .law = &law, .is_felt = true, .is_damped = true};
+                .sign = 1, .terms = terms, .law = &law, .has_force = true, .is_damped = true};
             double Y = 0, s = 0;
             for (int step = 0; step < 100 && !(s > 0); step++) {
                 double row[8];
-                (void)power_series_make(series, &pair.frame, &still, Y, length, &scale);
-                if (root_first_crossing(power_series_root(series), series->degree, &s))
+                (void)power_series_expand(series, &pair.frame, &still, Y, length, &scale);
+                if (root_first_crossing(power_series_leader(series), series->degree, &s))
                     power_series_cut(series, s);
-                power_series_end(series, row);
-                Y = root_value(power_series_root(series), series->degree, 1);
+                power_series_at(series, 1, row);
+                Y = root_value(power_series_leader(series), series->degree, 1);
                 time += row[series->at_t];
                 pair.frame.damper[0].w = row[0];
                 pair.frame.q[0] = row[series->at_q];
@@ -236,7 +237,7 @@ static void the_order_is_whole_over_a_whole_contact(void **state) {
     }
 }
 
-// Pressed by a push that the springs of the structure stand for, from no speed at all.
+// A constant acceleration presses the mass into the buffer from rest.
 static void a_mass_without_speed_is_pressed_in(void **state) {
     (void)state;
     static const double exponents[] = {1, 1.37, 1.5, 2.2};
@@ -259,7 +260,7 @@ static void a_mass_without_speed_is_pressed_in(void **state) {
                 break;
             time += step.length;
             deepest = fmax(deepest, damper->r);
-            // It swings about where k p^n / m_e is the push: energy is kept.
+            // It oscillates about the equilibrium and conserves energy.
             const double p = damper->r, n = exponents[i];
             const double held = damper->w * damper->w / 2 + 2 * pow(p, n + 1) / (n + 1);
             const double most = 1e-3 * pow(1e-3 / 2 * (n + 1), 1 / n);
@@ -277,7 +278,7 @@ int main(void) {
         cmocka_unit_test(the_motion_is_smooth_at_the_touch),
         cmocka_unit_test(a_contact_takes_few_steps_and_ends_as_it_should),
         cmocka_unit_test(a_contact_keeps_its_tolerance),
-        cmocka_unit_test(the_order_is_whole_over_a_whole_contact),
+        cmocka_unit_test(the_order_is_integer_over_a_whole_contact),
         cmocka_unit_test(a_mass_without_speed_is_pressed_in),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
