@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/solve/rounding_growth.h"
 #include "core/solve/step_work.h"
 
 enum { STILL_EVENTS = 1000, STORM_EVENTS = 100, IDLE_STEPS = 1000 };
@@ -115,7 +116,39 @@ static void pass(EventEngine *engine, const ContactEvent *hit) {
     }
 }
 
-static Status happen(ModalState *state, const ContactEvent *event) {
+// Of the one mass that there is.
+static State single_state(const ModalState *state) {
+    const double shape = state->modes->shapes[0];
+    return (State){state->q[0] * shape, state->p[0] * shape, state->damper[0].r,
+                   state->damper[0].w};
+}
+
+static void grow_to_event(Trust *growth, const ModalState *state) {
+    const DamperState *damper = &state->damper[0];
+    const State at = single_state(state);
+    const double time = modal_state_time(state),
+                 largest = state->impacts.response->peaks.displacement;
+    if (damper->phase == PHASE_FLIGHT)
+        trust_fly(growth, time, &at, largest);
+    else if (damper->phase == PHASE_CONTACT)
+        trust_press(growth, damper->side, time, &at, largest);
+    else
+        trust_rest(growth, time, &at, largest);
+}
+
+static void grow_over_event(Trust *growth, const ModalState *state, ContactPhase phase,
+                            const State *before) {
+    const DamperState *damper = &state->damper[0];
+    if (phase == PHASE_FLIGHT && state->plan->form == CONTACT_IMPULSIVE &&
+        damper->plan->clearance > 0)
+        trust_bounce(growth, damper->contact.restitution, before->w,
+                     state->diagonal[0] * before->v + state->omega2[0] * before->x);
+    if (damper->phase == PHASE_RESTING)
+        trust_stick(growth);
+}
+
+static Status happen(EventEngine *engine, const ContactEvent *event) {
+    ModalState *state = &engine->state;
     const size_t most = STILL_EVENTS * state->dampers;
     state->events++;
     state->chatter_events++;
@@ -123,7 +156,15 @@ static Status happen(ModalState *state, const ContactEvent *event) {
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "more than %zu contact events at one instant, t = %.17g s", most,
                            modal_state_time(state));
-    contact_event_apply(state, event);
+    if (engine->growth != NULL) {
+        const ContactPhase phase = state->damper[0].phase;
+        const State before = single_state(state);
+        grow_to_event(engine->growth, state);
+        contact_event_apply(state, event);
+        grow_over_event(engine->growth, state, phase, &before);
+    } else {
+        contact_event_apply(state, event);
+    }
     return impact_log_status(&state->impacts, state->problem);
 }
 
@@ -147,7 +188,7 @@ static Status press(EventEngine *engine, const Slice *slice, double length) {
     engine->idle = state->offset > before ? 0 : engine->idle + 1;
     state->events += engine->idle > 0 && engine->idle < IDLE_STEPS;
     if (step.is_event)
-        TRY(happen(state, &step.event));
+        TRY(happen(engine, &step.event));
     else
         recorder_note(state);
     state->run->work.steps++;
@@ -208,7 +249,7 @@ static Status advance(EventEngine *engine, double length) {
     if (arc->length > 0)
         pass(engine, is_event ? &event : NULL);
     if (is_event)
-        TRY(happen(state, &event));
+        TRY(happen(engine, &event));
     return count_steps(engine, each(engine, STEP_WORK_ARC) +
                                    (is_event ? each(engine, STEP_WORK_EVENT) : 0));
 }
@@ -297,7 +338,7 @@ Status event_engine_settle(EventEngine *engine) {
         is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
                    state->damper[event.damper].phase == PHASE_FLIGHT;
         if (is_event)
-            TRY(happen(state, &event));
+            TRY(happen(engine, &event));
     }
     return STATUS_OK;
 }
@@ -334,17 +375,23 @@ static void track(EventEngine *engine, size_t flown) {
     }
 }
 
+Status event_engine_finish_interval(EventEngine *engine) {
+    ModalState *state = &engine->state;
+    TRY(event_engine_cross(engine, state->interval));
+    state->run->work.mode_samples += state->mode_count;
+    state->sample++;
+    state->offset = 0;
+    event_engine_take_sample(engine);
+    return STATUS_OK;
+}
+
 Status event_engine_step(EventEngine *engine, size_t until) {
     ModalState *state = &engine->state;
     const size_t flown = fly(engine, until);
     if (flown > 0) {
         TRY(count_steps(engine, (double)flown * each(engine, STEP_WORK_FLIGHT)));
     } else {
-        TRY(event_engine_cross(engine, state->interval));
-        state->run->work.mode_samples += state->mode_count;
-        state->sample++;
-        state->offset = 0;
-        event_engine_take_sample(engine);
+        TRY(event_engine_finish_interval(engine));
     }
     if (engine->track != NULL)
         track(engine, flown);

@@ -21,10 +21,11 @@ typedef struct EventEngine {
     PowerContact ode;
     FlightBuffer trail;
     Recorder record;
-    double work;   // since the progress was asked
-    size_t idle;   // steps of contact in a row that took no time
-    double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
-                   // FLIGHT_BUFFER_MAX; NULL: not wanted
+    double work;          // since the progress was asked
+    size_t idle;          // steps of contact in a row that took no time
+    struct Trust *growth; // of a single mass, told of each event; NULL: none
+    double *track;        // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
+                          // FLIGHT_BUFFER_MAX; NULL: not wanted
 } EventEngine;
 
 // `tolerance` is of contacts under a power law. Cleared by event_engine_clear, also after a
@@ -45,6 +46,9 @@ Status event_engine_settle(EventEngine *engine);
 // none.
 Status event_engine_step(EventEngine *engine, size_t until);
 void event_engine_take_sample(EventEngine *engine);
+
+// From the present instant to the next sample, and takes it.
+Status event_engine_finish_interval(EventEngine *engine);
 
 // From the present sample over `length` [s].
 Status event_engine_cross(EventEngine *engine, double length);

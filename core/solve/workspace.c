@@ -3,7 +3,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "core/solve/exact_state.h"
+#include "core/solve/single_mass.h"
 
 enum { KEPT_MAX = 1 << 18 }; // values
 
@@ -29,10 +29,8 @@ void workspace_tidy(Workspace *workspace) {
 
 void workspace_clear(Workspace *workspace) {
     fourier_stock_clear(&workspace->transforms);
-    if (workspace->exact != NULL)
-        exact_forget(workspace->exact);
-    free(workspace->exact);
-    workspace->exact = NULL;
+    single_mass_free(workspace->single);
+    workspace->single = NULL;
     free(workspace->values);
     workspace->values = NULL;
     workspace->room = 0;

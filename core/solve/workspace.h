@@ -8,8 +8,8 @@
 // All zero is empty.
 typedef struct Workspace {
     FourierStock transforms;
-    struct Exact *exact; // the exact solver's, with the tables of the last system
-    double *values;      // scratch
+    struct SingleMass *single; // single_mass.h's, with the tables of the last system
+    double *values;            // scratch
     size_t room;
 } Workspace;
 

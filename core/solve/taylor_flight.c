@@ -1,8 +1,9 @@
-#include "core/solve/hop.h"
+#include "core/solve/taylor_flight.h"
 
 #include <string.h>
 
-void hop_table_make(HopTable *table, const Motion *flying, double omega, double unit) {
+void taylor_flight_table_make(TaylorFlightTable *table, const Motion *flying, double omega,
+                              double unit) {
     const double omega2 = flying->omega2 * unit * unit, damping = flying->damping * unit;
     const double turn = omega * unit;
     memset(table, 0, sizeof *table);
@@ -13,10 +14,11 @@ void hop_table_make(HopTable *table, const Motion *flying, double omega, double 
     table->is_sine = omega > 0;
     for (int i = 0; i < 4; i++) {
         // a_g's own series under a unit of its value, or of its slope or other half.
-        double x[HOP_DEGREE + 1] = {i == 0, i == 1}, a[HOP_DEGREE + 1] = {i == 2, 0};
+        double x[TAYLOR_FLIGHT_DEGREE + 1] = {i == 0, i == 1},
+                                        a[TAYLOR_FLIGHT_DEGREE + 1] = {i == 2, 0};
         if (i == 3)
             a[1] = omega > 0 ? turn : 1;
-        for (int k = 2; k <= HOP_DEGREE; k++) {
+        for (int k = 2; k <= TAYLOR_FLIGHT_DEGREE; k++) {
             if (omega > 0)
                 a[k] = -turn * turn * a[k - 2] / (k * (k - 1));
             x[k] = -(damping * (k - 1) * x[k - 1] + omega2 * x[k - 2] + a[k - 2]) / (k * (k - 1));

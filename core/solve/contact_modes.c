@@ -4,7 +4,7 @@
 // The quadratic pencil's left vectors p = (D lambda + W, lambda^2 + D lambda + W) take a state
 // apart into amplitudes, scaled here so that r is the sum of their real parts. Made in long double:
 // the rows' sizes differ by the square of the contact's frequency.
-#include "core/solve/pulse.h"
+#include "core/solve/contact_modes.h"
 
 #include <complex.h>
 #include <math.h>
@@ -55,9 +55,9 @@ static void put(double row[4], int mode, Complex factor) {
     row[2 * mode + 1] = (double)-cimagl(factor);
 }
 
-static void put_seen(Pulse *pulse, PulseRow row, int mode, Complex factor) {
-    pulse->see[2 * mode][row] = (double)creall(factor);
-    pulse->see[2 * mode + 1][row] = (double)-cimagl(factor);
+static void put_seen(ContactModes *modes, ModesRow row, int mode, Complex factor) {
+    modes->see[2 * mode][row] = (double)creall(factor);
+    modes->see[2 * mode + 1][row] = (double)-cimagl(factor);
 }
 
 static long double square(Complex z) {
@@ -65,7 +65,7 @@ static long double square(Complex z) {
 }
 
 // The integral of (Re(g1 d1) + Re(g2 d2))^2.
-static void make_form(PulseForm *form, const Complex g[2], const Complex l[2],
+static void make_form(ModesForm *form, const Complex g[2], const Complex l[2],
                       const double jump[4]) {
     double(*of)[4] = form->of;
     for (int i = 0; i < 2; i++) {
@@ -95,7 +95,7 @@ static void make_form(PulseForm *form, const Complex g[2], const Complex l[2],
 
 // The integral of (Re(g1 d1) + Re(g2 d2)) (f0 a + f1 s) under a sine, twice that if `is_square`,
 // and then with that of (f0 a + f1 s)^2; else with that of (own[0] a + own[1] s) a.
-static void make_sine(PulseSine *sine, const Complex g[2], const Complex l[2], double omega,
+static void make_sine(ModesSine *sine, const Complex g[2], const Complex l[2], double omega,
                       const double f[2], const double *own) {
     const bool is_square = own == NULL;
     for (int i = 0; i < 2; i++) {
@@ -126,36 +126,36 @@ static Complex power_of_e(Complex z) {
     return 1 + less;
 }
 
-static void make_tables(Pulse *pulse, const Complex l[2], double interval) {
-    for (int i = 0; i < PULSE_RIDE; i++) {
-        const Complex turn = power_of_e(complex_of(0, (i + 1) * pulse->base_omega * interval));
-        pulse->cosine[i] = (double)creall(turn);
-        pulse->sine[i] = (double)cimagl(turn);
+static void make_tables(ContactModes *modes, const Complex l[2], double interval) {
+    for (int i = 0; i < MODES_BLOCK; i++) {
+        const Complex turn = power_of_e(complex_of(0, (i + 1) * modes->base_omega * interval));
+        modes->cosine[i] = (double)creall(turn);
+        modes->sine[i] = (double)cimagl(turn);
     }
-    pulse->unit = pulse->time / PULSE_TABLE_UNIT;
-    pulse->per_unit = PULSE_TABLE_UNIT / pulse->time;
+    modes->unit = modes->time / MODES_TABLE_UNIT;
+    modes->per_unit = MODES_TABLE_UNIT / modes->time;
     for (int mode = 0; mode < 2; mode++) {
-        const Complex step = power_of_e(l[mode] * (long double)pulse->time / PULSE_TABLE_UNIT);
+        const Complex step = power_of_e(l[mode] * (long double)modes->time / MODES_TABLE_UNIT);
         const Complex whole = power_of_e(l[mode] * interval);
-        const Complex peak = power_of_e(l[mode] * pulse->peak_time);
+        const Complex peak = power_of_e(l[mode] * modes->peak_time);
         Complex power = 1;
-        for (int i = 0; i <= PULSE_TABLE; i++, power *= step) {
-            pulse->table[i][2 * mode] = (double)creall(power);
-            pulse->table[i][2 * mode + 1] = (double)cimagl(power);
+        for (int i = 0; i <= MODES_TABLE; i++, power *= step) {
+            modes->table[i][2 * mode] = (double)creall(power);
+            modes->table[i][2 * mode + 1] = (double)cimagl(power);
         }
-        const Complex jump = complex_of(pulse->jump[2 * mode], pulse->jump[2 * mode + 1]);
+        const Complex jump = complex_of(modes->jump[2 * mode], modes->jump[2 * mode + 1]);
         power = 1;
-        for (int i = 0; i < PULSE_RIDE; i++) {
-            pulse->jumps[2 * mode][PULSE_RIDE + i] = (double)creall(power * jump);
-            pulse->jumps[2 * mode + 1][PULSE_RIDE + i] = (double)cimagl(power * jump);
+        for (int i = 0; i < MODES_BLOCK; i++) {
+            modes->jumps[2 * mode][MODES_BLOCK + i] = (double)creall(power * jump);
+            modes->jumps[2 * mode + 1][MODES_BLOCK + i] = (double)cimagl(power * jump);
             power *= whole;
-            pulse->ride[2 * mode][i] = (double)creall(power);
-            pulse->ride[2 * mode + 1][i] = (double)cimagl(power);
+            modes->ride[2 * mode][i] = (double)creall(power);
+            modes->ride[2 * mode + 1][i] = (double)cimagl(power);
         }
-        pulse->peak[2 * mode] = (double)creall(peak);
-        pulse->peak[2 * mode + 1] = (double)cimagl(peak);
-        pulse->interval[2 * mode] = (double)creall(whole);
-        pulse->interval[2 * mode + 1] = (double)cimagl(whole);
+        modes->peak[2 * mode] = (double)creall(peak);
+        modes->peak[2 * mode + 1] = (double)cimagl(peak);
+        modes->interval[2 * mode] = (double)creall(whole);
+        modes->interval[2 * mode + 1] = (double)cimagl(whole);
     }
 }
 
@@ -173,7 +173,7 @@ static bool find_oscillations(const Pencil *p, Complex l[2]) {
     l[1] = complex_of(-fast_damping, sqrtl(fast2));
     if (!find_root(p, &l[0]) || !find_root(p, &l[1]))
         return false;
-    // Faster decays of the buffer's would want more terms of pulse_nudge than there are.
+    // Faster decays of the buffer's would want more terms of contact_modes_nudge than there are.
     for (int i = 0; i < 2; i++)
         if (!(creall(l[i]) < 0) || !(cimagl(l[i]) > (i == 0 ? 0.05L : 0.25L) * -creall(l[i])))
             return false;
@@ -181,33 +181,33 @@ static bool find_oscillations(const Pencil *p, Complex l[2]) {
 }
 
 // What the particular motion shows a derivative later.
-static void put_derivative(Pulse *pulse, PulseRow row, PulseRow of) {
-    double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
-    const double omega = pulse->base_omega;
+static void put_derivative(ContactModes *modes, ModesRow row, ModesRow of) {
+    double *a = modes->see[MODES_A], *s = modes->see[MODES_S];
+    const double omega = modes->base_omega;
     a[row] = omega > 0 ? -omega * s[of] : 0;
     s[row] = omega > 0 ? omega * a[of] : a[of];
 }
 
-void pulse_make(Pulse *pulse, const Motion *m, double base_omega, double interval) {
-    memset(pulse, 0, sizeof *pulse);
+void contact_modes_make(ContactModes *modes, const Motion *m, double base_omega, double interval) {
+    memset(modes, 0, sizeof *modes);
     const Pencil p = {m->damping, m->omega2, m->contact_damping, m->contact_omega2, m->share};
     const double half = m->contact_damping / 2, contact2 = m->contact_omega2 - half * half;
     const long double omega = base_omega;
     Complex l[2], g[2], centre[2];
     if (!(contact2 > 0) || !find_oscillations(&p, l))
         return;
-    pulse->base_omega = base_omega;
-    pulse->contact_omega = sqrt(contact2);
-    pulse->time = PI / pulse->contact_omega;
-    pulse->damping = m->contact_damping;
-    pulse->growth = (double)creall(power_of_e(half * (long double)pulse->time));
+    modes->base_omega = base_omega;
+    modes->contact_omega = sqrt(contact2);
+    modes->time = PI / modes->contact_omega;
+    modes->damping = m->contact_damping;
+    modes->growth = (double)creall(power_of_e(half * (long double)modes->time));
     // In an isolated contact of damping ratio Z = sin b the force is largest after a right angle
     // less 3 b; a guess.
     const double Z = half / sqrt(m->contact_omega2),
                  b = Z * (1 + Z * Z * (1.0 / 6 + Z * Z * 0.075));
-    pulse->peak_time = larger(PI / 2 - 3 * b, 0) / pulse->contact_omega;
-    static const PulseRow r_rows[] = {PULSE_R, PULSE_W, PULSE_R2, PULSE_R3, PULSE_R4};
-    static const PulseRow n_rows[] = {PULSE_N, PULSE_N1, PULSE_N2, PULSE_N3, PULSE_N4};
+    modes->peak_time = larger(PI / 2 - 3 * b, 0) / modes->contact_omega;
+    static const ModesRow r_rows[] = {MODES_R, MODES_W, MODES_R2, MODES_R3, MODES_R4};
+    static const ModesRow n_rows[] = {MODES_N, MODES_N1, MODES_N2, MODES_N3, MODES_N4};
     Complex fixed[2] = {0, 0}; // what x and r are under a_g = 1, and what its slope adds
     Complex fixed_slope[2] = {0, 0};
     bool is_apart = true; // from the sine
@@ -226,22 +226,22 @@ void pulse_make(Pulse *pulse, const Motion *m, double base_omega, double interva
         const Complex apart = l[i] * l[i] + omega * omega, base = -into[1];
         const Complex value = base * l[i] / apart;
         const Complex slope = omega > 0 ? base * omega / apart : value / l[i];
-        const Complex columns[PULSE_COLUMNS] = {into[0], into[1], into[2], into[3], value, slope};
+        const Complex columns[MODES_COLUMNS] = {into[0], into[1], into[2], into[3], value, slope};
         is_apart = is_apart && square(apart) > 1e-8L * square(l[i]) * square(l[i]);
-        for (int j = 0; j < PULSE_COLUMNS; j++) {
-            pulse->into[j][2 * i] = (double)creall(columns[j]);
-            pulse->into[j][2 * i + 1] = (double)cimagl(columns[j]);
+        for (int j = 0; j < MODES_COLUMNS; j++) {
+            modes->into[j][2 * i] = (double)creall(columns[j]);
+            modes->into[j][2 * i + 1] = (double)cimagl(columns[j]);
         }
-        pulse->jump[2 * i] = (double)creall(slope);
-        pulse->jump[2 * i + 1] = (double)cimagl(slope);
+        modes->jump[2 * i] = (double)creall(slope);
+        modes->jump[2 * i + 1] = (double)cimagl(slope);
         Complex power = 1;
         for (int j = 0; j < 5; j++, power *= l[i]) {
-            put_seen(pulse, r_rows[j], i, power);
-            put_seen(pulse, n_rows[j], i, force * power);
+            put_seen(modes, r_rows[j], i, power);
+            put_seen(modes, n_rows[j], i, force * power);
         }
-        put_seen(pulse, PULSE_X, i, X);
-        put_seen(pulse, PULSE_V, i, X * l[i]);
-        put(pulse->middle, i, (X + p.share) / l[i]);
+        put_seen(modes, MODES_X, i, X);
+        put_seen(modes, MODES_V, i, X * l[i]);
+        put(modes->middle, i, (X + p.share) / l[i]);
         fixed[0] -= X * value;
         fixed[1] -= value;
         fixed_slope[0] -= X * slope;
@@ -249,42 +249,42 @@ void pulse_make(Pulse *pulse, const Motion *m, double base_omega, double interva
         g[i] = X * l[i];
         centre[i] = (X + p.share) * l[i];
         for (int j = 0; j < 2; j++) {
-            pulse->sigma[2 * i + j] = (double)creall(l[i]);
-            pulse->omega[2 * i + j] = (double)cimagl(l[i]);
+            modes->sigma[2 * i + j] = (double)creall(l[i]);
+            modes->omega[2 * i + j] = (double)cimagl(l[i]);
         }
-        pulse->size2[i] = (double)square(l[i]);
+        modes->size2[i] = (double)square(l[i]);
     }
-    pulse->slow_sigma = pulse->sigma[0];
-    pulse->fast = pulse->omega[2];
-    const double turn = 0.05 / pulse->fast, decay = -0.1 / pulse->sigma[2];
-    pulse->near = turn < decay ? turn : decay;
-    double *a = pulse->see[PULSE_A], *s = pulse->see[PULSE_S];
-    a[PULSE_X] = (double)creall(fixed[0]);
-    s[PULSE_X] = (double)creall(fixed_slope[0]);
-    a[PULSE_R] = (double)creall(fixed[1]);
-    s[PULSE_R] = (double)creall(fixed_slope[1]);
-    put_derivative(pulse, PULSE_V, PULSE_X);
+    modes->slow_sigma = modes->sigma[0];
+    modes->fast = modes->omega[2];
+    const double turn = 0.05 / modes->fast, decay = -0.1 / modes->sigma[2];
+    modes->near = turn < decay ? turn : decay;
+    double *a = modes->see[MODES_A], *s = modes->see[MODES_S];
+    a[MODES_X] = (double)creall(fixed[0]);
+    s[MODES_X] = (double)creall(fixed_slope[0]);
+    a[MODES_R] = (double)creall(fixed[1]);
+    s[MODES_R] = (double)creall(fixed_slope[1]);
+    put_derivative(modes, MODES_V, MODES_X);
     for (int j = 1; j < 5; j++)
-        put_derivative(pulse, r_rows[j], r_rows[j - 1]);
-    a[PULSE_N] = m->contact_omega2 * a[PULSE_R] + m->contact_damping * a[PULSE_W];
-    s[PULSE_N] = m->contact_omega2 * s[PULSE_R] + m->contact_damping * s[PULSE_W];
+        put_derivative(modes, r_rows[j], r_rows[j - 1]);
+    a[MODES_N] = m->contact_omega2 * a[MODES_R] + m->contact_damping * a[MODES_W];
+    s[MODES_N] = m->contact_omega2 * s[MODES_R] + m->contact_damping * s[MODES_W];
     for (int j = 1; j < 5; j++)
-        put_derivative(pulse, n_rows[j], n_rows[j - 1]);
-    pulse->middle_a = a[PULSE_X] + m->share * a[PULSE_R];
-    pulse->middle_s = s[PULSE_X] + m->share * s[PULSE_R];
-    make_form(&pulse->vv, g, l, pulse->jump);
-    make_form(&pulse->ww, l, l, pulse->jump);
+        put_derivative(modes, n_rows[j], n_rows[j - 1]);
+    modes->middle_a = a[MODES_X] + m->share * a[MODES_R];
+    modes->middle_s = s[MODES_X] + m->share * s[MODES_R];
+    make_form(&modes->vv, g, l, modes->jump);
+    make_form(&modes->ww, l, l, modes->jump);
     if (omega > 0) {
-        const double v[2] = {a[PULSE_V], s[PULSE_V]}, w[2] = {a[PULSE_W], s[PULSE_W]};
+        const double v[2] = {a[MODES_V], s[MODES_V]}, w[2] = {a[MODES_W], s[MODES_W]};
         const double both[2] = {v[0] + m->share * w[0], v[1] + m->share * w[1]};
         static const double one[2] = {1, 0};
-        make_sine(&pulse->sine_vv, g, l, base_omega, v, NULL);
-        make_sine(&pulse->sine_ww, l, l, base_omega, w, NULL);
-        make_sine(&pulse->sine_work, centre, l, base_omega, one, both);
-        pulse->sway = fabs(a[PULSE_R2]) + fabs(s[PULSE_R2]);
-        pulse->n_sway = fabs(a[PULSE_N2]) + fabs(s[PULSE_N2]);
+        make_sine(&modes->sine_vv, g, l, base_omega, v, NULL);
+        make_sine(&modes->sine_ww, l, l, base_omega, w, NULL);
+        make_sine(&modes->sine_work, centre, l, base_omega, one, both);
+        modes->sway = fabs(a[MODES_R2]) + fabs(s[MODES_R2]);
+        modes->n_sway = fabs(a[MODES_N2]) + fabs(s[MODES_N2]);
     }
-    make_tables(pulse, l, interval);
-    const double longest = 2 * pulse->time < interval ? 2 * pulse->time : interval;
-    pulse->is_usable = is_apart && -pulse->slow_sigma * longest < 0.01;
+    make_tables(modes, l, interval);
+    const double longest = 2 * modes->time < interval ? 2 * modes->time : interval;
+    modes->is_usable = is_apart && -modes->slow_sigma * longest < 0.01;
 }

@@ -1,0 +1,163 @@
+// What single_mass.c and linear_contact.c know of a run while it goes on.
+#ifndef CORE_SOLVE_SINGLE_MASS_STATE_H
+#define CORE_SOLVE_SINGLE_MASS_STATE_H
+
+#include <math.h>
+
+#include "core/solve/base_motion_cursor.h"
+#include "core/solve/contact_modes.h"
+#include "core/solve/frame_engine.h"
+#include "core/solve/lanes.h"
+#include "core/solve/rounding_growth.h"
+#include "core/solve/single_mass.h"
+#include "core/solve/taylor_flight.h"
+
+// All that the tables depend on.
+typedef struct SingleMassKey {
+    double omega2, damping, share;
+    double contact_omega2[2], contact_damping[2]; // by Side
+    double interval, base_omega;
+} SingleMassKey;
+
+// Contact over one sample interval: gains of (x, v, r, w) from (x, v, r, w, a, b), with a_g = a at
+// its start and b at its end, or under a sine a and b its halves; and the integrals over it as
+// quadratic forms in these.
+enum { FORM_SIZE = 6, FORM_PAIRS = 21 };
+typedef struct ContactMap {
+    bool is_made;
+    double gain[FORM_SIZE][4];
+    double vv[FORM_PAIRS], ww[FORM_PAIRS], av[FORM_PAIRS], aw[FORM_PAIRS];
+} ContactMap;
+
+struct SingleMass {
+    Run *run;
+    const Plan *plan;
+    const PlanDamper *damper; // all zero where there is none
+    Problem *problem;
+    Motion flying, touching[2], resting;
+    Stretch stretch;
+    bool has_stops;     // that the mass may reach
+    bool has_blocks;    // of flight
+    size_t pending;     // samples whose sums wait in `stretch`
+    double free_work;   // integral of a_g times the free mass's velocity over them [m^2/s^2]
+    ContactPhase phase; // PHASE_FLIGHT or PHASE_CONTACT
+    Side side;
+    ContactOrigin origin;
+    State state;
+    size_t sample; // the last one passed
+    double offset; // time since then [s]
+    double interval;
+    BaseCursor base;
+    ImpactLog impacts;
+    ImpactRow row;
+    double *columns[CHANNEL_COUNT];
+    size_t statistics_start, statistics_count;
+    double base_speed, last_velocity; // since the last sample, for mean accelerations [m/s]
+    double squares[2];                // sums of displacement^2 and acceleration^2
+    bool is_short;                    // sample intervals are, for the structure and a sine
+    double base_slope;   // of the base, no larger over the whole run: [m/s^3], of a sine [m/s^2]
+    Slice sine;          // at sample sine_sample - 1
+    size_t sine_sample;  // 0: none yet
+    EventEngine *engine; // made when it is first needed
+    // Tables, kept for the next run of the same system.
+    SingleMassKey key;
+    bool has_tables;
+    Lanes lanes;
+    TaylorFlightTable short_flight;
+    ContactMap maps[2];
+    bool has_modes[2];
+    ContactModes modes[2]; // by Side
+    Trust growth;
+};
+
+static inline double single_mass_larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+static inline double single_mass_sign(Side side) {
+    return side == SIDE_RIGHT ? 1 : -1;
+}
+
+static inline double single_mass_time(const SingleMass *single) {
+    return (double)single->sample / single->plan->sample_rate + single->offset;
+}
+
+// Between the mass and a stop at r = 0 of the present origin [m].
+static inline double single_mass_gap(const SingleMass *single, Side side) {
+    if (single->origin == FROM_MIDDLE)
+        return single->damper->clearance / 2;
+    return single->origin == (ContactOrigin)side ? 0 : single->damper->clearance;
+}
+
+// Displacement of the mass relative to the storey at r = 0 [m].
+static inline double single_mass_middle(const SingleMass *single) {
+    const double stop = single->damper->clearance / 2;
+    return single->damper->offset +
+           (single->origin == FROM_MIDDLE ? 0 : single_mass_sign((Side)single->origin) * stop);
+}
+
+// 1 - share would lose digits where the free mass is the larger.
+static inline double single_mass_effective(const SingleMass *single) {
+    return single->plan->mass[0] * single->flying.share;
+}
+
+// s [m/s^2].
+static inline double single_mass_push(const SingleMass *single, const State *at) {
+    return single->flying.damping * at->v + single->flying.omega2 * at->x;
+}
+
+// n [m/s^2]; 0 in flight.
+static inline double single_mass_pull(const SingleMass *single, const State *at) {
+    if (single->phase != PHASE_CONTACT)
+        return 0;
+    const Motion *m = &single->touching[single->side];
+    return m->contact_damping * at->w + m->contact_omega2 * at->r;
+}
+
+// A sine seen from t on; t is at most an interval that is short.
+static inline void single_mass_turn(const Slice *slice, double t, Slice *turned) {
+    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
+    const double sine = angle - angle * (square * (1.0 / 6 - square * (1.0 / 120)) +
+                                         fourth * square * (1.0 / 5040));
+    const double less = square * (1.0 / 2 - square * (1.0 / 24)) +
+                        fourth * square * (1.0 / 720 - square * (1.0 / 40320)); // 1 less the cosine
+    *turned = (Slice){slice->value - (slice->value * less - slice->slope * sine),
+                      slice->slope - (slice->slope * less + slice->value * sine), slice->omega};
+}
+
+// Its integral.
+static inline double single_mass_turned(const Slice *slice, double t) {
+    const double angle = slice->omega * t, square = angle * angle, fourth = square * square;
+    const double sine = 1 - square * (1.0 / 6 - square * (1.0 / 120)) -
+                        fourth * square * (1.0 / 5040); // over the angle
+    const double less = angle * (1.0 / 2 - square * (1.0 / 24) + fourth * (1.0 / 720));
+    return t * (slice->value * sine + slice->slope * less);
+}
+
+// The base from this instant on to the next sample, where has_blocks and is_short.
+static inline void single_mass_slice(SingleMass *single, Slice *slice) {
+    const Base *base = single->run->base;
+    if (single->stretch.base_max == 0 ||
+        (base->form == BASE_SAMPLED && single->sample + 1 >= base->count)) {
+        *slice = (Slice){0, 0, 0};
+    } else if (base->form == BASE_SAMPLED) {
+        const double *a = base->values + single->sample;
+        const double slope = (a[1] - a[0]) * single->plan->sample_rate;
+        *slice = (Slice){a[0] + slope * single->offset, slope, 0};
+    } else {
+        if (single->sine_sample != single->sample + 1) {
+            (void)base_cursor_interval(&single->base, single->sample, &single->sine);
+            single->sine_sample = single->sample + 1;
+        }
+        single_mass_turn(&single->sine, single->offset, slice);
+    }
+}
+
+#define SINGLE_MASS_STEPS 5 // solver steps of a piece or of a stretch of contact
+
+EnergyState single_mass_energy(const SingleMass *single);
+// The next sample is reached: records it.
+void single_mass_pass(SingleMass *single);
+void single_mass_release(SingleMass *single);
+
+#endif
