@@ -135,18 +135,6 @@ static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem)
                             (unsigned long long)study->runs);
 }
 
-static Status ensemble_check_densities(const Simulation *simulation, Problem *problem) {
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double values = study_run_densities(simulation);
-    if (values <= STUDY_DENSITIES_MAX)
-        return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, "/output/psd/segment",
-                       "%zu spectra of segments of %llu samples are %.0f densities, an ensemble "
-                       "takes at most %d: ask for shorter segments or fewer channels",
-                       psd->channels.count, (unsigned long long)psd->segment, values,
-                       STUDY_DENSITIES_MAX);
-}
-
 static Status ensemble_complete(void *request, const Simulation *simulation,
                                 const SimulationLimits *limits, Problem *problem) {
     EnsembleStudy *study = request;
@@ -169,7 +157,8 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
         study->metric == CHOICE_ABSENT
             ? STATUS_OK
             : study_run_check_metric(simulation, statistics_metric_names[study->metric], problem);
-    const Status densities = ensemble_check_densities(simulation, problem);
+    const Status densities =
+        study_run_check_densities(simulation, study_run_densities(simulation), problem);
     return seeds != STATUS_OK ? seeds : metric != STATUS_OK ? metric : densities;
 }
 
@@ -202,10 +191,9 @@ Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *t
     return STATUS_OK;
 }
 
-static Status ensemble_member_scene(const void *of, size_t member, const StudyTools *tools,
-                                    Simulation *scene, void *part, Problem *problem) {
+static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene, void *part,
+                                    Problem *problem) {
     const EnsembleWork *work = of;
-    (void)tools;
     (void)part;
     return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene, problem);
 }

@@ -144,20 +144,6 @@ static Status comparison_fill_names(CompareStudy *study, const Simulation *simul
     return STATUS_OK;
 }
 
-static Status comparison_check_densities(const CompareStudy *study, const Simulation *simulation,
-                                         Problem *problem) {
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double variants = (double)study->models.count + (double)study->separations.count;
-    const double values = (double)(psd->segment / 2 + 1) * variants;
-    if (psd->channels.count == 0 || values <= STUDY_DENSITIES_MAX)
-        return STATUS_OK;
-    return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment", (double)psd->segment,
-                            "samples",
-                            "gives about %.0f densities of all variants, a comparison takes at "
-                            "most %d: ask for shorter segments or fewer models",
-                            values, STUDY_DENSITIES_MAX);
-}
-
 static Status comparison_complete(void *request, const Simulation *simulation,
                                   const SimulationLimits *limits, Problem *problem) {
     CompareStudy *study = request;
@@ -169,7 +155,10 @@ static Status comparison_complete(void *request, const Simulation *simulation,
     const Status storey = comparison_check_storey(study, simulation, problem);
     const Status band = comparison_check_band(study, problem);
     TRY(comparison_fill_names(study, simulation, problem));
-    const Status densities = comparison_check_densities(study, simulation, problem);
+    const SpectrumRequest *psd = &simulation->output.psd;
+    const double variants = (double)study->models.count + (double)study->separations.count;
+    const double values = psd->channels.count > 0 ? (double)(psd->segment / 2 + 1) * variants : 0;
+    const Status densities = study_run_check_densities(simulation, values, problem);
     return models != STATUS_OK   ? models
            : storey != STATUS_OK ? storey
            : band != STATUS_OK   ? band
@@ -431,13 +420,14 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
     return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace, problem);
 }
 
-static Status comparison_scene(const void *of, size_t member, const StudyTools *tools,
-                               Simulation *scene, void *made, Problem *problem) {
+static Status comparison_scene(const void *of, size_t member, Simulation *scene, void *made,
+                               Problem *problem) {
     const CompareWork *work = of;
     ComparePart *part = made;
     (void)fields_default(compare_entry_fields, &part->entry); // nothing to allocate
     return comparison_apply(work->study, work->work.simulation,
-                            &work->answer->entries.at[member + 1], tools->limits, scene, problem);
+                            &work->answer->entries.at[member + 1], work->work.limits, scene,
+                            problem);
 }
 
 static Status comparison_keep(const void *of, const Outcome *outcome, const StudyTools *tools,

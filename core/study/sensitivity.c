@@ -176,12 +176,8 @@ static Status sensitivity_check_runs(SensitivityStudy *study, const Simulation *
                                 "must be 0 or left out without a deviation to draw from: give "
                                 "restitution_deviation or contact_time_deviation, or materials "
                                 "whose revisions record theirs");
-    if (study->runs > 0 && values > STUDY_DENSITIES_MAX)
-        return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment",
-                                (double)simulation->output.psd.segment, "samples",
-                                "gives %.0f densities of all channels, the study takes at most "
-                                "%d: ask for shorter segments or fewer channels",
-                                values, STUDY_DENSITIES_MAX);
+    if (study->runs > 0)
+        TRY(study_run_check_densities(simulation, values, problem));
     if (values * (double)study->runs > UNCERTAINTY_BANDS_MAX)
         return problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
                                 "must be at most %.0f for spectra of %.0f densities, is %llu: ask "
@@ -274,11 +270,10 @@ static double sensitivity_step_up(const SensitivityWork *work, int parameter, si
     return perturbation_max_step(work->simulation, parameter, sensitivity_step(work, step));
 }
 
-static Status sensitivity_scene(const void *of, size_t member, const StudyTools *tools,
-                                Simulation *scene, void *made, Problem *problem) {
+static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, void *made,
+                                Problem *problem) {
     const SensitivityWork *work = of;
     SensitivityPart *part = made;
-    (void)tools;
     TRY(sensitivity_copy(work->simulation, scene, problem));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;

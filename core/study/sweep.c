@@ -231,11 +231,11 @@ typedef struct SweepWork {
     Sweep *answer;
 } SweepWork;
 
-static Status sweep_scene(const void *of, size_t member, const StudyTools *tools, Simulation *scene,
-                          void *part, Problem *problem) {
+static Status sweep_scene(const void *of, size_t member, Simulation *scene, void *part,
+                          Problem *problem) {
     const SweepWork *work = of;
     (void)part;
-    return sweep_grid_scene(work->grid, member, true, tools->limits, scene, problem);
+    return sweep_grid_scene(work->grid, member, true, work->work.limits, scene, problem);
 }
 
 // Memory for the rows is needed only here: an executor that stores rows does not fold them.
