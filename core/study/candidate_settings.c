@@ -30,7 +30,7 @@ const char *const tradeoff_status_names[] = {"measured", "refused", "failed", NU
 
 // clang-format off
 const Field tradeoff_point_fields[] = {
-    FIELD_TEXT(TradeoffPoint, name, 0, PRESENCE_OPTIONAL, 0, "for people"),
+    FIELD_TEXT(TradeoffPoint, name, 0, PRESENCE_OPTIONAL, 0, "name for display"),
     FIELD_TEXT(TradeoffPoint, solver, 0, PRESENCE_OPTIONAL, 0, "solver"),
     FIELD_REAL(TradeoffPoint, step, "s", ANY, OPTIONAL, "its step"),
     FIELD_REAL(TradeoffPoint, tolerance, NULL, ANY, OPTIONAL, "its tolerance"),
@@ -38,13 +38,13 @@ const Field tradeoff_point_fields[] = {
     FIELD_REAL(TradeoffPoint, sample_rate, "Hz", ANY, OPTIONAL, "sample rate in place of the scene's; the base keeps its own"),
     FIELD_REAL(TradeoffPoint, duration, "s", ANY, OPTIONAL, "duration in place of the scene's"),
     FIELD_COUNT(TradeoffPoint, segment, "samples", AT_MIN(1), OPTIONAL, "segment of the spectra in place of the scene's"),
-    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_MIN(1), OPTIONAL, "modes that it keeps; all if absent"),
-    FIELD_CHOICE(TradeoffPoint, status, tradeoff_status_names, TRADEOFF_MEASURED, "whether it was run"),
+    FIELD_COUNT(TradeoffPoint, modes, NULL, AT_MIN(1), OPTIONAL, "number of modes kept; all if absent"),
+    FIELD_CHOICE(TradeoffPoint, status, tradeoff_status_names, TRADEOFF_MEASURED, "measured; refused: too expensive or invalid; failed: the run ended early"),
     FIELD_TEXT(TradeoffPoint, why, 0, PRESENCE_OPTIONAL, 0, "why it was not measured"),
-    FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, another time will differ"),
+    FIELD_REAL(TradeoffPoint, cpu_minimum, "s", ANY, OPTIONAL, "CPU time of a run with the scene's own output, the smallest timing; a measurement, not repeatable"),
     FIELD_REAL(TradeoffPoint, cpu_median, "s", ANY, OPTIONAL, "median of the timings; a measurement"),
-    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_MIN(0), 0, "runs that were timed: short ones are timed many at once"),
-    FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
+    FIELD_COUNT(TradeoffPoint, runs, NULL, AT_MIN(0), 0, "number of timed runs: short ones are timed many at once"),
+    FIELD_REAL(TradeoffPoint, steps, NULL, ANY, OPTIONAL, "solver steps"),
     FIELD_ITEM(TradeoffPoint, errors, error_fields, NULL, PRESENCE_DEFAULT, "differences from the reference"),
     FIELD_FLAG(TradeoffPoint, is_best, false, "no other point is both cheaper and closer by the metric; follows from measured times"),
     FIELD_END

@@ -13,27 +13,27 @@ enum { RUNS_MAX = 10000 };
 
 // clang-format off
 static const Field ensemble_study_fields[] = {
-    FIELD_COUNT(EnsembleStudy, runs, NULL, WITHIN(2, RUNS_MAX), 64, "runs, each with a seed of its own; under a target at most so many"),
+    FIELD_COUNT(EnsembleStudy, runs, NULL, WITHIN(2, RUNS_MAX), 64, "runs, each with its own seed; with a target the largest number of them"),
     FIELD_COUNT(EnsembleStudy, first_seed, NULL, WITHIN(0, 0x1p53 - 1), OPTIONAL, "the seeds are this one and those that follow it; the excitation's own if absent"),
-    FIELD_REAL(EnsembleStudy, target, NULL, ABOVE(0), OPTIONAL, "relative error wanted of the metric's mean, against its mean over all of the runs: no more of them are made than keep it; if absent, all are"),
-    FIELD_CHOICE(EnsembleStudy, metric, statistics_metric_names, OPTIONAL, "what the target is of; psd: the norm of the difference of the mean densities over the norm of the density, of the channel that is farthest off; rms_displacement if absent"),
+    FIELD_REAL(EnsembleStudy, target, NULL, ABOVE(0), OPTIONAL, "wanted relative error of the metric's mean, against its mean over all of the runs: no more runs are made than necessary; all are made if absent"),
+    FIELD_CHOICE(EnsembleStudy, metric, statistics_metric_names, OPTIONAL, "metric of the target; psd: norm of the difference of the mean densities over the norm of the density, of the channel with the largest error; rms_displacement if absent"),
     FIELD_END
 };
 
 static const Field ensemble_statistic_fields[] = {
-    FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of all that follows"),
-    FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs that know it"),
-    FIELD_REAL(RunStatistic, mean, NULL, ANY, OPTIONAL, "mean over those"),
+    FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
+    FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs in which it is known"),
+    FIELD_REAL(RunStatistic, mean, NULL, ANY, OPTIONAL, "mean over these runs"),
     FIELD_REAL(RunStatistic, standard_deviation, NULL, ANY, OPTIONAL, "of one run"),
     FIELD_REAL(RunStatistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
-    FIELD_REAL(RunStatistic, low, NULL, ANY, OPTIONAL, "the interval of the mean over all seeds there are begins here, by Student's t"),
-    FIELD_REAL(RunStatistic, high, NULL, ANY, OPTIONAL, "and ends here"),
+    FIELD_REAL(RunStatistic, low, NULL, ANY, OPTIONAL, "lower end of the confidence interval of the mean over all possible seeds, by Student's t"),
+    FIELD_REAL(RunStatistic, high, NULL, ANY, OPTIONAL, "upper end of that interval"),
     FIELD_REAL(RunStatistic, minimum, NULL, ANY, OPTIONAL, "the smallest"),
     FIELD_REAL(RunStatistic, q05, NULL, ANY, OPTIONAL, "5 % of the runs are below"),
-    FIELD_REAL(RunStatistic, q25, NULL, ANY, OPTIONAL, "25 % are"),
-    FIELD_REAL(RunStatistic, median, NULL, ANY, OPTIONAL, "half of them are"),
-    FIELD_REAL(RunStatistic, q75, NULL, ANY, OPTIONAL, "75 % are"),
-    FIELD_REAL(RunStatistic, q95, NULL, ANY, OPTIONAL, "95 % are"),
+    FIELD_REAL(RunStatistic, q25, NULL, ANY, OPTIONAL, "25 % of the runs are below"),
+    FIELD_REAL(RunStatistic, median, NULL, ANY, OPTIONAL, "half of the runs are below"),
+    FIELD_REAL(RunStatistic, q75, NULL, ANY, OPTIONAL, "75 % of the runs are below"),
+    FIELD_REAL(RunStatistic, q95, NULL, ANY, OPTIONAL, "95 % of the runs are below"),
     FIELD_REAL(RunStatistic, maximum, NULL, ANY, OPTIONAL, "the largest"),
     FIELD_COUNT(RunStatistic, minimum_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the smallest, the first of equal ones"),
     FIELD_COUNT(RunStatistic, maximum_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the largest"),
@@ -41,30 +41,30 @@ static const Field ensemble_statistic_fields[] = {
 };
 
 static const Field ensemble_statistics_fields[] = {
-    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "of the summary's number of this name"),
+    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "of this number of the summary"),
     FIELD_ITEM(EnsembleStatistics, rms_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, peak_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, rms_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, impacts, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
-    FIELD_ITEM(EnsembleStatistics, peak_contact_force, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown where contacts have no force"),
+    FIELD_ITEM(EnsembleStatistics, peak_contact_force, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown if contacts have no force"),
     FIELD_END
 };
 
 static const Field ensemble_trust_fields[] = {
-    FIELD_COUNT(RunTrust, whole, NULL, AT_MIN(0), 0, "runs whose trajectory is their scene's own to the end"),
-    FIELD_COUNT(RunTrust, beyond, NULL, AT_MIN(0), 0, "runs that go on beyond their trust horizon: there only statistics hold"),
-    FIELD_COUNT(RunTrust, unknown, NULL, AT_MIN(0), 0, "runs whose error nothing estimates"),
-    FIELD_REAL(RunTrust, shortest_horizon, "s", ANY, OPTIONAL, "of those that have one"),
-    FIELD_REAL(RunTrust, largest_error_estimate, NULL, ANY, OPTIONAL, "of those that have one"),
-    FIELD_REAL(RunTrust, largest_energy_residual, NULL, ANY, OPTIONAL, "of all that came to an end"),
+    FIELD_COUNT(RunTrust, whole, NULL, AT_MIN(0), 0, "runs whose trajectory can be trusted to the end"),
+    FIELD_COUNT(RunTrust, beyond, NULL, AT_MIN(0), 0, "runs that continue beyond their trust horizon, where only statistics are valid"),
+    FIELD_COUNT(RunTrust, unknown, NULL, AT_MIN(0), 0, "runs without an error estimate"),
+    FIELD_REAL(RunTrust, shortest_horizon, "s", ANY, OPTIONAL, "of the runs that have one"),
+    FIELD_REAL(RunTrust, largest_error_estimate, NULL, ANY, OPTIONAL, "of the runs that have one"),
+    FIELD_REAL(RunTrust, largest_energy_residual, NULL, ANY, OPTIONAL, "of all runs that ended"),
     FIELD_END
 };
 
 static const Field ensemble_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "in a word"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed so"),
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
     {.name = "first_seed", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of their seeds"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
     FIELD_END
 };
 
@@ -73,41 +73,41 @@ static const Field ensemble_spectrum_fields[] = {
     FIELD_TEXT(RunSpectrum, unit, 0, PRESENCE_OPTIONAL, 0, "of the densities"),
     FIELD_REALS(RunSpectrum, mean, NULL, ANY, 0, PRESENCE_OPTIONAL, "mean of the runs' densities at each frequency"),
     FIELD_REALS(RunSpectrum, standard_deviation, NULL, ANY, 0, PRESENCE_OPTIONAL, "of one run's density"),
-    FIELD_REALS(RunSpectrum, low, NULL, ANY, 0, PRESENCE_OPTIONAL, "the interval of the mean over all seeds there are begins here, at each frequency for itself, by Student's t of its logarithm"),
-    FIELD_REALS(RunSpectrum, high, NULL, ANY, 0, PRESENCE_OPTIONAL, "and ends here"),
+    FIELD_REALS(RunSpectrum, low, NULL, ANY, 0, PRESENCE_OPTIONAL, "lower end of the confidence interval of the mean over all possible seeds, at each frequency separately, by Student's t of its logarithm"),
+    FIELD_REALS(RunSpectrum, high, NULL, ANY, 0, PRESENCE_OPTIONAL, "upper end of that interval"),
     FIELD_END
 };
 
 static const Field ensemble_run_fields[] = {
     {.name = "seed", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(RunRecord, number, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the scene with this seed gives this row"},
-    FIELD_TEXT(RunRecord, why, 0, PRESENCE_OPTIONAL, 0, "it failed for this reason"),
-    FIELD_REAL(RunRecord, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
+    FIELD_TEXT(RunRecord, why, 0, PRESENCE_OPTIONAL, 0, "reason of its failure"),
+    FIELD_REAL(RunRecord, steps, NULL, ANY, OPTIONAL, "solver steps"),
     FIELD_BASE(RunRecord, summary, summary_fields),
     FIELD_END
 };
 
 static const Field ensemble_target_fields[] = {
-    FIELD_REAL(EnsembleTarget, error, NULL, ANY, OPTIONAL, "relative error wanted of the mean, against the mean of all runs asked for"),
-    FIELD_CHOICE(EnsembleTarget, metric, statistics_metric_names, OPTIONAL, "of what"),
+    FIELD_REAL(EnsembleTarget, error, NULL, ANY, OPTIONAL, "wanted relative error of the mean, against the mean of all requested runs"),
+    FIELD_CHOICE(EnsembleTarget, metric, statistics_metric_names, OPTIONAL, "metric of the error"),
     FIELD_REAL(EnsembleTarget, confidence, NULL, ANY, OPTIONAL, "that the error is no larger than estimated"),
-    FIELD_COUNT(EnsembleTarget, pilot, NULL, AT_MIN(0), OPTIONAL, "runs that were made before any were foretold"),
-    FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_MIN(0), OPTIONAL, "runs foretold after those to keep the target, themselves among them"),
-    FIELD_REAL(EnsembleTarget, estimated_error, NULL, ANY, OPTIONAL, "of the mean of the runs made; 0 where all were"),
-    FIELD_FLAG(EnsembleTarget, is_kept, false, "the estimated error is within the one wanted"),
-    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "in words"),
+    FIELD_COUNT(EnsembleTarget, pilot, NULL, AT_MIN(0), OPTIONAL, "runs made before the first prediction"),
+    FIELD_COUNT(EnsembleTarget, predicted_runs, NULL, AT_MIN(0), OPTIONAL, "predicted number of runs that keep the target, the pilot included"),
+    FIELD_REAL(EnsembleTarget, estimated_error, NULL, ANY, OPTIONAL, "of the mean of the runs made; 0 if all were made"),
+    FIELD_FLAG(EnsembleTarget, is_kept, false, "the estimated error is within the wanted error"),
+    FIELD_TEXT(EnsembleTarget, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
     FIELD_END
 };
 
 static const Field ensemble_answer_fields[] = {
-    FIELD_COUNT(Ensemble, runs, NULL, AT_MIN(1), OPTIONAL, "runs asked for"),
+    FIELD_COUNT(Ensemble, runs, NULL, AT_MIN(1), OPTIONAL, "runs requested"),
     FIELD_COUNT(Ensemble, first_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the first"),
     FIELD_COUNT(Ensemble, made, NULL, AT_MIN(0), 0, "runs made"),
-    FIELD_COUNT(Ensemble, failed, NULL, AT_MIN(0), 0, "those of them that failed; the others alone are counted in all that follows"),
-    FIELD_REAL(Ensemble, steps, NULL, ANY, 0, "solver steps of all, counted"),
+    FIELD_COUNT(Ensemble, failed, NULL, AT_MIN(0), 0, "runs that failed; all numbers below are of the others"),
+    FIELD_REAL(Ensemble, steps, NULL, ANY, 0, "solver steps of all runs"),
     FIELD_REAL(Ensemble, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
-    FIELD_ITEM_OR_NULL(Ensemble, target, ensemble_target_fields, PRESENCE_OPTIONAL, "what became of the target"),
+    FIELD_ITEM_OR_NULL(Ensemble, target, ensemble_target_fields, PRESENCE_OPTIONAL, "result of the target"),
     FIELD_ITEM(Ensemble, statistics, ensemble_statistics_fields, NULL, PRESENCE_DEFAULT, "over the runs"),
-    FIELD_ITEM(Ensemble, trust, ensemble_trust_fields, NULL, PRESENCE_DEFAULT, "how far single trajectories can be trusted"),
+    FIELD_ITEM(Ensemble, trust, ensemble_trust_fields, NULL, PRESENCE_DEFAULT, "accuracy of single trajectories"),
     FIELD_LIST(Ensemble, failures, ensemble_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_REALS(Ensemble, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
     FIELD_LIST(Ensemble, spectra, ensemble_spectrum_fields, 0, PRESENCE_DEFAULT, "mean densities, channel by channel"),
@@ -135,18 +135,6 @@ static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem)
                             (unsigned long long)study->runs);
 }
 
-static Status ensemble_check_densities(const Simulation *simulation, Problem *problem) {
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double values = study_run_densities(simulation);
-    if (values <= STUDY_DENSITIES_MAX)
-        return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, "/output/psd/segment",
-                       "%zu spectra of segments of %llu samples are %.0f densities, an ensemble "
-                       "takes at most %d: ask for shorter segments or fewer channels",
-                       psd->channels.count, (unsigned long long)psd->segment, values,
-                       STUDY_DENSITIES_MAX);
-}
-
 static Status ensemble_complete(void *request, const Simulation *simulation,
                                 const SimulationLimits *limits, Problem *problem) {
     EnsembleStudy *study = request;
@@ -169,7 +157,8 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
         study->metric == CHOICE_ABSENT
             ? STATUS_OK
             : study_run_check_metric(simulation, statistics_metric_names[study->metric], problem);
-    const Status densities = ensemble_check_densities(simulation, problem);
+    const Status densities =
+        study_run_check_densities(simulation, study_run_densities(simulation), problem);
     return seeds != STATUS_OK ? seeds : metric != STATUS_OK ? metric : densities;
 }
 
@@ -202,10 +191,9 @@ Status ensemble_scene(const Simulation *simulation, uint64_t seed, Simulation *t
     return STATUS_OK;
 }
 
-static Status ensemble_member_scene(const void *of, size_t member, const StudyTools *tools,
-                                    Simulation *scene, void *part, Problem *problem) {
+static Status ensemble_member_scene(const void *of, size_t member, Simulation *scene, void *part,
+                                    Problem *problem) {
     const EnsembleWork *work = of;
-    (void)tools;
     (void)part;
     return ensemble_scene(work->work.simulation, work->study->first_seed + member, scene, problem);
 }
@@ -356,7 +344,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     return answer->table.at != NULL ? STATUS_OK : study_no_memory(problem);
 }
 
-static const Kind ensemble_answer = {"ensemble", "what many seeds came to", ensemble_answer_fields,
+static const Kind ensemble_answer = {"ensemble", "results of many seeds", ensemble_answer_fields,
                                      sizeof(Ensemble)};
 
 const StudyKind study_ensemble = {

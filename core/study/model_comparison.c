@@ -17,10 +17,10 @@ const char *const compare_status_names[] = {"run", "refused", "failed", NULL};
 
 // clang-format off
 static const Field compare_study_fields[] = {
-    FIELD_TEXTS(CompareStudy, models, NULL, NULL, NAMES_MAX, PRESENCE_OPTIONAL, 0, "contact models; if absent the scene's own where separations are named, else all"),
-    FIELD_TEXTS(CompareStudy, separations, separation_names, NULL, 2, PRESENCE_OPTIONAL, 0, "rules by which linear contacts end; if absent the scene's own where models are named, else both"),
-    FIELD_REAL(CompareStudy, part, NULL, WITHIN(1e-6, 1), 0.01, "the motions have parted where their displacements differ by this part of the largest displacement"),
-    FIELD_REALS(CompareStudy, band, "Hz", AT_MIN(0), 2, PRESENCE_OPTIONAL, "from where to where the spectra are compared; if absent where the scene's own has 99.9 % of its power"),
+    FIELD_TEXTS(CompareStudy, models, NULL, NULL, NAMES_MAX, PRESENCE_OPTIONAL, 0, "contact models; if absent the scene's own if separations are named, else all"),
+    FIELD_TEXTS(CompareStudy, separations, separation_names, NULL, 2, PRESENCE_OPTIONAL, 0, "rules by which linear contacts end; if absent the scene's own if models are named, else both"),
+    FIELD_REAL(CompareStudy, part, NULL, WITHIN(1e-6, 1), 0.01, "motions diverge when their displacements differ by this part of the largest displacement"),
+    FIELD_REALS(CompareStudy, band, "Hz", AT_MIN(0), 2, PRESENCE_OPTIONAL, "band in which the spectra are compared; if absent that with 99.9 % of the power of the scene's own"),
     FIELD_COUNT(CompareStudy, storey, NULL, AT_MIN(1), OPTIONAL, "whose displacement and mean_acceleration are compared; the first damper's if absent"),
     FIELD_END
 };
@@ -29,27 +29,27 @@ const Field compare_contacts_fields[] = {
     FIELD_COUNT(CompareContacts, resting, NULL, AT_MIN(0), OPTIONAL, "intervals of persistent contact"),
     FIELD_REAL(CompareContacts, mean_duration, "s", ANY, OPTIONAL, "of the impacts that ended"),
     FIELD_REAL(CompareContacts, mean_approach_speed, "m/s", ANY, OPTIONAL, "of the impacts"),
-    FIELD_REAL(CompareContacts, largest_approach_speed, "m/s", ANY, OPTIONAL, "of them"),
+    FIELD_REAL(CompareContacts, largest_approach_speed, "m/s", ANY, OPTIONAL, "largest of these speeds"),
     FIELD_REAL(CompareContacts, mean_restitution, NULL, ANY, OPTIONAL, "separation over approach speed, of the impacts that ended"),
     FIELD_REAL(CompareContacts, energy_lost, "J", ANY, OPTIONAL, "in all contacts"),
     FIELD_END
 };
 
 const Field compare_differences_fields[] = {
-    FIELD_REAL(CompareDifferences, peak_displacement, NULL, ANY, OPTIONAL, "over the reference's, less 1: 0.1 is a tenth more"),
+    FIELD_REAL(CompareDifferences, peak_displacement, NULL, ANY, OPTIONAL, "ratio to the reference less 1: 0.1 is a tenth more"),
     FIELD_REAL(CompareDifferences, rms_displacement, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_REAL(CompareDifferences, peak_acceleration, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_REAL(CompareDifferences, rms_acceleration, NULL, ANY, OPTIONAL, "likewise"),
-    FIELD_REAL(CompareDifferences, impacts, NULL, ANY, OPTIONAL, "how many more"),
-    FIELD_REAL(CompareDifferences, peak_contact_force, NULL, ANY, OPTIONAL, "over the reference's, less 1; unknown where impacts have no force"),
+    FIELD_REAL(CompareDifferences, impacts, NULL, ANY, OPTIONAL, "difference of the numbers"),
+    FIELD_REAL(CompareDifferences, peak_contact_force, NULL, ANY, OPTIONAL, "ratio to the reference less 1; unknown if impacts have no force"),
     FIELD_END
 };
 
 static const Field compare_divergence_fields[] = {
-    FIELD_REAL(CompareDivergence, time, "s", ANY, OPTIONAL, "the displacements differ by the stated part of the largest from here on; unknown: not within the run"),
-    FIELD_REAL(CompareDivergence, horizon, "s", ANY, OPTIONAL, "the earlier trust horizon of both; unknown: neither has one within the run"),
-    FIELD_FLAG(CompareDivergence, is_trusted, false, "the time is within it: it is the contact that parts them, not rounding"),
-    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "in words"),
+    FIELD_REAL(CompareDivergence, time, "s", ANY, OPTIONAL, "first time at which the displacements differ by the stated part of the largest; unknown: not within the run"),
+    FIELD_REAL(CompareDivergence, horizon, "s", ANY, OPTIONAL, "the earlier trust horizon of the two; unknown: neither has one within the run"),
+    FIELD_FLAG(CompareDivergence, is_trusted, false, "the time is within the horizon: the contact causes the difference, not rounding"),
+    FIELD_TEXT(CompareDivergence, why, 0, PRESENCE_OPTIONAL, 0, "explanation"),
     FIELD_END
 };
 
@@ -60,31 +60,31 @@ static const Field compare_trace_fields[] = {
 };
 
 const Field compare_entry_fields[] = {
-    FIELD_TEXT(CompareEntry, name, 0, PRESENCE_OPTIONAL, 0, "for people"),
+    FIELD_TEXT(CompareEntry, name, 0, PRESENCE_OPTIONAL, 0, "name for display"),
     FIELD_TEXT(CompareEntry, contact_model, 0, PRESENCE_OPTIONAL, 0, "contact model"),
-    FIELD_CHOICE(CompareEntry, separation, separation_names, OPTIONAL, "when its contacts end; unknown where the model needs no rule"),
-    FIELD_CHOICE(CompareEntry, status, compare_status_names, COMPARE_RUN, "whether it was run: refused is what the scene's buffers do not allow"),
-    FIELD_TEXT(CompareEntry, why, 0, PRESENCE_OPTIONAL, 0, "why it was not run to its end"),
-    FIELD_REAL(CompareEntry, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
-    FIELD_LIST(CompareEntry, derived, derived_fields, 0, PRESENCE_DEFAULT, "what the buffers came to"),
-    FIELD_ITEM(CompareEntry, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as of any run"),
-    FIELD_ITEM(CompareEntry, contacts, compare_contacts_fields, NULL, PRESENCE_DEFAULT, "the ledger of impacts as a whole"),
+    FIELD_CHOICE(CompareEntry, separation, separation_names, OPTIONAL, "rule by which its contacts end; unknown if the model needs none"),
+    FIELD_CHOICE(CompareEntry, status, compare_status_names, COMPARE_RUN, "run; refused: the scene's buffers do not allow it; failed: the run ended early"),
+    FIELD_TEXT(CompareEntry, why, 0, PRESENCE_OPTIONAL, 0, "why it did not run to its end"),
+    FIELD_REAL(CompareEntry, steps, NULL, ANY, OPTIONAL, "solver steps"),
+    FIELD_LIST(CompareEntry, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters derived from the buffers"),
+    FIELD_ITEM(CompareEntry, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
+    FIELD_ITEM(CompareEntry, contacts, compare_contacts_fields, NULL, PRESENCE_DEFAULT, "summary of all impacts"),
     FIELD_ITEM(CompareEntry, differences, compare_differences_fields, NULL, PRESENCE_DEFAULT, "from the reference"),
     FIELD_ITEM(CompareEntry, psd, distance_fields, NULL, PRESENCE_DEFAULT, "distance of its spectrum from the reference's"),
-    FIELD_ITEM(CompareEntry, displacement, likeness_fields, NULL, PRESENCE_DEFAULT, "beside the reference's, in metres"),
-    FIELD_ITEM(CompareEntry, divergence, compare_divergence_fields, NULL, PRESENCE_DEFAULT, "when it parts from the reference"),
+    FIELD_ITEM(CompareEntry, displacement, likeness_fields, NULL, PRESENCE_DEFAULT, "comparison with the reference's, in metres"),
+    FIELD_ITEM(CompareEntry, divergence, compare_divergence_fields, NULL, PRESENCE_DEFAULT, "time at which it departs from the reference"),
     FIELD_REALS(CompareEntry, density, NULL, ANY, 0, PRESENCE_OPTIONAL, "its spectrum"),
-    FIELD_ITEM(CompareEntry, trace, compare_trace_fields, NULL, PRESENCE_DEFAULT, "its displacement, the least and the largest of each bucket of samples"),
+    FIELD_ITEM(CompareEntry, trace, compare_trace_fields, NULL, PRESENCE_DEFAULT, "its displacement, smallest and largest of each bucket of samples"),
     FIELD_END
 };
 
 static const Field compare_answer_fields[] = {
     FIELD_COUNT(Comparison, storey, NULL, AT_MIN(1), OPTIONAL, "whose displacement and mean_acceleration are compared"),
-    FIELD_REAL(Comparison, part, NULL, ANY, OPTIONAL, "of the largest displacement, by which motions have parted"),
+    FIELD_REAL(Comparison, part, NULL, ANY, OPTIONAL, "part of the largest displacement by which motions diverge"),
     FIELD_TEXT(Comparison, channel, 0, PRESENCE_OPTIONAL, 0, "of the spectra"),
     FIELD_TEXT(Comparison, unit, 0, PRESENCE_OPTIONAL, 0, "of the densities"),
     FIELD_REALS(Comparison, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
-    FIELD_REAL(Comparison, trace_rate, "Hz", ANY, OPTIONAL, "buckets a second of the traces"),
+    FIELD_REAL(Comparison, trace_rate, "Hz", ANY, OPTIONAL, "buckets per second of the traces"),
     FIELD_COUNT(Comparison, trace_samples, NULL, AT_MIN(1), OPTIONAL, "samples in each bucket"),
     FIELD_LIST(Comparison, entries, compare_entry_fields, 0, PRESENCE_DEFAULT, "the variants; the first is the reference, the scene as it is"),
     FIELD_END
@@ -144,32 +144,21 @@ static Status comparison_fill_names(CompareStudy *study, const Simulation *simul
     return STATUS_OK;
 }
 
-static Status comparison_check_densities(const CompareStudy *study, const Simulation *simulation,
-                                         Problem *problem) {
-    const SpectrumRequest *psd = &simulation->output.psd;
-    const double variants = (double)study->models.count + (double)study->separations.count;
-    const double values = (double)(psd->segment / 2 + 1) * variants;
-    if (psd->channels.count == 0 || values <= STUDY_DENSITIES_MAX)
-        return STATUS_OK;
-    return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment", (double)psd->segment,
-                            "samples",
-                            "gives about %.0f densities of all variants, a comparison takes at "
-                            "most %d: ask for shorter segments or fewer models",
-                            values, STUDY_DENSITIES_MAX);
-}
-
 static Status comparison_complete(void *request, const Simulation *simulation,
                                   const SimulationLimits *limits, Problem *problem) {
     CompareStudy *study = request;
     (void)limits;
     if (simulation->scene.dampers.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/kind",
-                           "compare tries contact models: the scene has no damper");
+                           "compare needs a damper: the scene has none");
     const Status models = comparison_check_models(study, problem);
     const Status storey = comparison_check_storey(study, simulation, problem);
     const Status band = comparison_check_band(study, problem);
     TRY(comparison_fill_names(study, simulation, problem));
-    const Status densities = comparison_check_densities(study, simulation, problem);
+    const SpectrumRequest *psd = &simulation->output.psd;
+    const double variants = (double)study->models.count + (double)study->separations.count;
+    const double values = psd->channels.count > 0 ? (double)(psd->segment / 2 + 1) * variants : 0;
+    const Status densities = study_run_check_densities(simulation, values, problem);
     return models != STATUS_OK   ? models
            : storey != STATUS_OK ? storey
            : band != STATUS_OK   ? band
@@ -422,7 +411,7 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
                                   band->count == 2 ? band->at[1] : (double)NAN);
     entry->displacement = likeness_measure(&from, &to, work->study->part, progress);
     if (!progress_advance(progress, 1))
-        return problem_set(problem, STATUS_CANCELLED, "stopped at a comparison");
+        return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
     TRY(comparison_fill_divergence(work, outcome, entry, problem));
     if (fields_copy(rows, &outcome->plan, &plan) != STATUS_OK)
         return study_no_memory(problem);
@@ -431,13 +420,14 @@ static Status comparison_measure(const CompareWork *work, const Outcome *outcome
     return comparison_fill_trace(&to, (size_t)work->answer->trace_samples, &entry->trace, problem);
 }
 
-static Status comparison_scene(const void *of, size_t member, const StudyTools *tools,
-                               Simulation *scene, void *made, Problem *problem) {
+static Status comparison_scene(const void *of, size_t member, Simulation *scene, void *made,
+                               Problem *problem) {
     const CompareWork *work = of;
     ComparePart *part = made;
     (void)fields_default(compare_entry_fields, &part->entry); // nothing to allocate
     return comparison_apply(work->study, work->work.simulation,
-                            &work->answer->entries.at[member + 1], tools->limits, scene, problem);
+                            &work->answer->entries.at[member + 1], work->work.limits, scene,
+                            problem);
 }
 
 static Status comparison_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
@@ -526,7 +516,7 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     return STATUS_OK;
 }
 
-static const Kind comparison_answer = {"compare", "what contact models and rules came to",
+static const Kind comparison_answer = {"compare", "results of contact models and rules",
                                        compare_answer_fields, sizeof(Comparison)};
 
 const StudyKind study_compare = {

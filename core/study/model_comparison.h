@@ -10,17 +10,17 @@
 // The request.
 typedef struct CompareStudy {
     Variant variant;
-    Texts models;      // none: the scene's own where separations are named, else all
+    Texts models;      // none until completed: the scene's own if separations are named, else all
     Texts separations; // likewise
-    double part;       // of the reference's largest displacement, by which motions have parted
+    double part;       // of the reference's largest displacement, by which motions diverge
     Reals band;        // of the spectra [Hz]; none: 99.9 % of the reference's power
-    uint64_t storey;   // that is looked at; COUNT_ABSENT until completed: the first damper's
+    uint64_t storey;   // whose motion is compared; COUNT_ABSENT until completed: the first damper's
 } CompareStudy;
 
 typedef enum CompareStatus { COMPARE_RUN, COMPARE_REFUSED, COMPARE_FAILED } CompareStatus;
 extern const char *const compare_status_names[];
 
-// What the ledger says as a whole; NAN where nothing tells it.
+// Summary of all impacts; NAN where unknown.
 typedef struct CompareContacts {
     uint64_t resting; // intervals of persistent contact
     double mean_duration, mean_approach_speed, largest_approach_speed, mean_restitution;
@@ -30,19 +30,19 @@ typedef struct CompareContacts {
 // Relative to the reference's number: 0.1 is a tenth more.
 typedef struct CompareDifferences {
     double peak_displacement, rms_displacement, peak_acceleration, rms_acceleration;
-    double impacts; // how many more
+    double impacts; // difference of the numbers
     double peak_contact_force;
 } CompareDifferences;
 
-// When the displacements part, and whether that is the contact model's doing.
+// Time at which the displacements diverge, and whether the contact model is the cause.
 typedef struct CompareDivergence {
     double time;     // NAN: not within the run
-    double horizon;  // the earlier one of both; NAN: both can be trusted to the end
-    bool is_trusted; // the time is within it
+    double horizon;  // the earlier trust horizon; NAN: both can be trusted to the end
+    bool is_trusted; // the time is within the horizon
     char *why;
 } CompareDivergence;
 
-// Displacement over time, the least and the largest of each bucket of samples.
+// Displacement over time, the smallest and the largest of each bucket of samples.
 typedef struct CompareTrace {
     Reals minimum, maximum;
 } CompareTrace;
@@ -51,9 +51,9 @@ typedef struct CompareTrace {
 typedef struct CompareEntry {
     char *name; // "spring_damper, zero_force"
     char *contact_model;
-    int separation; // CHOICE_ABSENT where the model has none
+    int separation; // CHOICE_ABSENT if the model has none
     int status;     // CompareStatus
-    char *why;      // of one that was not run to its end
+    char *why;      // it did not run to its end
     double steps;
     DerivedList derived;
     Summary summary;

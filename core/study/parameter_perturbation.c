@@ -268,11 +268,11 @@ static Status uncertainty_check_number(const InputUncertainty *uncertainty,
         return problem_add(problem, STATUS_INVALID, place, "must be left out: %s", why);
     if (!isnan(uncertainty_common(uncertainty, parameter)))
         return problem_add(problem, STATUS_INVALID, place,
-                           "must be left out: %s_deviation says it for all buffers", name);
+                           "must be left out: %s_deviation gives it for all buffers", name);
     if (value <= 1)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, place,
-                       "is %.3g of its value, as %.64s tells, and must be at most 1 to be drawn "
+                       "is %.3g of its value, as %.64s records, and must be at most 1 to be drawn "
                        "from: give %s_deviation",
                        value, deviation->source, name);
 }
@@ -284,9 +284,10 @@ static Status uncertainty_check_source(const InputDeviation *deviation, const Bu
     if (deviation->source == NULL)
         return STATUS_OK;
     if (buffer->material == NULL || strcmp(deviation->source, buffer->material) != 0)
-        return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "source"),
-                           "is not what stands at that buffer: leave it out, or name its material "
-                           "and revision");
+        return problem_add(
+            problem, STATUS_INVALID, uncertainty_place(place, index, "source"),
+            "is not the material of that buffer: leave it out, or name its material and "
+            "revision");
     for (int parameter = 0; parameter < 2; parameter++) {
         const double value = uncertainty_value(deviation, parameter),
                      recorded = uncertainty_recorded(buffer, parameter);
@@ -294,7 +295,7 @@ static Status uncertainty_check_source(const InputDeviation *deviation, const Bu
             return problem_add(
                 problem, STATUS_INVALID,
                 uncertainty_place(place, index, sensitivity_parameter_names[parameter]),
-                "is %.6g, but %.80s tells %.6g: leave out the source", value, deviation->source,
+                "is %.6g, but %.80s records %.6g: leave out the source", value, deviation->source,
                 recorded);
     }
     return STATUS_OK;
@@ -307,18 +308,18 @@ static Status uncertainty_check(const InputUncertainty *uncertainty, const Simul
     char place[PLACE];
     if (deviation->damper > dampers->count)
         return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "damper"),
-                           "is the number of no damper");
+                           "must be the number of a damper");
     const Buffer *buffer =
         perturbation_buffer(&dampers->at[deviation->damper - 1], (size_t)deviation->buffer);
     if (!buffer_is_given(buffer))
         return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, "buffer"),
-                           "stands at no stop: where both have the same it is \"buffer\", else "
+                           "is not given: if both stops have the same it is \"buffer\", else "
                            "\"left_buffer\" and \"right_buffer\"");
     for (size_t i = 0; i < index; i++)
         if (uncertainty->spread.at[i].damper == deviation->damper &&
             uncertainty->spread.at[i].buffer == deviation->buffer)
             return problem_add(problem, STATUS_INVALID, uncertainty_place(place, index, ""),
-                               "is of the same buffer as another: one each");
+                               "names the buffer of another entry: give one each");
     TRY(uncertainty_check_source(deviation, buffer, index, problem));
     const Status restitution =
         uncertainty_check_number(uncertainty, simulation, index, SENSITIVITY_RESTITUTION, problem);

@@ -22,25 +22,25 @@ static const char *const sensitivity_buffer_names[] = {
 
 static const Field sensitivity_spread_fields[] = {
     FIELD_COUNT(InputDeviation, damper, NULL, AT_MIN(1), REQUIRED, "number of the damper, from 1"),
-    FIELD_CHOICE(InputDeviation, buffer, sensitivity_buffer_names, 0, "which of its buffers"),
-    FIELD_TEXT(InputDeviation, source, 160, PRESENCE_OPTIONAL, 0, "the material and revision that tells it"),
-    FIELD_REAL(InputDeviation, restitution, NULL, WITHIN(0, 1), OPTIONAL, "relative standard deviation of its restitution; sure if absent"),
-    FIELD_REAL(InputDeviation, contact_time, NULL, WITHIN(0, 1), OPTIONAL, "likewise of its contact time; of a table all rows are changed by one factor"),
+    FIELD_CHOICE(InputDeviation, buffer, sensitivity_buffer_names, 0, "one of its buffers"),
+    FIELD_TEXT(InputDeviation, source, 160, PRESENCE_OPTIONAL, 0, "material and revision that the deviations come from"),
+    FIELD_REAL(InputDeviation, restitution, NULL, WITHIN(0, 1), OPTIONAL, "relative standard deviation of its restitution; exact if absent"),
+    FIELD_REAL(InputDeviation, contact_time, NULL, WITHIN(0, 1), OPTIONAL, "likewise of its contact time; all rows of a table are scaled by one factor"),
     FIELD_END
 };
 
 static const Field sensitivity_input_fields[] = {
-    FIELD_REAL(InputUncertainty, restitution_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "relative standard deviation of every buffer's restitution, 0: it is sure; if absent that of spread"),
+    FIELD_REAL(InputUncertainty, restitution_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "relative standard deviation of every buffer's restitution, 0: exact; if absent that of spread"),
     FIELD_REAL(InputUncertainty, contact_time_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "likewise of its contact time"),
-    FIELD_LIST(InputUncertainty, spread, sensitivity_spread_fields, DEVIATIONS_MAX, PRESENCE_OPTIONAL, "buffer by buffer; if absent what the revisions of the buffers' materials tell of the deviations of restitution and contact_time, of a table the root mean square of its rows"),
+    FIELD_LIST(InputUncertainty, spread, sensitivity_spread_fields, DEVIATIONS_MAX, PRESENCE_OPTIONAL, "deviations buffer by buffer; if absent those in the revisions of the buffers' materials, of a table the root mean square of its rows"),
     FIELD_END
 };
 
 static const Field sensitivity_study_fields[] = {
-    FIELD_TEXTS(SensitivityStudy, parameters, sensitivity_parameter_names, NULL, SENSITIVITY_PARAMETERS, PRESENCE_OPTIONAL, 0, "by what the response is differentiated, of all dampers and sides at once; if absent by all of restitution, contact_time, stiffness, damping, mass (the free masses') and clearance that the scene has"),
-    FIELD_REAL(SensitivityStudy, step, NULL, WITHIN(1e-6, 0.2), 0.01, "relative, of the central differences; half and a quarter of it are tried too"),
+    FIELD_TEXTS(SensitivityStudy, parameters, sensitivity_parameter_names, NULL, SENSITIVITY_PARAMETERS, PRESENCE_OPTIONAL, 0, "parameters of the derivatives, each for all dampers and sides at once; if absent all of restitution, contact_time, stiffness, damping, mass (of the free masses) and clearance that the scene has"),
+    FIELD_REAL(SensitivityStudy, step, NULL, WITHIN(1e-6, 0.2), 0.01, "relative step of the central differences; half and a quarter of it are tried too"),
     FIELD_BASE(SensitivityStudy, uncertainty, sensitivity_input_fields),
-    FIELD_COUNT(SensitivityStudy, runs, NULL, WITHIN(0, RUNS_MAX), OPTIONAL, "runs with restitution and contact time drawn; 200 if absent, none without a deviation"),
+    FIELD_COUNT(SensitivityStudy, runs, NULL, WITHIN(0, RUNS_MAX), OPTIONAL, "runs with restitution and contact time drawn at random; 200 if absent, none without a deviation"),
     FIELD_COUNT(SensitivityStudy, seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "of the draws"),
     FIELD_END
 };
@@ -57,53 +57,53 @@ static const Field sensitivity_stop_fields[] = {
     FIELD_REAL(SensitivityStop, stiffness_by_contact_time, NULL, ANY, OPTIONAL, "over that of T_c"),
     FIELD_REAL(SensitivityStop, damping_by_restitution, NULL, ANY, OPTIONAL, "relative change of c_b over the relative error of e; unknown at e = 1, where there is no damping"),
     FIELD_REAL(SensitivityStop, damping_by_contact_time, NULL, ANY, OPTIONAL, "over that of T_c"),
-    FIELD_REAL(SensitivityStop, by_damper_mass, NULL, ANY, OPTIONAL, "relative change of k_b and of c_b over that of the free mass; 0 where a rig's masses identify them"),
+    FIELD_REAL(SensitivityStop, by_damper_mass, NULL, ANY, OPTIONAL, "relative change of k_b and of c_b over that of the free mass; 0 if a rig's masses identify them"),
     FIELD_REAL(SensitivityStop, by_structure_mass, NULL, ANY, OPTIONAL, "over that of all masses of the structure together"),
-    FIELD_REAL(SensitivityStop, stiffness_deviation, NULL, ANY, OPTIONAL, "relative standard deviation of k_b that follows of the stated ones, to first order"),
+    FIELD_REAL(SensitivityStop, stiffness_deviation, NULL, ANY, OPTIONAL, "relative standard deviation of k_b that follows from the stated deviations, to first order"),
     FIELD_REAL(SensitivityStop, damping_deviation, NULL, ANY, OPTIONAL, "of c_b"),
     FIELD_TEXT(SensitivityStop, why, 0, PRESENCE_OPTIONAL, 0, "why there are no closed forms"),
     FIELD_END
 };
 
 static const Field sensitivity_slope_fields[] = {
-    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "the summary's number of this name"),
+    FIELD_CHOICE(SensitivitySlope, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
     FIELD_REAL(SensitivitySlope, value, NULL, ANY, OPTIONAL, "of the scene itself"),
-    FIELD_REAL(SensitivitySlope, derivative, NULL, ANY, OPTIONAL, "its relative change over the parameter's, by the central difference of the middle step"),
-    FIELD_REAL(SensitivitySlope, spread, NULL, ANY, OPTIONAL, "the largest less the smallest of all steps' differences"),
-    FIELD_FLAG(SensitivitySlope, is_settled, false, "the spread is at most a tenth of the largest, or 0.001: the steps agree. Where it is not, the number is no derivative"),
+    FIELD_REAL(SensitivitySlope, derivative, NULL, ANY, OPTIONAL, "relative change over that of the parameter, by the central difference of the middle step"),
+    FIELD_REAL(SensitivitySlope, spread, NULL, ANY, OPTIONAL, "largest less smallest difference of all steps"),
+    FIELD_FLAG(SensitivitySlope, is_settled, false, "the spread is at most a tenth of the largest, or 0.001: the steps agree. Otherwise the number is no derivative"),
     FIELD_END
 };
 
 static const Field sensitivity_row_fields[] = {
-    FIELD_CHOICE(SensitivityRow, parameter, sensitivity_parameter_names, OPTIONAL, "of all dampers and sides at once"),
-    FIELD_REALS(SensitivityRow, steps, NULL, ANY, 0, PRESENCE_OPTIONAL, "relative, to either side; a restitution goes up no farther than to 1"),
-    FIELD_LIST(SensitivityRow, slopes, sensitivity_slope_fields, 0, PRESENCE_DEFAULT, "statistic by statistic"),
-    FIELD_TEXT(SensitivityRow, why, 0, PRESENCE_OPTIONAL, 0, "why there are none, or why a run of them failed"),
+    FIELD_CHOICE(SensitivityRow, parameter, sensitivity_parameter_names, OPTIONAL, "parameter, of all dampers and sides at once"),
+    FIELD_REALS(SensitivityRow, steps, NULL, ANY, 0, PRESENCE_OPTIONAL, "relative steps down and up; a restitution does not exceed 1"),
+    FIELD_LIST(SensitivityRow, slopes, sensitivity_slope_fields, 0, PRESENCE_DEFAULT, "metric by metric"),
+    FIELD_TEXT(SensitivityRow, why, 0, PRESENCE_OPTIONAL, 0, "why there are no slopes, or why one of the runs failed"),
     FIELD_END
 };
 
 static const Field sensitivity_statistic_fields[] = {
-    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "the summary's number of this name"),
-    FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of all that follows"),
-    FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs that know it"),
+    FIELD_CHOICE(RunStatistic, metric, statistics_metric_names, OPTIONAL, "number of the summary"),
+    FIELD_TEXT(RunStatistic, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers below"),
+    FIELD_COUNT(RunStatistic, count, NULL, AT_MIN(0), 0, "runs in which it is known"),
     FIELD_REAL(RunStatistic, value, NULL, ANY, OPTIONAL, "of the scene itself"),
     FIELD_REAL(RunStatistic, mean, NULL, ANY, OPTIONAL, "mean over the runs"),
     FIELD_REAL(RunStatistic, standard_deviation, NULL, ANY, OPTIONAL, "of one run"),
-    FIELD_REAL(RunStatistic, low, NULL, ANY, OPTIONAL, "the interval of the mean begins here, by Student's t"),
-    FIELD_REAL(RunStatistic, high, NULL, ANY, OPTIONAL, "and ends here"),
+    FIELD_REAL(RunStatistic, low, NULL, ANY, OPTIONAL, "lower end of the confidence interval of the mean, by Student's t"),
+    FIELD_REAL(RunStatistic, high, NULL, ANY, OPTIONAL, "upper end of that interval"),
     FIELD_REAL(RunStatistic, minimum, NULL, ANY, OPTIONAL, "the smallest"),
     FIELD_REAL(RunStatistic, q05, NULL, ANY, OPTIONAL, "5 % of the runs are below"),
-    FIELD_REAL(RunStatistic, median, NULL, ANY, OPTIONAL, "half of them are"),
-    FIELD_REAL(RunStatistic, q95, NULL, ANY, OPTIONAL, "95 % are"),
+    FIELD_REAL(RunStatistic, median, NULL, ANY, OPTIONAL, "half of the runs are below"),
+    FIELD_REAL(RunStatistic, q95, NULL, ANY, OPTIONAL, "95 % of the runs are below"),
     FIELD_REAL(RunStatistic, maximum, NULL, ANY, OPTIONAL, "the largest"),
     FIELD_END
 };
 
 static const Field sensitivity_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "in a word"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed so"),
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
     {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
     FIELD_END
 };
 
@@ -113,45 +113,45 @@ static const Field sensitivity_spectrum_fields[] = {
     FIELD_REALS(RunSpectrum, value, NULL, ANY, 0, PRESENCE_OPTIONAL, "of the scene itself"),
     FIELD_REALS(RunSpectrum, mean, NULL, ANY, 0, PRESENCE_OPTIONAL, "mean of the runs' densities at each frequency"),
     FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency for itself"),
-    FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of them are"),
-    FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % are"),
+    FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of the runs are below"),
+    FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % of the runs are below"),
     FIELD_END
 };
 
 static const Field sensitivity_draw_fields[] = {
-    FIELD_COUNT(SensitivityDraw, run, NULL, AT_MIN(1), OPTIONAL, "its number; what is drawn follows of it and of the seed"),
-    FIELD_TEXT(SensitivityDraw, why, 0, PRESENCE_OPTIONAL, 0, "it failed for this reason"),
-    FIELD_REALS(SensitivityDraw, restitution, NULL, ANY, 0, PRESENCE_OPTIONAL, "each given buffer's is this times the scene's: damper by damper, that of both sides, left, right"),
+    FIELD_COUNT(SensitivityDraw, run, NULL, AT_MIN(1), OPTIONAL, "its number; number and seed determine the draw"),
+    FIELD_TEXT(SensitivityDraw, why, 0, PRESENCE_OPTIONAL, 0, "reason of its failure"),
+    FIELD_REALS(SensitivityDraw, restitution, NULL, ANY, 0, PRESENCE_OPTIONAL, "factor of each given buffer's restitution: damper by damper, of both sides, left, right"),
     FIELD_REALS(SensitivityDraw, contact_time, NULL, ANY, 0, PRESENCE_OPTIONAL, "likewise"),
-    FIELD_ITEM(SensitivityDraw, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as of any run"),
+    FIELD_ITEM(SensitivityDraw, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
     FIELD_END
 };
 
 static const Field sensitivity_uncertainty_fields[] = {
-    FIELD_REAL(InputUncertainty, restitution_deviation, NULL, ANY, OPTIONAL, "relative, stated for all buffers; where it is unknown that of spread was taken"),
+    FIELD_REAL(InputUncertainty, restitution_deviation, NULL, ANY, OPTIONAL, "relative, stated for all buffers; if unknown, spread was used"),
     FIELD_REAL(InputUncertainty, contact_time_deviation, NULL, ANY, OPTIONAL, "likewise"),
-    FIELD_LIST(InputUncertainty, spread, sensitivity_spread_fields, 0, PRESENCE_DEFAULT, "the deviations of each buffer, and whose they are"),
+    FIELD_LIST(InputUncertainty, spread, sensitivity_spread_fields, 0, PRESENCE_DEFAULT, "deviations of each buffer and their sources"),
     FIELD_END
 };
 
 static const Field sensitivity_answer_fields[] = {
     FIELD_ITEM(Sensitivity, summary, summary_fields, NULL, PRESENCE_DEFAULT, "of the scene itself"),
-    FIELD_REAL(Sensitivity, steps, NULL, ANY, 0, "solver steps of all runs, counted"),
-    FIELD_LIST(Sensitivity, contact, sensitivity_stop_fields, 0, PRESENCE_DEFAULT, "what errors do to k_b and c_b, stop by stop"),
-    FIELD_LIST(Sensitivity, response, sensitivity_row_fields, 0, PRESENCE_DEFAULT, "what changes do to the response, parameter by parameter"),
-    FIELD_FLAG(Sensitivity, is_chaotic, false, "the scene goes on beyond its trust horizon"),
-    FIELD_TEXT(Sensitivity, why, 0, PRESENCE_OPTIONAL, 0, "what that means for the derivatives of the response"),
-    FIELD_COUNT(Sensitivity, runs, NULL, AT_MIN(0), 0, "runs with restitution and contact time drawn, asked for"),
-    FIELD_COUNT(Sensitivity, made, NULL, AT_MIN(0), 0, "of those, made"),
-    FIELD_COUNT(Sensitivity, failed, NULL, AT_MIN(0), 0, "of those, failed; the others alone are counted in what follows"),
+    FIELD_REAL(Sensitivity, steps, NULL, ANY, 0, "solver steps of all runs"),
+    FIELD_LIST(Sensitivity, contact, sensitivity_stop_fields, 0, PRESENCE_DEFAULT, "effect of errors on k_b and c_b, stop by stop"),
+    FIELD_LIST(Sensitivity, response, sensitivity_row_fields, 0, PRESENCE_DEFAULT, "effect of changes on the response, parameter by parameter"),
+    FIELD_FLAG(Sensitivity, is_chaotic, false, "the scene continues beyond its trust horizon"),
+    FIELD_TEXT(Sensitivity, why, 0, PRESENCE_OPTIONAL, 0, "consequence for the derivatives of the response"),
+    FIELD_COUNT(Sensitivity, runs, NULL, AT_MIN(0), 0, "requested runs with restitution and contact time drawn at random"),
+    FIELD_COUNT(Sensitivity, made, NULL, AT_MIN(0), 0, "drawn runs made"),
+    FIELD_COUNT(Sensitivity, failed, NULL, AT_MIN(0), 0, "drawn runs that failed; all numbers below are of the others"),
     FIELD_COUNT(Sensitivity, seed, NULL, AT_MIN(0), OPTIONAL, "of the draws"),
     FIELD_BASE(Sensitivity, uncertainty, sensitivity_uncertainty_fields),
-    FIELD_TEXT(Sensitivity, distribution, 0, PRESENCE_OPTIONAL, 0, "of the draws, in words"),
+    FIELD_TEXT(Sensitivity, distribution, 0, PRESENCE_OPTIONAL, 0, "distribution of the draws"),
     FIELD_REAL(Sensitivity, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
     FIELD_LIST(Sensitivity, statistics, sensitivity_statistic_fields, 0, PRESENCE_DEFAULT, "over the drawn runs"),
     FIELD_LIST(Sensitivity, failures, sensitivity_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_REALS(Sensitivity, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
-    FIELD_LIST(Sensitivity, spectra, sensitivity_spectrum_fields, 0, PRESENCE_DEFAULT, "the drawn runs' densities, channel by channel"),
+    FIELD_LIST(Sensitivity, spectra, sensitivity_spectrum_fields, 0, PRESENCE_DEFAULT, "densities of the drawn runs, channel by channel"),
     FIELD_LIST(Sensitivity, table, sensitivity_draw_fields, 0, PRESENCE_DEFAULT, "every drawn run"),
     FIELD_END
 };
@@ -173,15 +173,11 @@ static Status sensitivity_check_runs(SensitivityStudy *study, const Simulation *
         study->runs = is_uncertain ? RUNS_DEFAULT : 0;
     if (study->runs > 0 && !is_uncertain)
         return problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
-                                "must be 0 or left out without a spread to draw from: give "
+                                "must be 0 or left out without a deviation to draw from: give "
                                 "restitution_deviation or contact_time_deviation, or materials "
-                                "whose revisions tell theirs");
-    if (study->runs > 0 && values > STUDY_DENSITIES_MAX)
-        return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment",
-                                (double)simulation->output.psd.segment, "samples",
-                                "gives %.0f densities of all channels, the study takes at most "
-                                "%d: ask for shorter segments or fewer channels",
-                                values, STUDY_DENSITIES_MAX);
+                                "whose revisions record theirs");
+    if (study->runs > 0)
+        TRY(study_run_check_densities(simulation, values, problem));
     if (values * (double)study->runs > UNCERTAINTY_BANDS_MAX)
         return problem_add_real(problem, STATUS_INVALID, "/study/runs", (double)study->runs, NULL,
                                 "must be at most %.0f for spectra of %.0f densities, is %llu: ask "
@@ -197,7 +193,7 @@ static Status sensitivity_complete(void *request, const Simulation *simulation,
     (void)limits;
     if (simulation->scene.dampers.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/kind",
-                           "sensitivity is of a damper's numbers: the scene has no damper");
+                           "sensitivity needs a damper: the scene has none");
     TRY(uncertainty_complete(&study->uncertainty, simulation, problem));
     const Status restitution = sensitivity_check_deviation(
         simulation, study->uncertainty.restitution_deviation, SENSITIVITY_RESTITUTION,
@@ -274,11 +270,10 @@ static double sensitivity_step_up(const SensitivityWork *work, int parameter, si
     return perturbation_max_step(work->simulation, parameter, sensitivity_step(work, step));
 }
 
-static Status sensitivity_scene(const void *of, size_t member, const StudyTools *tools,
-                                Simulation *scene, void *made, Problem *problem) {
+static Status sensitivity_scene(const void *of, size_t member, Simulation *scene, void *made,
+                                Problem *problem) {
     const SensitivityWork *work = of;
     SensitivityPart *part = made;
-    (void)tools;
     TRY(sensitivity_copy(work->simulation, scene, problem));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;
@@ -585,13 +580,14 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     return STATUS_OK;
 }
 
-static const Kind sensitivity_answer = {"sensitivity", "what errors of a buffer's numbers do",
+static const Kind sensitivity_answer = {"sensitivity", "effects of errors of a buffer's numbers",
                                         sensitivity_answer_fields, sizeof(Sensitivity)};
 
 const StudyKind study_sensitivity = {
-    .kind = {"sensitivity",
-             "what errors of restitution, contact time and masses do to k_b, c_b and the response",
-             sensitivity_study_fields, sizeof(SensitivityStudy)},
+    .kind =
+        {"sensitivity",
+         "effects of errors of restitution, contact time and masses on k_b, c_b and the response",
+         sensitivity_study_fields, sizeof(SensitivityStudy)},
     .answer = &sensitivity_answer,
     .shorten = "ask for fewer runs or parameters",
     .complete = sensitivity_complete,

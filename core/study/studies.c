@@ -17,14 +17,14 @@ const KindTable study_kinds = {"kind", studies_kind, true};
 const KindTable study_answer_kinds = {"kind", studies_answer, false};
 
 const Field study_answer_fields[] = {
-    FIELD_VARIANT(StudyAnswer, study, &study_answer_kinds, PRESENCE_REQUIRED, "what it came to"),
+    FIELD_VARIANT(StudyAnswer, study, &study_answer_kinds, PRESENCE_REQUIRED, "the answer"),
     FIELD_END,
 };
 
 const Field study_request_fields[] = {
     FIELD_BASE(StudyRequest, simulation, simulation_fields),
     FIELD_VARIANT(StudyRequest, study, &study_kinds, PRESENCE_OPTIONAL,
-                  "what is to be found out about the scene beside its run"),
+                  "a study of the scene, beside its run"),
     FIELD_END,
 };
 

@@ -19,8 +19,11 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
     if (*answer == NULL || made == NULL) {
         (void)study_no_memory(problem);
     } else {
-        *made =
-            (StudyWork){.kind = kind, .study = study, .simulation = simulation, .answer = *answer};
+        made->kind = kind;
+        made->study = study;
+        made->simulation = simulation;
+        made->limits = tools->limits;
+        made->answer = *answer;
         status = kind->begin(made, &own, problem);
         if (made->wanted == 0)
             made->wanted = made->members;
@@ -46,7 +49,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     RunRecord *run = &part->run;
     run->steps = (double)NAN;
     (void)fields_default(summary_fields, &run->summary); // absent: nothing to allocate
-    run->status = kind->scene(work, member, tools, &scene, part, problem);
+    run->status = kind->scene(work, member, &scene, part, problem);
     part->is_refused = run->status != STATUS_OK;
     if (run->status == STATUS_OK)
         run->status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,

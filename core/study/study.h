@@ -10,8 +10,9 @@ typedef struct StudyKind StudyKind;
 // they are made by any threads in any order, and folded in the order of their numbers.
 typedef struct StudyWork {
     const StudyKind *kind;
-    const void *study; // the request; borrowed, as the next two
+    const void *study; // the request; borrowed, as the next three
     const Simulation *simulation;
+    const SimulationLimits *limits;
     void *answer;
     size_t members;    // at most
     size_t wanted;     // the first ones; the study ends when the last of them is folded
@@ -52,8 +53,8 @@ struct StudyKind {
     Status (*begin)(void *work, const StudyTools *tools, Problem *problem);
     // Makes the scene of a member, from 0; other threads make other members at the same time.
     // `scene` is cleared by the caller. A failure is the member's, unless it ends the study.
-    Status (*scene)(const void *work, size_t member, const StudyTools *tools, Simulation *scene,
-                    void *part, Problem *problem);
+    Status (*scene)(const void *work, size_t member, Simulation *scene, void *part,
+                    Problem *problem);
     // Keeps what the fold needs of a run beside steps and summary. NULL: the spectra.
     Status (*keep)(const void *work, const Outcome *outcome, const StudyTools *tools, void *part,
                    Problem *problem);

@@ -73,6 +73,17 @@ double study_run_densities(const Simulation *simulation) {
                : (double)psd->channels.count * ((double)(psd->segment / 2) + 1);
 }
 
+Status study_run_check_densities(const Simulation *simulation, double densities, Problem *problem) {
+    enum { DENSITIES_MAX = 1 << 18 };
+    if (densities <= DENSITIES_MAX)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/output/psd/segment",
+                            (double)simulation->output.psd.segment, "samples",
+                            "gives %.0f densities in all spectra, at most %d are allowed: ask for "
+                            "shorter segments, or for fewer channels or models",
+                            densities, DENSITIES_MAX);
+}
+
 bool study_run_has_force(const Simulation *simulation) {
     const Scene *scene = &simulation->scene;
     return scene->dampers.count > 0 &&

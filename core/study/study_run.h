@@ -63,11 +63,11 @@ typedef struct RunSpectra {
 Status run_spectra_make(const Spectrum *like, Reals *frequency, RunSpectra *spectra,
                         Problem *problem);
 
-// Limit on the densities of one run's spectra.
-enum { STUDY_DENSITIES_MAX = 1 << 18 };
-
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
+
+// Validates that a study holds no more than 2^18 densities at a time.
+Status study_run_check_densities(const Simulation *simulation, double densities, Problem *problem);
 
 // Whether the contacts of the simulation have a force.
 bool study_run_has_force(const Simulation *simulation);

@@ -45,12 +45,12 @@ const char *sweep_metric_unit(const char *name) {
 
 // clang-format off
 static const Field sweep_axis_fields[] = {
-    FIELD_TEXT(SweepAxis, pointer, 200, PRESENCE_REQUIRED, 0, "JSON Pointer to what varies in the scene, /dampers/0/clearance; a buffer's takes names of materials, /excitation/name names of records, a kind's name (/contact/model) makes it that kind"),
-    FIELD_TEXTS(SweepAxis, values, NULL, NULL, SWEEP_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "what it takes, one after the other; or a range"),
-    FIELD_REAL(SweepAxis, from, NULL, ANY, OPTIONAL, "first number of a range"),
-    FIELD_REAL(SweepAxis, to, NULL, ANY, OPTIONAL, "its last"),
-    FIELD_COUNT(SweepAxis, count, NULL, WITHIN(2, SWEEP_AXIS_VALUES), OPTIONAL, "how many, both ends among them"),
-    FIELD_CHOICE(SweepAxis, spacing, sweep_spacing_names, OPTIONAL, "of a range: by equal differences, or by equal ratios; linear if absent"),
+    FIELD_TEXT(SweepAxis, pointer, 200, PRESENCE_REQUIRED, 0, "JSON Pointer to the member that varies, such as /dampers/0/clearance; values of a buffer are names of materials, of /excitation/name names of records, of a kind's name (/contact/model) kinds"),
+    FIELD_TEXTS(SweepAxis, values, NULL, NULL, SWEEP_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "its values in this order; or give a range"),
+    FIELD_REAL(SweepAxis, from, NULL, ANY, OPTIONAL, "first value of a range"),
+    FIELD_REAL(SweepAxis, to, NULL, ANY, OPTIONAL, "last number of a range"),
+    FIELD_COUNT(SweepAxis, count, NULL, WITHIN(2, SWEEP_AXIS_VALUES), OPTIONAL, "number of values, both ends included"),
+    FIELD_CHOICE(SweepAxis, spacing, sweep_spacing_names, OPTIONAL, "spacing of a range: equal differences or equal ratios; linear if absent"),
     FIELD_END
 };
 
@@ -62,44 +62,44 @@ const Field pinned_record_fields[] = {
 };
 
 static const Field sweep_study_fields[] = {
-    FIELD_LIST(SweepStudy, axes, sweep_axis_fields, SWEEP_AXES, PRESENCE_REQUIRED, "what varies; changes are made in this order, and of a grid the last axis varies fastest"),
+    FIELD_LIST(SweepStudy, axes, sweep_axis_fields, SWEEP_AXES, PRESENCE_REQUIRED, "members that vary; they are set in this order, and in a grid the last axis varies fastest"),
     FIELD_CHOICE(SweepStudy, mode, sweep_mode_names, SWEEP_GRID, "grid: every combination of the axes' values; list: their first values together, then their second, and so on"),
-    FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, sweep_default_metrics, SWEEP_METRICS, PRESENCE_DEFAULT, 0, "what is kept of each point: the summary's numbers, and steps, the solver's"),
-    FIELD_LIST(SweepStudy, materials, buffer_fields, 0, PRESENCE_OPTIONAL, "numbers of the materials that the scene and the axes name, as they were when it was submitted; need not be given"),
-    FIELD_LIST(SweepStudy, records, pinned_record_fields, 0, PRESENCE_OPTIONAL, "ground motions that the axes name, as they were when it was submitted; need not be given"),
+    FIELD_TEXTS(SweepStudy, metrics, sweep_metric_names, sweep_default_metrics, SWEEP_METRICS, PRESENCE_DEFAULT, 0, "metrics kept of each point: numbers of the summary, and steps, the solver's"),
+    FIELD_LIST(SweepStudy, materials, buffer_fields, 0, PRESENCE_OPTIONAL, "numbers of the materials that the scene and the axes name, at submission; filled in if absent"),
+    FIELD_LIST(SweepStudy, records, pinned_record_fields, 0, PRESENCE_OPTIONAL, "ground motions that the axes name, at submission; filled in if absent"),
     FIELD_END
 };
 
 static const Field sweep_axis_values_fields[] = {
-    FIELD_TEXT(SweepAxisValues, pointer, 0, PRESENCE_OPTIONAL, 0, "what varies"),
+    FIELD_TEXT(SweepAxisValues, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies"),
     FIELD_TEXT(SweepAxisValues, unit, 0, PRESENCE_OPTIONAL, 0, "of its numbers"),
-    FIELD_TEXTS(SweepAxisValues, values, NULL, NULL, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "all that it takes"),
+    FIELD_TEXTS(SweepAxisValues, values, NULL, NULL, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "all its values"),
     FIELD_END
 };
 
 static const Field sweep_failure_fields[] = {
-    FIELD_CHOICE(StudyFailure, status, sweep_status_names, OPTIONAL, "in a word"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "points that failed so"),
+    FIELD_CHOICE(StudyFailure, status, sweep_status_names, OPTIONAL, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "points that failed for this reason"),
     {.name = "first_point", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "what that one said"),
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
     FIELD_END
 };
 
 static const Field sweep_table_fields[] = {
-    FIELD_COUNT(SweepTable, failed, NULL, AT_MIN(0), OPTIONAL, "points that came to nothing"),
-    FIELD_REALS(SweepTable, points, NULL, ANY, 0, PRESENCE_OPTIONAL, "numbers of the points that are there, from 0"),
-    FIELD_REALS(SweepTable, statuses, NULL, ANY, 0, PRESENCE_OPTIONAL, "what became of each: 0 made"),
-    FIELD_REALS(SweepTable, values, NULL, ANY, 0, PRESENCE_OPTIONAL, "the metrics of each"),
-    FIELD_LIST(SweepTable, failures, sweep_failure_fields, 0, PRESENCE_OPTIONAL, "points that failed, by how"),
+    FIELD_COUNT(SweepTable, failed, NULL, AT_MIN(0), OPTIONAL, "points that failed"),
+    FIELD_REALS(SweepTable, points, NULL, ANY, 0, PRESENCE_OPTIONAL, "numbers of the points made, from 0"),
+    FIELD_REALS(SweepTable, statuses, NULL, ANY, 0, PRESENCE_OPTIONAL, "status of each: 0 is made"),
+    FIELD_REALS(SweepTable, values, NULL, ANY, 0, PRESENCE_OPTIONAL, "metrics, row by row"),
+    FIELD_LIST(SweepTable, failures, sweep_failure_fields, 0, PRESENCE_OPTIONAL, "failed points by their reason"),
     FIELD_END
 };
 
 static const Field sweep_answer_fields[] = {
-    FIELD_COUNT(Sweep, points, NULL, AT_MIN(1), OPTIONAL, "points asked for"),
-    FIELD_CHOICE(Sweep, mode, sweep_mode_names, OPTIONAL, "how the axes go together"),
-    FIELD_LIST(Sweep, axes, sweep_axis_values_fields, 0, PRESENCE_DEFAULT, "what varies, in the order of the changes"),
-    FIELD_TEXTS(Sweep, metrics, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "what is kept of each point"),
-    FIELD_ITEM_OR_NULL(Sweep, table, sweep_table_fields, PRESENCE_OPTIONAL, "the rows, where they are not kept beside the result"),
+    FIELD_COUNT(Sweep, points, NULL, AT_MIN(1), OPTIONAL, "points requested"),
+    FIELD_CHOICE(Sweep, mode, sweep_mode_names, OPTIONAL, "combination of the axes"),
+    FIELD_LIST(Sweep, axes, sweep_axis_values_fields, 0, PRESENCE_DEFAULT, "members that vary, in the order in which they are set"),
+    FIELD_TEXTS(Sweep, metrics, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "metrics kept of each point"),
+    FIELD_ITEM_OR_NULL(Sweep, table, sweep_table_fields, PRESENCE_OPTIONAL, "the rows, unless they are stored beside the result"),
     FIELD_END
 };
 // clang-format on
@@ -110,11 +110,11 @@ static Status sweep_check_metrics(const SweepStudy *study, Problem *problem) {
             if (strcmp(study->metrics.at[i], study->metrics.at[k]) == 0) {
                 char place[sizeof((Fault){0}.pointer)];
                 pointer_index(place, sizeof place, "/study/metrics", i);
-                return problem_add(problem, STATUS_INVALID, place, "stands there twice");
+                return problem_add(problem, STATUS_INVALID, place, "is listed twice");
             }
     if (study->metrics.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/metrics",
-                           "must have at least one: rows of a sweep keep nothing else");
+                           "must have at least one: a row of a sweep holds nothing else");
     return STATUS_OK;
 }
 
@@ -231,11 +231,11 @@ typedef struct SweepWork {
     Sweep *answer;
 } SweepWork;
 
-static Status sweep_scene(const void *of, size_t member, const StudyTools *tools, Simulation *scene,
-                          void *part, Problem *problem) {
+static Status sweep_scene(const void *of, size_t member, Simulation *scene, void *part,
+                          Problem *problem) {
     const SweepWork *work = of;
     (void)part;
-    return sweep_grid_scene(work->grid, member, true, tools->limits, scene, problem);
+    return sweep_grid_scene(work->grid, member, true, work->work.limits, scene, problem);
 }
 
 // Memory for the rows is needed only here: an executor that stores rows does not fold them.
@@ -284,7 +284,7 @@ static Status sweep_begin(void *of, const StudyTools *tools, Problem *problem) {
     return sweep_fill(work->grid, work->answer, problem);
 }
 
-static const Kind sweep_answer = {"sweep", "what each point came to", sweep_answer_fields,
+static const Kind sweep_answer = {"sweep", "result of each point", sweep_answer_fields,
                                   sizeof(Sweep)};
 
 const StudyKind study_sweep = {

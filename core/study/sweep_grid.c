@@ -269,15 +269,15 @@ static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
             if (strcmp(axes->at[i].pointer, axes->at[k].pointer) == 0) {
                 snprintf(place, sizeof place, "/study/axes/%zu/pointer", i);
                 status = problem_add(problem, STATUS_INVALID, place,
-                                     "is the pointer of axis %zu too: one axis each", k);
+                                     "is also the pointer of axis %zu: give one axis each", k);
             }
         const size_t length = sweep_axis_length(&axes->at[i]),
                      first = sweep_axis_length(&axes->at[0]);
         snprintf(place, sizeof place, "/study/axes/%zu", i);
         if (status == STATUS_OK && study->mode == SWEEP_LIST && length != first)
             status = problem_add(problem, STATUS_INVALID, place,
-                                 "has %zu values, the first axis has %zu: in a list all are as "
-                                 "long",
+                                 "has %zu values, the first axis has %zu: in a list all must "
+                                 "have the same number",
                                  length, first);
     }
     return status;

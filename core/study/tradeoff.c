@@ -18,17 +18,17 @@ static const double default_errors[METRICS] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3};
 
 // clang-format off
 static const Field tradeoff_study_fields[] = {
-    FIELD_REAL(TradeoffStudy, error, NULL, AT_MIN(0), OPTIONAL, "error wanted, in the metric's unit; 1e-3 if absent, 1e-2 of mean_acceleration and peak_force, no impact, 0.1 dB"),
-    FIELD_CHOICE(TradeoffStudy, metric, metric_names, METRIC_DISPLACEMENT, "what the error is of"),
-    FIELD_COUNT(TradeoffStudy, repeats, NULL, WITHIN(1, REPEATS_MAX), 5, "timings of each point; the smallest and the median are told"),
-    FIELD_TEXTS(TradeoffStudy, solvers, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0, "solvers that are tried; all if absent"),
-    FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 5e7, "solver steps that a point may be foretold to take; it is refused beyond"),
-    FIELD_COUNT(TradeoffStudy, trial, NULL, AT_MIN(1), 1, "another number measures the CPU times anew; the same one is answered from what was measured"),
+    FIELD_REAL(TradeoffStudy, error, NULL, AT_MIN(0), OPTIONAL, "wanted error, in the metric's unit; if absent 1e-3, for mean_acceleration and peak_force 1e-2, for impacts 0, for psd 0.1 dB"),
+    FIELD_CHOICE(TradeoffStudy, metric, metric_names, METRIC_DISPLACEMENT, "metric of the error"),
+    FIELD_COUNT(TradeoffStudy, repeats, NULL, WITHIN(1, REPEATS_MAX), 5, "timings of each point, of which the smallest and the median are reported"),
+    FIELD_TEXTS(TradeoffStudy, solvers, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0, "solvers to try; all if absent"),
+    FIELD_REAL(TradeoffStudy, point_steps, NULL, WITHIN(1, 1e15), 5e7, "limit on the estimated solver steps of a point; a more expensive one is refused"),
+    FIELD_COUNT(TradeoffStudy, trial, NULL, AT_MIN(1), 1, "another number measures the CPU times again; the same number returns the stored answer"),
     FIELD_END
 };
 
 static const Field tradeoff_reference_fields[] = {
-    FIELD_TEXT(TradeoffReference, solver, 0, PRESENCE_OPTIONAL, 0, "solver that the points are compared with"),
+    FIELD_TEXT(TradeoffReference, solver, 0, PRESENCE_OPTIONAL, 0, "reference solver"),
     FIELD_BASE(TradeoffReference, yardstick, reference_summary_fields),
     FIELD_END
 };
@@ -40,13 +40,13 @@ static const Field tradeoff_recommendation_fields[] = {
 };
 
 static const Field tradeoff_answer_fields[] = {
-    FIELD_CHOICE(Tradeoff, metric, metric_names, OPTIONAL, "what the error wanted is of"),
-    FIELD_REAL(Tradeoff, error, NULL, ANY, OPTIONAL, "error wanted"),
+    FIELD_CHOICE(Tradeoff, metric, metric_names, OPTIONAL, "metric of the wanted error"),
+    FIELD_REAL(Tradeoff, error, NULL, ANY, OPTIONAL, "wanted error"),
     FIELD_COUNT(Tradeoff, repeats, NULL, AT_MIN(1), OPTIONAL, "timings of each point"),
     FIELD_COUNT(Tradeoff, trial, NULL, AT_MIN(1), OPTIONAL, "number of the measurement"),
-    FIELD_ITEM(Tradeoff, reference, tradeoff_reference_fields, NULL, PRESENCE_DEFAULT, "what the points are compared with"),
-    FIELD_LIST(Tradeoff, points, tradeoff_point_fields, 0, PRESENCE_DEFAULT, "the ways tried"),
-    FIELD_ITEM(Tradeoff, recommendation, tradeoff_recommendation_fields, NULL, PRESENCE_DEFAULT, "the point to take"),
+    FIELD_ITEM(Tradeoff, reference, tradeoff_reference_fields, NULL, PRESENCE_DEFAULT, "reference of all points"),
+    FIELD_LIST(Tradeoff, points, tradeoff_point_fields, 0, PRESENCE_DEFAULT, "settings tried"),
+    FIELD_ITEM(Tradeoff, recommendation, tradeoff_recommendation_fields, NULL, PRESENCE_DEFAULT, "the recommended point"),
     FIELD_END
 };
 // clang-format on
@@ -332,12 +332,12 @@ static Status tradeoff_study_run(const void *request, const Simulation *simulati
     return status;
 }
 
-static const Kind tradeoff_answer = {"tradeoff", "what speed costs in accuracy, measured",
+static const Kind tradeoff_answer = {"tradeoff", "accuracy against CPU time, measured",
                                      tradeoff_answer_fields, sizeof(Tradeoff)};
 
 const StudyKind study_tradeoff = {
     .kind = {"tradeoff",
-             "error against CPU time over solvers, steps and what else may be traded for speed",
+             "error against CPU time over solvers, steps and other settings traded for speed",
              tradeoff_study_fields, sizeof(TradeoffStudy)},
     .answer = &tradeoff_answer,
     .shorten = "ask for fewer solvers or repeats, or lower point_steps",

@@ -291,7 +291,7 @@ static void what_cannot_be_answered_is_refused(void **state) {
 
     inquiry = study_request_make(600, 20);
     inquiry.simulation.output.psd.segment = 600000;
-    assert_refused(&inquiry, NULL, "/output/psd/segment", "takes at most 262144");
+    assert_refused(&inquiry, NULL, "/output/psd/segment", "at most 262144 are allowed");
 
     inquiry = study_request_make(1, 2000);
     const SimulationLimits limits = {.steps = 1e5};

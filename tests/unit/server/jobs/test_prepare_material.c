@@ -416,16 +416,16 @@ static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
         const char *members, *pointer, *detail;
     } cases[] = {
         {", \"spread\": [{\"damper\": 2, \"restitution\": 0.02}]", "/study/spread/0/damper",
-         "is the number of no damper"},
+         "must be the number of a damper"},
         {", \"spread\": [{\"damper\": 1, \"buffer\": \"left_buffer\"}]", "/study/spread/0/buffer",
-         "stands at no stop"},
-        {", \"spread\": [{\"damper\": 1}, {\"damper\": 1}]", "/study/spread/1", "one each"},
+         "is not given: if both"},
+        {", \"spread\": [{\"damper\": 1}, {\"damper\": 1}]", "/study/spread/1", "give one each"},
         {", \"spread\": [{\"damper\": 1, \"source\": \"sponge@1\", \"restitution\": 0.1}]",
-         "/study/spread/0/source", "is not what stands at that buffer"},
+         "/study/spread/0/source", "is not the material of that buffer"},
         {", \"spread\": [{\"damper\": 1, \"source\": \"foam@1\", \"restitution\": 0.2}]",
-         "/study/spread/0/restitution", "is 0.2, but foam@1 tells 0.1"},
+         "/study/spread/0/restitution", "is 0.2, but foam@1 records 0.1"},
         {", \"restitution_deviation\": 0.1, \"spread\": [{\"damper\": 1, \"restitution\": 0.1}]",
-         "/study/spread/0/restitution", "must be left out: restitution_deviation says it"},
+         "/study/spread/0/restitution", "must be left out: restitution_deviation gives it"},
         {", \"spread\": [{\"damper\": 1, \"restitution\": 1.5}]", "/study/spread/0/restitution",
          "must be within [0, 1]"},
     };
@@ -437,7 +437,7 @@ static void what_a_study_says_itself_wins_over_what_was_recorded(void **state) {
     }
     say("wild", SAID("\"restitution\": 0.1, \"restitution_deviation\": 0.2"));
     assert_int_equal(prepare("\"buffer\": \"wild\"", SENSITIVITY("")), STATUS_INVALID);
-    expect_fault("/study/spread/0/restitution", "is 2 of its value, as wild@1 tells");
+    expect_fault("/study/spread/0/restitution", "is 2 of its value, as wild@1 records");
     prepare_well("\"buffer\": \"wild\"", SENSITIVITY(", \"restitution_deviation\": 0.4"));
 }
 
