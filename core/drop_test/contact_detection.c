@@ -213,25 +213,7 @@ static Status detection_find_baseline(const Reals *force, ContactDetection *dete
     return STATUS_OK;
 }
 
-static bool detection_add_run(ContactDetection *detection, const DetectedContact *run,
-                              size_t *room) {
-    if (detection->count == TRACE_CONTACTS_MAX) {
-        detection->is_full = true;
-        return true;
-    }
-    if (detection->count == *room) {
-        const size_t more = *room == 0 ? 16 : 2 * *room;
-        DetectedContact *runs = realloc(detection->runs, more * sizeof *runs);
-        if (runs == NULL)
-            return false;
-        detection->runs = runs;
-        *room = more;
-    }
-    detection->runs[detection->count++] = *run;
-    return true;
-}
-
-// Whether `next` detection_is_same to the contact `run`: as its tensile part, which is smaller and
+// Whether `next` belongs to the contact `run`: as its tensile part, which is smaller and
 // follows soon, or after noise that fell below the threshold but not to the baseline.
 static bool detection_is_same(const ContactDetection *detection, const DetectedContact *run,
                               const DetectedContact *next) {
@@ -249,8 +231,7 @@ static bool detection_is_same(const ContactDetection *detection, const DetectedC
     return fabs(sum) > detection->threshold / 2 * (double)gap && (sum > 0) == (run->peak > 0);
 }
 
-static Status detection_find_runs(size_t count, ContactDetection *detection) {
-    size_t room = 0;
+static void detection_find_runs(size_t count, ContactDetection *detection) {
     for (size_t i = 0; i < count; i++) {
         const double value = detection->force[i];
         if (!(fabs(value) > detection->threshold))
@@ -268,8 +249,9 @@ static Status detection_find_runs(size_t count, ContactDetection *detection) {
         DetectedContact *before =
             detection->count > 0 ? &detection->runs[detection->count - 1] : NULL;
         if (before == NULL || detection->is_full || !detection_is_same(detection, before, &run)) {
-            if (!detection_add_run(detection, &run, &room))
-                return STATUS_NO_MEMORY;
+            detection->is_full = detection->count == TRACE_CONTACTS_MAX;
+            if (!detection->is_full)
+                detection->runs[detection->count++] = run;
             continue;
         }
         before->last = run.last;
@@ -279,7 +261,6 @@ static Status detection_find_runs(size_t count, ContactDetection *detection) {
                 before->peak = run.peak;
         }
     }
-    return STATUS_OK;
 }
 
 Status contact_detection_run(const Reals *force, double threshold, ContactDetection *detection) {
@@ -293,11 +274,11 @@ Status contact_detection_run(const Reals *force, double threshold, ContactDetect
         largest = fmax(largest, fabs(detection->force[i]));
     detection->threshold =
         isnan(threshold) ? fmax(6 * detection->noise, 0.002 * largest) : threshold;
-    return detection_find_runs(force->count, detection);
+    detection_find_runs(force->count, detection);
+    return STATUS_OK;
 }
 
 void contact_detection_clear(ContactDetection *detection) {
     free(detection->force);
-    free(detection->runs);
     *detection = (ContactDetection){.count = 0};
 }

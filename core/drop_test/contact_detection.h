@@ -22,7 +22,7 @@ typedef struct ContactDetection {
     double noise;       // standard deviation [N]
     double noise_count; // samples outside contacts, from which it is estimated
     double threshold;   // [N]
-    DetectedContact *runs;
+    DetectedContact runs[TRACE_CONTACTS_MAX];
     size_t count;
     bool is_full; // more than TRACE_CONTACTS_MAX were found; the others are left out
 } ContactDetection;

@@ -57,48 +57,37 @@ static double trace_hidden(double level, int separation, double *before) {
     return most;
 }
 
-// The part of the trace in which one contact is fitted.
-typedef struct TracePart {
-    size_t from, to;             // samples from .. to - 1
-    bool is_at_begin, is_at_end; // of the trace
-} TracePart;
-
-static TracePart trace_part(const ContactDetection *found, size_t count, size_t number) {
+// Fills the window in which contact `number` is fitted. Returns its first sample.
+static size_t trace_fill_window(const ContactDetection *found, size_t number, int separation,
+                                FitWindow *window) {
     const DetectedContact *run = &found->runs[number];
-    const size_t length = run->last - run->first + 1;
     const double level = found->threshold / fabs(run->peak);
-    double before;
-    const double after = trace_hidden(level, SEPARATION_ZERO_PENETRATION, &before);
-    const size_t about = (size_t)((double)length * (4 + 2 * after)) + 24;
-    TracePart part = {.from = run->first > about ? run->first - about : 0,
-                      .to = count - run->last > about ? run->last + about : count};
+    const size_t run_length = run->last - run->first + 1, count = found->samples;
+    double before, after = trace_hidden(level, SEPARATION_ZERO_PENETRATION, &before);
+    const size_t about = (size_t)((double)run_length * (4 + 2 * after)) + 24;
+    size_t from = run->first > about ? run->first - about : 0;
+    size_t to = count - run->last > about ? run->last + about : count;
     // A contact may continue below the threshold: it gets two thirds of the gap behind it.
     if (number > 0) {
-        const size_t end = found->runs[number - 1].last;
-        const size_t wall = run->first - (run->first - end) / 3;
-        part.from = part.from > wall ? part.from : wall;
+        const size_t wall = run->first - (run->first - found->runs[number - 1].last) / 3;
+        from = from > wall ? from : wall;
     }
     if (number + 1 < found->count) {
         const size_t gap = found->runs[number + 1].first - run->last - 1;
         const size_t wall = run->last + 1 + gap * 2 / 3;
-        part.to = part.to < wall ? part.to : wall;
+        to = to < wall ? to : wall;
     }
-    return part;
-}
-
-static void trace_fill_window(const ContactDetection *found, const DetectedContact *run,
-                              const TracePart *part, int separation, FitWindow *window) {
-    const size_t samples = part->to - part->from;
+    const size_t samples = to - from;
     const size_t m = (samples + FIT_BLOCKS_MAX - 1) / FIT_BLOCKS_MAX;
     *window = (FitWindow){
         .blocks = samples / m,
         .per_block = m,
         .separation = separation,
-        .first = (long)(run->first - part->from),
-        .last = (long)(run->last - part->from),
+        .first = (long)(run->first - from),
+        .last = (long)(run->last - from),
     };
     for (size_t k = 0; k < window->blocks; k++) {
-        const double *force = found->force + part->from + k * m;
+        const double *force = found->force + from + k * m;
         double sum = 0;
         for (size_t i = 0; i < m; i++)
             sum += force[i] / run->peak;
@@ -110,15 +99,15 @@ static void trace_fill_window(const ContactDetection *found, const DetectedConta
     const double noise = found->noise / run->peak;
     window->noise_freedom = fmax(found->noise_count - (double)samples, 0);
     window->noise_square = noise * noise * window->noise_freedom;
-    double before;
-    const double after = trace_hidden(found->threshold / fabs(run->peak), separation, &before);
-    const double length = (double)(window->last - window->first + 1);
+    after = trace_hidden(level, separation, &before);
+    const double length = (double)run_length;
     const long end = (long)(window->blocks * m) - 1;
     window->least_start = window->first - (long)ceil(1.5 * before * length) - 2 - (long)length / 8;
     window->most_end = window->last + (long)ceil(1.5 * after * length) + 2 + (long)length / 8;
     // At least one sample on each side must be out of contact.
     window->least_start = window->least_start > 1 ? window->least_start : 1;
     window->most_end = window->most_end < end - 1 ? window->most_end : end - 1;
+    return from;
 }
 
 // The interval without a fit: from the samples above the threshold.
@@ -180,9 +169,9 @@ static Status trace_conclude(const FitConfidence *likely, bool is_form_sure, dou
     }
     if (likely->decay.mean + 2 * likely->decay.deviation > decay_max) {
         trace_withdraw(counted, contact);
-        return trace_status(
-            sentence(&contact->why, "the force has no distinct end: pulses with a restitution of "
-                                    "nearly 0 fit the trace as well"));
+        return trace_status(sentence(&contact->why,
+                                     "the force has no distinct end: pulses with a restitution of "
+                                     "nearly 0 fit the trace as well"));
     }
     return STATUS_OK;
 }
@@ -205,13 +194,12 @@ static Status trace_draw(const PulseFit *fit, const PulseModel *model,
 }
 
 static Status trace_fit_contact(FitWindow *window, const ContactDetection *found,
-                                const DetectedContact *run, const TracePart *part, double interval,
+                                const DetectedContact *run, double origin, double interval,
                                 const PulseFit *fits, size_t count, TraceContact *contact) {
     if (count == 0)
         return trace_status(sentence(&contact->why, "no pulse of the model fits"));
     const PulseFit *fit = &fits[0];
     contact->seen.samples = (uint64_t)(fit->last - fit->first + 1);
-    const double origin = (double)part->from;
     contact->seen.first = (origin + (double)fit->first) * interval;
     contact->seen.last = (origin + (double)fit->last) * interval;
     PulseModel model;
@@ -305,10 +293,9 @@ static size_t trace_fit_pulled(const TraceOptions *options, size_t number, doubl
 }
 
 static Status trace_read_contact(double interval, const TraceOptions *options,
-                                 const ContactDetection *found, size_t samples, size_t number,
-                                 FitWindow *window, TraceContact *contact) {
+                                 const ContactDetection *found, size_t number, FitWindow *window,
+                                 TraceContact *contact) {
     const DetectedContact *run = &found->runs[number];
-    const TracePart part = trace_part(found, samples, number);
     const double none = (double)NAN;
     *contact = (TraceContact){.contact_time = none,
                               .contact_time_uncertainty = none,
@@ -325,23 +312,23 @@ static Status trace_read_contact(double interval, const TraceOptions *options,
     contact->seen.crossing_time = (double)(run->pressed - run->first + 1) * interval;
     contact->seen.crossing_uncertainty = interval / sqrt(6);
     trace_count_samples(found, run, options->separation, interval, contact);
-    if (run->first == 0 || run->last == samples - 1) {
+    if (run->first == 0 || run->last == found->samples - 1) {
         contact->most_contact_time = (double)NAN;
         return trace_status(sentence(&contact->why, "the trace %s during the contact",
                                      run->first == 0 ? "begins" : "ends"));
     }
-    trace_fill_window(found, run, &part, options->separation, window);
+    const size_t from = trace_fill_window(found, number, options->separation, window);
     PulseFit fits[FITS_MAX];
     bool is_settled = true;
     const size_t count = options->gravity > 0
                              ? trace_fit_pulled(options, number, interval, fabs(run->peak), window,
                                                 fits, &is_settled)
                              : pulse_fit_run(window, fits);
-    TRY(trace_fit_contact(window, found, run, &part, interval, fits, count, contact));
+    TRY(trace_fit_contact(window, found, run, (double)from, interval, fits, count, contact));
     if (!is_settled && !isnan(contact->contact_time))
-        return trace_status(
-            sentence(&contact->why, "gravity is only partly corrected: the masses and this force "
-                                    "do not lead to one approach speed; check them, or give it"));
+        return trace_status(sentence(&contact->why,
+                                     "gravity is only partly corrected: the masses and this force "
+                                     "do not lead to one approach speed; check them, or give it"));
     if (options->gravity > 0 && !(window->pull_rate > 0) && !isnan(contact->contact_time))
         return trace_status(sentence(
             &contact->why,
@@ -367,33 +354,27 @@ Status trace_analysis_run(double interval, const Reals *force, const TraceOption
                           const char *pointer, TraceAnalysis *analysis, Problem *problem) {
     *analysis = (TraceAnalysis){.why = NULL};
     TRY(trace_validate(interval, force, pointer, problem));
+    TraceContacts *list = &analysis->contacts;
     ContactDetection found;
-    FitWindow *window = malloc(sizeof *window);
     Status status = contact_detection_run(force, options->threshold, &found);
-    if (status == STATUS_OK && window != NULL && found.count > 0) {
-        analysis->contacts.at = calloc(found.count, sizeof *analysis->contacts.at);
-        if (analysis->contacts.at == NULL)
-            status = STATUS_NO_MEMORY;
-    }
-    if (window == NULL)
+    FitWindow *window = malloc(sizeof *window);
+    list->at = status == STATUS_OK ? calloc(found.count + 1, sizeof *list->at) : NULL;
+    if (window == NULL || list->at == NULL)
         status = STATUS_NO_MEMORY;
-    if (status == STATUS_OK) {
-        for (size_t i = 0; i < found.count && status == STATUS_OK; i++) {
-            if (!progress_advance(options->progress, (double)i / (double)found.count)) {
-                status = STATUS_CANCELLED;
-                break;
-            }
-            analysis->contacts.count++;
-            status = trace_read_contact(interval, options, &found, force->count, i, window,
-                                        &analysis->contacts.at[i]);
+    for (size_t i = 0; status == STATUS_OK && i < found.count; i++) {
+        if (!progress_advance(options->progress, (double)i / (double)found.count)) {
+            status = STATUS_CANCELLED;
+            break;
         }
-        if (status == STATUS_OK && found.count == 0)
-            status = trace_status(sentence(
-                &analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
-        if (status == STATUS_OK && found.is_full)
-            status = trace_status(sentence(
-                &analysis->why, "only the first %d contacts are evaluated", TRACE_CONTACTS_MAX));
+        list->count++;
+        status = trace_read_contact(interval, options, &found, i, window, &list->at[i]);
     }
+    if (status == STATUS_OK && found.count == 0)
+        status = trace_status(
+            sentence(&analysis->why, "no force exceeds the threshold of %.3g N", found.threshold));
+    if (status == STATUS_OK && found.is_full)
+        status = trace_status(sentence(&analysis->why, "only the first %d contacts are evaluated",
+                                       TRACE_CONTACTS_MAX));
     contact_detection_clear(&found);
     free(window);
     return status;
