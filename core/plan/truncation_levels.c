@@ -16,7 +16,7 @@
 #include <stdlib.h>
 
 #include "core/excitation/chirp.h"
-#include "core/excitation/pulse_common.h"
+#include "core/excitation/pulse.h"
 #include "core/excitation/random.h"
 #include "core/excitation/sine.h"
 #include "core/plan/truncation_mode.h"
