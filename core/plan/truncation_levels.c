@@ -209,20 +209,6 @@ static void chirp(Level *level, Wave *wave, const Mode *mode, const ExcitationCh
     level->least = fmax(level->least, size / (omega * 2 * pi * fmax(low, f)) / 2);
 }
 
-bool levels_is_still(const Scene *scene) {
-    const Variant *of = scene->excitation;
-    const void *any = of;
-    if (of->kind == &excitation_sine.kind)
-        return ((const ExcitationSine *)any)->amplitude == 0;
-    if (of->kind == &excitation_random.kind)
-        return ((const ExcitationRandom *)any)->rms == 0;
-    if (of->kind == &excitation_chirp.kind)
-        return ((const ExcitationChirp *)any)->amplitude == 0;
-    if (of->kind == &excitation_half_sine.kind || of->kind == &excitation_triangular.kind)
-        return ((const ExcitationPulse *)any)->amplitude == 0;
-    return of->kind == &excitation_free.kind;
-}
-
 static void base_level(Level *level, Wave *wave, const Mode *mode, const Variant *of) {
     const void *any = of;
     if (of->kind == &excitation_sine.kind)
@@ -280,7 +266,7 @@ static void couple(const Plan *plan, const Wave *wave, Level *levels, double *ro
 
 Status levels_make(const Plan *plan, const Scene *scene, Level *levels, Wave *wave) {
     const size_t n = plan->storeys;
-    const bool is_still = levels_is_still(scene);
+    const bool is_still = excitation_is_still(scene_excitation(scene));
     double *carried = calloc(n, 2 * sizeof *carried);
     if (carried == NULL)
         return STATUS_NO_MEMORY;

@@ -26,7 +26,4 @@ typedef struct Wave {
 // levels[k] of all modes of the plan.
 Status levels_make(const Plan *plan, const Scene *scene, Level *levels, Wave *wave);
 
-// Whether the scene's base never moves.
-bool levels_is_still(const Scene *scene);
-
 #endif
