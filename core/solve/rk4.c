@@ -3,7 +3,7 @@
 // force jumps or bends between the stages, and the order is the first.
 #include <stdlib.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/steps_run.h"
 
 enum { STAGES = 4, TOTALS = 2 };

@@ -14,7 +14,7 @@
 // with all others that press or are met; it leaves where a step takes it away from the stop.
 #include <math.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/collision.h"
 #include "core/solve/time_stepping.h"
 

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/time_stepping.h"
 
 // Explicit steps that are too long for what is known beforehand to move.

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "core/math/ode.h"
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 
 // Parts of the fastest period and of the shortest contact that a step is of by itself.
 static const double PARTS = 30;

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/math/ode.h"
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "tests/support/base_at.h"
 
 enum { X, V, R, W, J, SIZE };
