@@ -1,10 +1,10 @@
-// The base's acceleration a_g(t) as a solver meets it: still, linear between samples, a sine, or a
-// few pieces; exact in each form. Not an excitation: how the samples came about is the excitation's
-// business. Used by excite/, solve/ and simulation/.
+// The base's acceleration a_g(t) for the solvers: still, linear between samples, a sine, or a few
+// pieces. Each form is exact.
 #ifndef CORE_EXCITATION_BASE_MOTION_H
 #define CORE_EXCITATION_BASE_MOTION_H
 
 #include <stddef.h>
+#include <stdlib.h>
 
 typedef enum BaseForm { BASE_STILL, BASE_SAMPLED, BASE_SINE, BASE_PIECES } BaseForm;
 
@@ -20,16 +20,21 @@ typedef struct BasePiece {
 // All zero is a still base.
 typedef struct Base {
     BaseForm form;
-    double
-        *values; // BASE_SAMPLED: owned, a_g at t = i * interval [m/s^2]; still after the last one
+    // BASE_SAMPLED: owned, a_g at t = i * interval [m/s^2]; still after the last one
+    double *values;
     size_t count;
     double interval;  // [s]
     double amplitude; // BASE_SINE: a_g = amplitude * sin(omega t) [m/s^2]
-    double omega;     // of all that turns: BASE_SINE, and BASE_PIECES (0: they are linear) [rad/s]
-    BasePiece pieces[BASE_PIECES_MAX]; // BASE_PIECES: by time; still before the first one
+    double omega;     // BASE_SINE, and BASE_PIECES, where 0 means linear pieces [rad/s]
+    BasePiece pieces[BASE_PIECES_MAX]; // BASE_PIECES: by time; still before the first
     size_t piece_count;
 } Base;
 
-void base_clear(Base *base);
+static inline void base_clear(Base *base) {
+    if (base == NULL)
+        return;
+    free(base->values);
+    *base = (Base){0};
+}
 
 #endif

@@ -3,9 +3,9 @@
 //
 //   a_g - h^2/12 a_g'',   a_g'' = A (p'' cos p - p'^2 sin p),
 //
-// so that the lines run as much above the sweep as below it: the mean error over each line is 0 to
-// the fourth order, and the largest is (p' h)^2 / 12 of the amplitude instead of / 8. A structure,
-// far slower than the knots, feels the mean.
+// so that the mean error over each line is 0 to the fourth order and the largest is (p' h)^2 / 12
+// of the amplitude instead of / 8. A structure that is far slower than the knots responds to the
+// mean.
 #include "core/excitation/chirp.h"
 
 #include <stdlib.h>
@@ -30,18 +30,18 @@ static const ExcitationChirp *chirp_of(const Excitation *excitation) {
     return (const ExcitationChirp *)(const void *)excitation;
 }
 
-static double highest(const ExcitationChirp *chirp) {
+static double chirp_highest(const ExcitationChirp *chirp) {
     return fmax(chirp->start_frequency, chirp->end_frequency);
 }
 
-// Lines in the whole sweep, so that a knot ends it.
-static double line_count(const ExcitationChirp *chirp) {
+// Lines in the whole sweep; a knot ends it.
+static double chirp_lines(const ExcitationChirp *chirp) {
     return fmax(ceil(chirp->sweep_time * chirp->rate * (1 - 1e-12)), 1);
 }
 
-// Knots up to the end of the sweep or, where the run ends first, one past it.
-static double knot_count(const ExcitationChirp *chirp, const Span *span) {
-    const double lines = line_count(chirp);
+// Knots up to the end of the sweep, or one past the end of the run where that is earlier.
+static double chirp_knots(const ExcitationChirp *chirp, const Span *span) {
+    const double lines = chirp_lines(chirp);
     if (chirp->sweep_time < span->duration)
         return lines + 1;
     return floor(span->duration / chirp->sweep_time * lines * (1 + 1e-12)) + 2;
@@ -53,33 +53,34 @@ static Status chirp_complete(Excitation *excitation, const Span *span, const cha
     if (isnan(chirp->sweep_time))
         chirp->sweep_time = span->duration;
     if (!(chirp->start_frequency >= 0) || !(chirp->end_frequency >= 0) ||
-        !isfinite(highest(chirp)) || !(chirp->sweep_time > 0) || !isfinite(chirp->sweep_time))
-        return STATUS_OK; // told by the rows
+        !isfinite(chirp_highest(chirp)) || !(chirp->sweep_time > 0) || !isfinite(chirp->sweep_time))
+        return STATUS_OK; // the row adds the fault
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
     pointer_join(place, sizeof place, pointer, "end_frequency");
-    if (highest(chirp) == 0)
+    if (chirp_highest(chirp) == 0)
         return problem_add_real(problem, STATUS_INVALID, place, chirp->end_frequency, "Hz",
                                 "must be above 0 Hz where the start frequency is 0 Hz");
     if (isnan(chirp->rate))
-        chirp->rate =
-            span->sample_rate * fmax(ceil(KNOTS_A_CYCLE * highest(chirp) / span->sample_rate), 1);
+        chirp->rate = span->sample_rate *
+                      fmax(ceil(KNOTS_A_CYCLE * chirp_highest(chirp) / span->sample_rate), 1);
     const size_t most = span->most != 0 && span->most < KNOTS_MAX ? span->most : KNOTS_MAX;
     pointer_join(place, sizeof place, pointer, "rate");
-    if (highest(chirp) > chirp->rate / 2)
+    if (chirp_highest(chirp) > chirp->rate / 2)
         return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
                                 "must be at least twice the highest frequency, %s Hz, is %s",
-                                text_real(limit, 2 * highest(chirp)), text_real(is, chirp->rate));
-    if (!(knot_count(chirp, span) - 2 <= (double)most))
+                                text_real(limit, 2 * chirp_highest(chirp)),
+                                text_real(is, chirp->rate));
+    if (!(chirp_knots(chirp, span) - 2 <= (double)most))
         return problem_add_real(problem, STATUS_INVALID, place, chirp->rate, "Hz",
                                 "must make at most %zu knots of the base's acceleration, %s makes "
                                 "%.0f",
-                                most, text_real(is, chirp->rate), knot_count(chirp, span) - 2);
+                                most, text_real(is, chirp->rate), chirp_knots(chirp, span) - 2);
     return STATUS_OK;
 }
 
 static double chirp_interval(const Excitation *excitation) {
     const ExcitationChirp *chirp = chirp_of(excitation);
-    return chirp->sweep_time / line_count(chirp);
+    return chirp->sweep_time / chirp_lines(chirp);
 }
 
 static double chirp_lasts(const Excitation *excitation) {
@@ -90,7 +91,7 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const P
                          Base *base, Problem *problem) {
     const ExcitationChirp *chirp = chirp_of(excitation);
     *base = (Base){0};
-    const double wanted = knot_count(chirp, span);
+    const double wanted = chirp_knots(chirp, span);
     if (!(wanted <= KNOTS_MAX + 2))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d knots, not %.0f",
                            KNOTS_MAX, wanted);
@@ -125,18 +126,22 @@ static double chirp_fastest(const Excitation *excitation) {
 static void chirp_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                         Problem *doubts) {
     const ExcitationChirp *chirp = chirp_of(excitation);
-    const double omega = 2 * (double)PI * highest(chirp), turn = omega / chirp->rate;
+    const double omega = 2 * (double)PI * chirp_highest(chirp), turn = omega / chirp->rate;
     char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
     pointer_join(place, sizeof place, pointer, "rate");
     if (turn * turn / 12 > 1e-3)
         (void)problem_add(doubts, STATUS_INVALID, place,
                           "is %s Hz, too few for %s Hz: the lines between the knots miss the sweep "
                           "by up to %.2g of its amplitude",
-                          text_real(is, chirp->rate), text_real(limit, highest(chirp)),
+                          text_real(is, chirp->rate), text_real(limit, chirp_highest(chirp)),
                           turn * turn / 12);
     const bool is_end = chirp->end_frequency >= chirp->start_frequency;
-    excitation_doubt_frequency(highest(chirp), span, pointer,
+    excitation_doubt_frequency(chirp_highest(chirp), span, pointer,
                                is_end ? "end_frequency" : "start_frequency", doubts);
+}
+
+static bool chirp_is_still(const Excitation *excitation) {
+    return chirp_of(excitation)->amplitude == 0;
 }
 
 const ExcitationKind excitation_chirp = {
@@ -147,6 +152,7 @@ const ExcitationKind excitation_chirp = {
     .interval = chirp_interval,
     .lasts = chirp_lasts,
     .effort = 1.5,
+    .is_still = chirp_is_still,
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

@@ -1,5 +1,4 @@
-// A sweep of the base's acceleration from one frequency to another, as the scene gives it.
-// Not the motion itself (base.h). Used by chirp.c and by tests; everyone else sees an Excitation.
+// The settings of a sweep of the base's acceleration.
 #ifndef CORE_EXCITATION_CHIRP_H
 #define CORE_EXCITATION_CHIRP_H
 

@@ -1,6 +1,5 @@
-// What ONE excitation is; excitations.c lists all. It yields the base's acceleration over the whole
-// run. The initial state belongs to it because every kind takes one. Not the solver's view of a
-// step: that is base.h. Used by scene/, plan/ and simulation/.
+// One kind of excitation: the initial state and the base's motion over the whole run. excitations.c
+// lists all kinds.
 #ifndef CORE_EXCITATION_EXCITATION_H
 #define CORE_EXCITATION_EXCITATION_H
 
@@ -16,35 +15,35 @@ typedef struct Excitation {
     Reals velocity;     // [m/s]
 } Excitation;
 
-// What an excitation needs to know of the run it serves.
+// Properties of the run on which an excitation depends.
 typedef struct Span {
     double duration;          // [s]
     double sample_rate;       // [Hz]
-    size_t most;              // samples at most, 0: no limit
+    size_t most;              // limit on the samples of the base, 0: none
     FourierStock *transforms; // may be NULL
 } Span;
 
 typedef struct ExcitationKind {
     Kind kind;
-    // Judges what the run does not matter for, beside what rows can see. NULL: nothing.
+    // Validates what does not depend on the run and no row can express. NULL: nothing.
     Status (*check)(const Excitation *excitation, const char *pointer, Problem *problem);
-    // Judges what ranges cannot say and completes defaults that depend on the run, below `pointer`.
-    // May be NULL.
+    // Validates what depends on the run and completes its defaults, below `pointer`. NULL: nothing.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
                        Problem *problem);
-    // The fastest the base moves, beyond what its samples show [rad/s]. NULL: it has nothing
-    // faster.
+    // The highest frequency of the base's motion [rad/s]. NULL: no higher than its samples show.
     double (*fastest)(const Excitation *excitation);
-    // Between the samples by which the base is known [s]. NULL: it is known in closed form.
+    // Between the samples of the base [s]. NULL: the base has a closed form.
     double (*interval)(const Excitation *excitation);
-    // Until when it has samples [s]. NULL: to the run's end.
+    // The time of its last sample [s]. NULL: the end of the run.
     double (*lasts)(const Excitation *excitation);
-    double effort; // of making one of them, in solver steps
-    // Makes the base's motion over span->duration. `base` is cleared by base_clear. Stops when
-    // `progress` says so.
+    double effort; // cost of one sample, in solver steps
+    // Whether the base never moves. NULL: it may move.
+    bool (*is_still)(const Excitation *excitation);
+    // Makes the base's motion over span->duration; the caller clears `base` with base_clear.
+    // STATUS_CANCELLED where `progress` stops it.
     Status (*make)(const Excitation *excitation, const Span *span, const Progress *progress,
                    Base *base, Problem *problem);
-    // Adds what is allowed but hardly meant to `doubts`, below `pointer`. NULL: nothing to doubt.
+    // Adds values that are allowed but hardly intended to `doubts`, below `pointer`. NULL: none.
     void (*doubt)(const Excitation *excitation, const Span *span, const char *pointer,
                   Problem *doubts);
 } ExcitationKind;
@@ -55,12 +54,17 @@ extern const Field excitation_fields[]; // the rows that every kind has
 extern const ExcitationKind excitation_free, excitation_random, excitation_sine, excitation_record,
     excitation_chirp, excitation_half_sine, excitation_triangular;
 
-// A doubt at pointer/name where the output's samples cannot show motion of this frequency.
+// Adds a doubt at pointer/name where the output's samples cannot show motion of this frequency.
 void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
                                 const char *name, Problem *doubts);
 
 static inline const ExcitationKind *excitation_kind(const Excitation *excitation) {
     return (const ExcitationKind *)(const void *)excitation->variant.kind;
+}
+
+static inline bool excitation_is_still(const Excitation *excitation) {
+    const ExcitationKind *kind = excitation_kind(excitation);
+    return kind->is_still != NULL && kind->is_still(excitation);
 }
 
 #endif

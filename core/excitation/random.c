@@ -2,7 +2,7 @@
 //
 //   y_m[i] = rms / sqrt(bins) * sum_k a_mk cos(2 pi k i / B) - b_mk sin(2 pi k i / B),  0 <= i < B,
 //
-// with independent standard normal a_mk, b_mk, which the counter-based generator has at
+// with independent standard normal a_mk, b_mk, the numbers of the counter-based generator at
 // (seed, stream m, index k). Blocks overlap by half and are faded by w[i] = sin(pi (i + 1/2) / B):
 //
 //   block 0     block 1     block 2
@@ -69,20 +69,21 @@ RandomBlocks random_blocks(const ExcitationRandom *random) {
     return blocks;
 }
 
-// Samples at 0 ... count - 1 reach the end of the run, which may lie a rounding beyond duration *
-// rate, and one more.
-static double sample_count(const ExcitationRandom *random, const Span *span) {
+// Samples 0 ... count - 1 reach one past the end of the run, which may be a rounding beyond
+// duration * rate.
+static double random_sample_count(const ExcitationRandom *random, const Span *span) {
     return floor(span->duration * random->rate * (1 + 1e-12)) + 2;
 }
 
-// Whether the rate is one to judge the band by; says so where the base would have too many samples.
-static bool check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
-                       Problem *problem) {
+// Whether the band can be validated against the rate. Adds a fault where the base would have too
+// many samples.
+static bool random_check_rate(const ExcitationRandom *random, const Span *span, const char *pointer,
+                              Problem *problem) {
     if (!(random->rate >= RATE_MIN) || !isfinite(random->rate))
-        return false; // the row's fault, or the sample rate's
+        return false; // a fault of the row or of the sample rate
     const size_t most = span->most != 0 && span->most < SAMPLES_MAX ? span->most : SAMPLES_MAX;
-    // The one sample past the end is not counted: a run of just the samples allowed has its base.
-    if (!isfinite(span->duration) || sample_count(random, span) - 1 <= (double)most)
+    // The sample past the end of the run does not count against the limit.
+    if (!isfinite(span->duration) || random_sample_count(random, span) - 1 <= (double)most)
         return true;
     char place[256], rate[32], limit[32];
     pointer_join(place, sizeof place, pointer, "rate");
@@ -103,7 +104,7 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     pointer_index(highest, sizeof highest, band, 1);
     if (isnan(random->rate))
         random->rate = span->sample_rate;
-    const bool has_rate = check_rate(random, span, pointer, problem);
+    const bool has_rate = random_check_rate(random, span, pointer, problem);
     if (!has_rate)
         status = STATUS_INVALID;
 
@@ -114,7 +115,7 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
                            random->band.count);
     const double f0 = random->band.at[0], f1 = random->band.at[1];
     if (!(f0 >= 0) || !isfinite(f0) || !isfinite(f1))
-        return STATUS_INVALID; // the row has said so
+        return STATUS_INVALID; // the row adds the fault
     const double narrowest = random->rate * BINS_MIN / BLOCK_MAX;
     if (!(f0 < f1))
         status = problem_add_real(problem, STATUS_INVALID, highest, f1, "Hz",
@@ -133,9 +134,9 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     return status;
 }
 
-// Of y_m.
-static void make_block(const ExcitationRandom *random, const RandomBlocks *blocks, uint64_t m,
-                       Synthesis *synthesis) {
+// Writes the spectrum of y_m and transforms it.
+static void random_make_block(const ExcitationRandom *random, const RandomBlocks *blocks,
+                              uint64_t m, Synthesis *synthesis) {
     double *bin = synthesis_bins(synthesis);
     // Half, because the transform of a real sequence adds bin k and its mirror.
     const double scale = random->rms / sqrt((double)blocks->bins) / 2;
@@ -147,9 +148,10 @@ static void make_block(const ExcitationRandom *random, const RandomBlocks *block
     synthesis_run(synthesis);
 }
 
-// Fade out onto a fresh hop only after fading in onto the one before it: so many samples of either,
-// no more of the block being made than they need.
-static void fade_in(const Synthesis *synthesis, const double *fade, size_t count, double *x) {
+// The faded first half of a block, added to `count` samples; then the second half, which starts the
+// next hop. Only the samples needed are computed.
+static void random_fade_in(const Synthesis *synthesis, const double *fade, size_t count,
+                           double *x) {
     double y[PART];
     for (size_t from = 0; from < count; from += PART) {
         const size_t many = count - from < PART ? count - from : PART;
@@ -159,8 +161,8 @@ static void fade_in(const Synthesis *synthesis, const double *fade, size_t count
     }
 }
 
-static void fade_out(const Synthesis *synthesis, const double *fade, size_t hop, size_t count,
-                     double *x) {
+static void random_fade_out(const Synthesis *synthesis, const double *fade, size_t hop,
+                            size_t count, double *x) {
     double y[PART];
     for (size_t from = 0; from < count; from += PART) {
         const size_t many = count - from < PART ? count - from : PART;
@@ -170,22 +172,22 @@ static void fade_out(const Synthesis *synthesis, const double *fade, size_t hop,
     }
 }
 
-static Status make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
-                           Synthesis *synthesis, const double *fade, const Progress *progress,
-                           Base *base, Problem *problem) {
+static Status random_make_samples(const ExcitationRandom *random, const RandomBlocks *blocks,
+                                  Synthesis *synthesis, const double *fade,
+                                  const Progress *progress, Base *base, Problem *problem) {
     const size_t hop = blocks->length / 2;
     const size_t hops = (base->count + hop - 1) / hop;
     for (size_t m = 0; m <= hops; m++) {
         if (!progress_advance(progress, (double)m / (double)(hops + 1)))
             return problem_set(problem, STATUS_CANCELLED,
                                "stopped while the base's motion was made");
-        make_block(random, blocks, m, synthesis);
+        random_make_block(random, blocks, m, synthesis);
         if (m > 0)
-            fade_in(synthesis, fade, m == hops ? base->count - (m - 1) * hop : hop,
-                    base->values + (m - 1) * hop);
+            random_fade_in(synthesis, fade, m == hops ? base->count - (m - 1) * hop : hop,
+                           base->values + (m - 1) * hop);
         if (m < hops)
-            fade_out(synthesis, fade, hop, m == hops - 1 ? base->count - m * hop : hop,
-                     base->values + m * hop);
+            random_fade_out(synthesis, fade, hop, m == hops - 1 ? base->count - m * hop : hop,
+                            base->values + m * hop);
     }
     return STATUS_OK;
 }
@@ -196,7 +198,7 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
     *base = (Base){0};
     if (random->rms == 0)
         return STATUS_OK; // still
-    const double wanted = sample_count(random, span);
+    const double wanted = random_sample_count(random, span);
     if (!(wanted >= 2 && wanted <= SAMPLES_MAX + 1))
         return problem_set(problem, STATUS_LIMIT, "the base may have at most %d samples, not %.0f",
                            SAMPLES_MAX, wanted);
@@ -216,7 +218,7 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
         base->interval = 1 / random->rate;
         const double step = PI / (double)blocks.length;
         circle_cosines((0.5 - (double)hop) * step, step, hop, fade); // sines, a quarter turn on
-        status = make_samples(random, &blocks, synthesis, fade, progress, base, problem);
+        status = random_make_samples(random, &blocks, synthesis, fade, progress, base, problem);
     }
     free(fade);
     synthesis_free(synthesis, span->transforms);
@@ -226,7 +228,11 @@ static Status random_make(const Excitation *excitation, const Span *span, const 
 }
 
 static double random_interval(const Excitation *excitation) {
-    return 1 / ((const ExcitationRandom *)(const void *)excitation)->rate;
+    return 1 / random_of(excitation)->rate;
+}
+
+static bool random_is_still(const Excitation *excitation) {
+    return random_of(excitation)->rms == 0;
 }
 
 const ExcitationKind excitation_random = {
@@ -237,5 +243,6 @@ const ExcitationKind excitation_random = {
     .complete = random_complete,
     .interval = random_interval,
     .effort = 0.06,
+    .is_still = random_is_still,
     .make = random_make,
 };

@@ -1,6 +1,5 @@
-// Band-limited Gaussian acceleration of the base: a flat one-sided density of rms^2 / (f1 - f0)
-// within [f0, f1]. Not a recorded motion and not white noise of a solver's step: its samples do not
-// depend on the solver. Used by excitations.c and the tests; everyone else sees an Excitation.
+// Band-limited Gaussian acceleration of the base with a flat one-sided density of rms^2 / (f1 - f0)
+// within [f0, f1]. Its samples do not depend on the solver.
 #ifndef CORE_EXCITATION_RANDOM_H
 #define CORE_EXCITATION_RANDOM_H
 
@@ -16,7 +15,7 @@ typedef struct ExcitationRandom {
     double rate; // of the samples [Hz]; absent: the run's sample rate
 } ExcitationRandom;
 
-// How the samples are made, known from band and rate alone.
+// The blocks of which the samples are made; they depend on band and rate alone.
 typedef struct RandomBlocks {
     size_t length;          // B, a power of two; a block begins every B / 2 samples
     size_t first_bin, bins; // the bins inside the band, without 0 and B / 2

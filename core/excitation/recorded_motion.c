@@ -57,7 +57,13 @@ bool record_resolve(ExcitationRecord *record, NamedRecord *named) {
     return true;
 }
 
-static Status refuse(const char *pointer, const char *name, const char *detail, Problem *problem) {
+static const ExcitationRecord *record_of(const Excitation *excitation) {
+    return (const ExcitationRecord *)(const void *)excitation;
+}
+
+// A fault at pointer/name, unless that place has one.
+static Status record_refuse(const char *pointer, const char *name, const char *detail,
+                            Problem *problem) {
     char place[sizeof((Fault){0}.pointer)];
     pointer_join(place, sizeof place, pointer, name);
     return problem_concerns(problem, place)
@@ -65,52 +71,57 @@ static Status refuse(const char *pointer, const char *name, const char *detail, 
                : problem_add(problem, STATUS_INVALID, place, "%s", detail);
 }
 
-// A name stands in place of samples; one that was not found was told by whoever looked for it.
-static Status check_named(const ExcitationRecord *record, const char *pointer, Problem *problem) {
+// A name replaces samples. A name that was not found may have its fault from the search.
+static Status record_check_named(const ExcitationRecord *record, const char *pointer,
+                                 Problem *problem) {
     const NamedRecord *named = record_named(record);
     Status status = STATUS_OK;
     if (record->samples.count > 0)
-        status = refuse(pointer, "samples", "must not stand beside the name of a record", problem);
+        status = record_refuse(pointer, "samples", "must not stand beside the name of a record",
+                               problem);
     if (!isnan(record->interval))
-        status = refuse(pointer, "interval",
-                        "must not stand beside the name of a record, which has its own", problem);
+        status =
+            record_refuse(pointer, "interval",
+                          "must not stand beside the name of a record, which has its own", problem);
     if (named == NULL || strcmp(named->name, record->name) != 0) {
         char place[sizeof((Fault){0}.pointer)];
         pointer_join(place, sizeof place, pointer, "digest");
         return problem_concerns(problem, place)
                    ? STATUS_INVALID
-                   : refuse(pointer, "name", "is not known here", problem);
+                   : record_refuse(pointer, "name", "is not known here", problem);
     }
     if (record->digest == NULL || strcmp(named->digest, record->digest) != 0)
-        return refuse(pointer, "digest", "is not that of the record", problem);
+        return record_refuse(pointer, "digest", "is not that of the record", problem);
     return status;
 }
 
 static Status record_check(const Excitation *excitation, const char *pointer, Problem *problem) {
-    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+    const ExcitationRecord *record = record_of(excitation);
     Status status = STATUS_OK;
     if (record->name != NULL)
-        return check_named(record, pointer, problem);
+        return record_check_named(record, pointer, problem);
     if (record->digest != NULL)
-        status = refuse(pointer, "digest", "is of a record, whose name is missing", problem);
+        status = record_refuse(pointer, "digest", "is of a record, whose name is missing", problem);
     if (record->samples.count == 0)
-        status = refuse(pointer, "samples",
-                        "is required, with at least one: base acceleration from the start on "
-                        "[m/s^2]; or the name of an uploaded record",
-                        problem);
+        status =
+            record_refuse(pointer, "samples",
+                          "is required, with at least one: base acceleration from the start on "
+                          "[m/s^2]; or the name of an uploaded record",
+                          problem);
     if (isnan(record->interval))
-        status = refuse(pointer, "interval", "is required: time between samples [s]", problem);
+        status =
+            record_refuse(pointer, "interval", "is required: time between samples [s]", problem);
     return status;
 }
 
 static Status record_complete(Excitation *excitation, const Span *span, const char *pointer,
                               Problem *problem) {
     (void)span;
-    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+    const ExcitationRecord *record = record_of(excitation);
     const Reals *samples = record_samples(record);
     if (!isfinite(record->scale))
-        return STATUS_OK; // told by the rows
-    // Every point of a sweep comes here.
+        return STATUS_OK; // the row adds the fault
+    // Fast, because every point of a sweep is completed.
     if (record->named != NULL && isfinite(record_named(record)->peak * record->scale))
         return STATUS_OK;
     for (size_t i = 0; i < samples->count; i++) {
@@ -128,19 +139,19 @@ static Status record_make(const Excitation *excitation, const Span *span, const 
                           Base *base, Problem *problem) {
     (void)span;
     (void)progress;
-    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+    const ExcitationRecord *record = record_of(excitation);
     const Reals *samples = record_samples(record);
-    memset(base, 0, sizeof *base);
+    *base = (Base){0};
     double *values = malloc(samples->count * sizeof *values);
     if (values == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a record of %zu samples",
                            samples->count);
     for (size_t i = 0; i < samples->count; i++)
         values[i] = samples->at[i] * record->scale;
-    base->form = BASE_SAMPLED;
-    base->values = values;
-    base->count = samples->count;
-    base->interval = record_interval(record);
+    *base = (Base){.form = BASE_SAMPLED,
+                   .values = values,
+                   .count = samples->count,
+                   .interval = record_interval(record)};
     return STATUS_OK;
 }
 
@@ -190,11 +201,11 @@ void record_look_doubt(const RecordLook *look, const char *before, const char *p
                           before, look->end_velocity, look->peak_velocity);
 }
 
-// A named record is doubted at its name.
+// The doubt about a named record is at its name.
 static void record_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                          Problem *doubts) {
     (void)span;
-    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+    const ExcitationRecord *record = record_of(excitation);
     const RecordLook look =
         record_look(record_samples(record), record_interval(record), record->scale);
     char place[sizeof((Fault){0}.pointer)];
@@ -203,12 +214,12 @@ static void record_doubt(const Excitation *excitation, const Span *span, const c
                       doubts);
 }
 
-static double interval_of(const Excitation *excitation) {
-    return record_interval((const ExcitationRecord *)(const void *)excitation);
+static double record_interval_of(const Excitation *excitation) {
+    return record_interval(record_of(excitation));
 }
 
-static double lasts(const Excitation *excitation) {
-    const ExcitationRecord *record = (const ExcitationRecord *)(const void *)excitation;
+static double record_lasts(const Excitation *excitation) {
+    const ExcitationRecord *record = record_of(excitation);
     return record_interval(record) * (double)record_samples(record)->count;
 }
 
@@ -216,8 +227,8 @@ const ExcitationKind excitation_record = {
     .kind = {"record", "a measured base acceleration", record_fields, sizeof(ExcitationRecord)},
     .check = record_check,
     .complete = record_complete,
-    .interval = interval_of,
-    .lasts = lasts,
+    .interval = record_interval_of,
+    .lasts = record_lasts,
     .effort = 0.05,
     .make = record_make,
     .doubt = record_doubt,

@@ -1,6 +1,4 @@
-// A measured base acceleration as samples: the scene's own, or those of a record that it names.
-// Not the motion itself (base.h), nor where named records are kept. Used by record.c, import.c,
-// server/jobs/prepare_record.c and command/; others see an Excitation.
+// A measured base acceleration: the scene's own samples or those of a named record.
 #ifndef CORE_EXCITATION_RECORDED_MOTION_H
 #define CORE_EXCITATION_RECORDED_MOTION_H
 
@@ -8,7 +6,7 @@
 
 enum { RECORD_SAMPLES = 1 << 22, RECORD_NAME_SIZE = 65, RECORD_DIGEST_SIZE = 65 };
 
-// What a name stands for. Whoever resolves names makes it.
+// A record that scenes refer to by name.
 typedef struct NamedRecord {
     Shared shared;
     char name[RECORD_NAME_SIZE];     // [A-Za-z0-9][A-Za-z0-9._-]*
@@ -18,26 +16,26 @@ typedef struct NamedRecord {
     Reals samples;                   // [m/s^2]
 } NamedRecord;
 
-// Takes the samples, also when it fails. NULL without memory. Dropped by
+// Takes ownership of the samples, also when it fails. NULL without memory. Released by
 // shared_drop(&named->shared).
 NamedRecord *named_record_new(const char *name, const char *digest, double interval,
                               Reals *samples);
 
 typedef struct ExcitationRecord {
     Excitation excitation;
-    char *name, *digest; // of a record that is kept elsewhere; NULL: the samples stand here
+    char *name, *digest; // of a named record; NULL: the samples are here
     Reals samples;       // [m/s^2] before scaling
     double interval;     // [s]
     double scale;        // [-]
     char *source;        // where the samples come from; may be NULL
-    Shared *named;       // a NamedRecord, what the name was found to stand for; NULL: not yet
+    Shared *named;       // the NamedRecord that the name was resolved to; NULL: not yet
 } ExcitationRecord;
 
 static inline const NamedRecord *record_named(const ExcitationRecord *record) {
     return (const NamedRecord *)(const void *)record->named;
 }
 
-// Before scaling, wherever they stand.
+// The samples before scaling.
 static inline const Reals *record_samples(const ExcitationRecord *record) {
     return record->named != NULL ? &record_named(record)->samples : &record->samples;
 }
@@ -45,12 +43,10 @@ static inline double record_interval(const ExcitationRecord *record) {
     return record->named != NULL ? record_named(record)->interval : record->interval;
 }
 
-// The name now stands for `named`, of which it gets a hold, and the digest says so. False without
-// memory.
+// Resolves the name to `named`, which is referenced, and sets the digest. False without memory.
 bool record_resolve(ExcitationRecord *record, NamedRecord *named);
 
-// What tells a sound record from a doubtful one: its largest magnitudes, each way, and what the
-// acceleration adds up to.
+// Figures by which a record is plausible or doubtful: its extremes and the velocity of the base.
 typedef struct RecordLook {
     double highest, lowest;             // acceleration, at least and at most 0 [m/s^2]
     size_t peak_at;                     // sample of the largest magnitude
@@ -59,12 +55,13 @@ typedef struct RecordLook {
 
 RecordLook record_look(const Reals *samples, double interval, double scale);
 
-// What is allowed but hardly meant, at `place`; the sentence, which speaks of samples, begins with
-// `before`.
+// Adds a doubt at `place` about values that are allowed but hardly intended; its sentence begins
+// with `before`.
 void record_look_doubt(const RecordLook *look, const char *before, const char *place,
                        Problem *doubts);
 
-// Whether it swings both ways and yet ends with a base that runs away: a baseline to correct.
+// Whether the acceleration has both signs and yet leaves the base with a velocity: its baseline is
+// not corrected.
 bool record_drifts(const RecordLook *look);
 
 #endif

@@ -1,10 +1,8 @@
-// A sine of the base, amplitude * sin(2 pi f t), given as its acceleration or as its displacement;
-// of the latter the acceleration is a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
-#include <string.h>
-
+// A sine of the base, amplitude * sin(2 pi f t), of its acceleration or of its displacement. For
+// the latter a_g = -amplitude (2 pi f)^2 sin(2 pi f t).
 #include "core/excitation/sine.h"
 
-static const char *const statistic_names[] = {
+static const char *const quantity_names[] = {
     [SINE_ACCELERATION] = "acceleration", [SINE_DISPLACEMENT] = "displacement", NULL};
 
 // clang-format off
@@ -12,17 +10,21 @@ static const Field sine_fields[] = {
     FIELD_BASE(ExcitationSine, excitation, excitation_fields),
     FIELD_REAL(ExcitationSine, frequency, "Hz", ABOVE(0), REQUIRED, "frequency of the base's motion"),
     FIELD_REAL(ExcitationSine, amplitude, "m/s^2 or m", ANY, REQUIRED, "amplitude of the quantity"),
-    FIELD_CHOICE(ExcitationSine, quantity, statistic_names, SINE_ACCELERATION, "of the base, what the amplitude is of"),
+    FIELD_CHOICE(ExcitationSine, quantity, quantity_names, SINE_ACCELERATION, "of the base, what the amplitude is of"),
     FIELD_END
 };
 // clang-format on
 
-static double omega_of(const ExcitationSine *sine) {
+static const ExcitationSine *sine_of(const Excitation *excitation) {
+    return (const ExcitationSine *)(const void *)excitation;
+}
+
+static double sine_omega(const ExcitationSine *sine) {
     return 2 * 3.14159265358979323846 * sine->frequency;
 }
 
-static double amplitude_of(const ExcitationSine *sine) {
-    const double omega = omega_of(sine);
+static double sine_amplitude(const ExcitationSine *sine) {
+    const double omega = sine_omega(sine);
     return sine->quantity == SINE_DISPLACEMENT ? -sine->amplitude * omega * omega : sine->amplitude;
 }
 
@@ -33,14 +35,14 @@ static Status sine_complete(Excitation *excitation, const Span *span, const char
     if (sine->quantity == CHOICE_ABSENT)
         sine->quantity = SINE_ACCELERATION;
     if (!isfinite(sine->frequency) || !isfinite(sine->amplitude))
-        return STATUS_OK; // told by the rows
+        return STATUS_OK; // the row adds the fault
     char place[sizeof((Fault){0}.pointer)];
-    if (!isfinite(omega_of(sine))) {
+    if (!isfinite(sine_omega(sine))) {
         pointer_join(place, sizeof place, pointer, "frequency");
         return problem_add_real(problem, STATUS_INVALID, place, sine->frequency, "Hz",
                                 "is too high to compute with");
     }
-    if (!isfinite(amplitude_of(sine))) {
+    if (!isfinite(sine_amplitude(sine))) {
         pointer_join(place, sizeof place, pointer, "amplitude");
         return problem_add_real(problem, STATUS_INVALID, place, sine->amplitude, "m",
                                 "must give a finite acceleration, amplitude * (2 pi frequency)^2");
@@ -53,22 +55,22 @@ static Status sine_make(const Excitation *excitation, const Span *span, const Pr
     (void)span;
     (void)progress;
     (void)problem;
-    const ExcitationSine *sine = (const ExcitationSine *)(const void *)excitation;
-    memset(base, 0, sizeof *base);
-    base->form = BASE_SINE;
-    base->amplitude = amplitude_of(sine);
-    base->omega = omega_of(sine);
+    const ExcitationSine *sine = sine_of(excitation);
+    *base = (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
     return STATUS_OK;
 }
 
 static double sine_fastest(const Excitation *excitation) {
-    return omega_of((const ExcitationSine *)(const void *)excitation);
+    return sine_omega(sine_of(excitation));
 }
 
 static void sine_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                        Problem *doubts) {
-    excitation_doubt_frequency(((const ExcitationSine *)(const void *)excitation)->frequency, span,
-                               pointer, "frequency", doubts);
+    excitation_doubt_frequency(sine_of(excitation)->frequency, span, pointer, "frequency", doubts);
+}
+
+static bool sine_is_still(const Excitation *excitation) {
+    return sine_of(excitation)->amplitude == 0;
 }
 
 const ExcitationKind excitation_sine = {
@@ -76,6 +78,7 @@ const ExcitationKind excitation_sine = {
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .fastest = sine_fastest,
+    .is_still = sine_is_still,
     .make = sine_make,
     .doubt = sine_doubt,
 };

@@ -1,5 +1,4 @@
-// A sine of the base, as the scene gives it.
-// Not the motion itself (base.h). Used by sine.c and by tests; everyone else sees an Excitation.
+// The settings of a sine of the base.
 #ifndef CORE_EXCITATION_SINE_H
 #define CORE_EXCITATION_SINE_H
 

@@ -1,10 +1,11 @@
-// A mode moves if the base pushes it, if it starts, if a damper stands where it moves, or if
-// damping ties it to one that does. What is computed of it in doubles is never exactly 0:
+// A mode moves if the base or the initial state excites it, if a damper is where its shape is not
+// 0, or if damping couples it to a mode that moves. In doubles these quantities are never exactly
+// 0:
 //
 //   |phi' v| <= ROUNDINGS eps |phi|' |v|
 //
-// counts as nothing, as does a shape that small beside its largest. The modes left then stay at
-// rest whatever the others do, so that leaving them out changes no more than rounding.
+// counts as 0, as does a shape so small beside its largest value. The other modes stay at rest
+// whatever these do, so that leaving them out changes no more than rounding does.
 #include "core/plan/mode_selection.h"
 
 #include <float.h>
@@ -13,13 +14,12 @@
 #include <string.h>
 
 #include "core/plan/modal_truncation.h"
-#include "core/plan/truncation_levels.h"
 
 enum { ROUNDINGS = 64 };
-static const double nothing = ROUNDINGS * DBL_EPSILON;
+static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
 
-// The part of |phi_k|' |v| that phi_k' v is; 0 where both are.
-static double part_of(const Plan *plan, size_t k, const double *v) {
+// |phi_k' v| over |phi_k|' |v|; 0 where both are 0.
+static double mode_share(const Plan *plan, size_t k, const double *v) {
     const Modes *modes = &plan->modes;
     long double sum = 0, size = 0;
     for (size_t j = 0; j < plan->storeys; j++) {
@@ -30,12 +30,13 @@ static double part_of(const Plan *plan, size_t k, const double *v) {
     return size > 0 ? (double)(fabsl(sum) / size) : 0;
 }
 
-// How much a mode sees by itself of base, start and dampers: the largest part.
-static double visibility(const Plan *plan, size_t k, const double *carried, size_t count) {
+// The largest share that base, initial state and dampers have in mode k without coupling. `sources`
+// holds `count` vectors.
+static double mode_visibility(const Plan *plan, size_t k, const double *sources, size_t count) {
     const Modes *modes = &plan->modes;
     double most = 0, widest = 0;
     for (size_t i = 0; i < count; i++)
-        most = fmax(most, part_of(plan, k, carried + i * plan->storeys));
+        most = fmax(most, mode_share(plan, k, sources + i * plan->storeys));
     for (size_t j = 0; j < plan->storeys; j++)
         widest = fmax(widest, fabs(modes->shapes[j * modes->count + k]));
     for (size_t d = 0; d < plan->damper_count; d++)
@@ -43,35 +44,35 @@ static double visibility(const Plan *plan, size_t k, const double *carried, size
     return most;
 }
 
-// M times what is pushed: the initial state, and r where the base moves.
-static size_t carry(const Plan *plan, const Scene *scene, double *carried) {
+// M times the initial displacement and velocity, and M r where the base moves. Returns how many.
+static size_t mode_sources(const Plan *plan, const Scene *scene, double *sources) {
     const double *const from[] = {plan->displacement, plan->velocity, plan->influence};
-    const size_t n = plan->storeys, count = levels_is_still(scene) ? 2 : 3;
+    const size_t n = plan->storeys, count = excitation_is_still(scene_excitation(scene)) ? 2 : 3;
     for (size_t i = 0; i < count; i++)
         for (size_t j = 0; j < n; j++) {
             long double sum = 0;
             for (size_t l = 0; l < n; l++)
                 sum += (long double)plan->mass[j * n + l] * from[i][l];
-            carried[i * n + j] = (double)sum;
+            sources[i * n + j] = (double)sum;
         }
     return count;
 }
 
-// Lists, by rising index, those of the first `count` modes that may move; `seen` holds what each
-// sees. Returns how many; at least one.
-static size_t list_seen(const Modes *modes, size_t count, double *seen, size_t *list) {
+// Lists, by rising index, those of the first `count` modes that may move; `seen` holds the
+// visibility of each. Returns how many; at least one.
+static size_t mode_list_moving(const Modes *modes, size_t count, double *seen, size_t *list) {
     const double *D = modes->damping;
     const size_t all = modes->count;
     for (bool grows = !modes->is_classical; grows;) {
         grows = false;
         for (size_t k = 0; k < count; k++) {
             double tied = 0;
-            for (size_t j = 0; j < count && seen[k] <= nothing; j++)
-                if (seen[j] > nothing)
+            for (size_t j = 0; j < count && seen[k] <= NEGLIGIBLE; j++)
+                if (seen[j] > NEGLIGIBLE)
                     tied = fmax(tied,
                                 fabs(D[k * all + j]) / sqrt(fabs(D[k * all + k] * D[j * all + j])));
-            // Without damping of its own a mode has no ties, but for rounding's.
-            if (!(tied <= nothing)) {
+            // A mode without damping of its own has no coupling but rounding.
+            if (!(tied <= NEGLIGIBLE)) {
                 seen[k] = tied;
                 grows = true;
             }
@@ -79,20 +80,20 @@ static size_t list_seen(const Modes *modes, size_t count, double *seen, size_t *
     }
     size_t found = 0;
     for (size_t k = 0; k < count; k++)
-        if (seen[k] > nothing)
+        if (seen[k] > NEGLIGIBLE)
             list[found++] = k;
     if (found == 0)
         list[found++] = 0;
     return found;
 }
 
-// As foretold: a step for each mode, or a product with a matrix where they are coupled.
-static double work_of(double modes, bool is_coupled) {
+// Predicted cost: a step for each mode, or a matrix product where they are coupled.
+static double mode_work(double modes, bool is_coupled) {
     return modes + (is_coupled ? modes * modes / 4 : 0);
 }
 
-static Status decide_unseen(Plan *plan, const double *seen, const size_t *list, size_t found,
-                            size_t count, bool is_coupled) {
+static Status mode_decide_unseen(Plan *plan, const double *seen, const size_t *list, size_t found,
+                                 size_t count, bool is_coupled) {
     double largest = 0;
     for (size_t k = 0, i = 0; k < count; k++) {
         if (i < found && list[i] == k)
@@ -102,13 +103,14 @@ static Status decide_unseen(Plan *plan, const double *seen, const size_t *list, 
     }
     return decisions_omit(
         &plan->report.decisions, "unseen_modes", (double)(count - found), "modes",
-        1 - work_of((double)found, is_coupled) / work_of((double)count, is_coupled),
+        1 - mode_work((double)found, is_coupled) / mode_work((double)count, is_coupled),
         "nothing sets them moving: not the base, nor the start, nor a damper; each sees at most "
         "%.2g of these",
         largest);
 }
 
-static Status decide_modes(Plan *plan, const TruncationError *error, size_t modes, double moved) {
+static Status mode_decide_lowest(Plan *plan, const TruncationError *error, size_t modes,
+                                 double moved) {
     const char *about =
         plan->damper_count == 0 ? "" : ", and neither move nor give way at the dampers' storeys";
     return decisions_add(&plan->report.decisions, "modes", "lowest", (double)modes, "modes",
@@ -119,7 +121,8 @@ static Status decide_modes(Plan *plan, const TruncationError *error, size_t mode
                          error->mean_acceleration);
 }
 
-static Status keep(Plan *plan, const Scene *scene, size_t modes, double *room, size_t *list) {
+static Status mode_select(Plan *plan, const Scene *scene, size_t modes, double *room,
+                          size_t *list) {
     const size_t n = plan->storeys;
     const bool is_coupled = !plan->modes.is_classical;
     TruncationError *errors = NULL;
@@ -130,20 +133,20 @@ static Status keep(Plan *plan, const Scene *scene, size_t modes, double *room, s
         if (status == STATUS_OK) {
             plan->is_truncated = true;
             plan->given_up = errors[modes - 1].displacement;
-            status =
-                decide_modes(plan, &errors[modes - 1], modes, truncation_moved_mass(plan, modes));
+            status = mode_decide_lowest(plan, &errors[modes - 1], modes,
+                                        truncation_moved_mass(plan, modes));
         }
         free(errors);
     }
     if (status != STATUS_OK)
         return status;
     double *seen = room + 3 * n;
-    const size_t count = carry(plan, scene, room);
+    const size_t count = mode_sources(plan, scene, room);
     for (size_t k = 0; k < modes; k++)
-        seen[k] = visibility(plan, k, room, count);
-    const size_t found = list_seen(&plan->modes, modes, seen, list);
+        seen[k] = mode_visibility(plan, k, room, count);
+    const size_t found = mode_list_moving(&plan->modes, modes, seen, list);
     if (found < modes)
-        status = decide_unseen(plan, seen, list, found, modes, is_coupled);
+        status = mode_decide_unseen(plan, seen, list, found, modes, is_coupled);
     modes_keep(&plan->modes, n, list, found);
     return status;
 }
@@ -156,7 +159,7 @@ Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem)
     size_t *list = calloc(n, sizeof *list);
     Status status = STATUS_NO_MEMORY;
     if (room != NULL && list != NULL)
-        status = keep(plan, scene, modes == 0 || modes > n ? n : modes, room, list);
+        status = mode_select(plan, scene, modes == 0 || modes > n ? n : modes, room, list);
     free(room);
     free(list);
     return status == STATUS_OK ? status : problem_set(problem, status, "no memory for the modes");

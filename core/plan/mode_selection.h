@@ -1,13 +1,12 @@
-// Leaves modes out of a plan: those beyond a number asked for, with the error that this is foretold
-// to make, and those that nothing in the scene can set moving. Not the foretelling (truncation.h).
-// Used by simulation/ and tests.
+// Leaves modes out of a plan: modes above the number asked for, and modes that nothing sets in
+// motion.
 #ifndef CORE_PLAN_MODE_SELECTION_H
 #define CORE_PLAN_MODE_SELECTION_H
 
 #include "core/plan/plan.h"
 
-// Once, of a plan of plan_new; `modes` is the number asked for, 0: all. Adds what it decides to the
-// plan's report. Nothing where plan_is_single.
+// Selects the modes of a plan of plan_new, once; `modes` is the number asked for, 0: all. Adds its
+// decisions and the predicted error to the plan. Does nothing where plan_is_single.
 Status plan_keep(Plan *plan, const Scene *scene, size_t modes, Problem *problem);
 
 #endif

@@ -1,9 +1,9 @@
-// Damping is classical, C = M sum_k d_k phi_k phi_k' M, where phi_i' C phi_j = 0 for i != j. C
-// comes in decimals and doubles, so nothing is exactly 0: what C's own rounding can make of it,
+// Damping is classical, C = M sum_k d_k phi_k phi_k' M, where phi_i' C phi_j = 0 for i != j. C is
+// rounded to doubles, so that values within its own rounding,
 //
 //   |phi_i' C phi_j| <= ROUNDINGS eps |phi_i|' |C| |phi_j|,
 //
-// counts as none, and is left out then.
+// count as 0 and are set to 0.
 #include "core/plan/modes.h"
 
 #include <float.h>
@@ -15,8 +15,8 @@
 
 enum { ROUNDINGS = 8 };
 
-// phi_i' C phi_j for all pairs, and what rounding can make of it.
-static void damp(Modes *modes, const double *damping, long double *work) {
+// phi_i' C phi_j of all pairs and whether all with i != j are within rounding of 0.
+static void modes_damp(Modes *modes, const double *damping, long double *work) {
     const size_t n = modes->count;
     modes->is_classical = true;
     long double *carried = work, *magnitude = work + n;
@@ -47,15 +47,15 @@ static void damp(Modes *modes, const double *damping, long double *work) {
             modes->damping[i] = 0;
 }
 
-static bool are_finite(const double *values, size_t count) {
+static bool modes_are_finite(const double *values, size_t count) {
     for (size_t i = 0; i < count; i++)
         if (!isfinite(values[i]))
             return false;
     return true;
 }
 
-static Status make(Modes *modes, size_t storeys, const double *mass, const double *stiffness,
-                   const double *damping, const double *influence, long double *work) {
+static Status modes_fill(Modes *modes, size_t storeys, const double *mass, const double *stiffness,
+                         const double *damping, const double *influence, long double *work) {
     const size_t n = storeys;
     long double *values = work, *vectors = work + n;
     TRY(linear_eigen(n, mass, stiffness, values, vectors));
@@ -77,9 +77,10 @@ static Status make(Modes *modes, size_t storeys, const double *mass, const doubl
         }
         modes->participation[k] = (double)share;
     }
-    damp(modes, damping, work);
-    return are_finite(modes->omega, n) && are_finite(modes->shapes, n * n) &&
-                   are_finite(modes->damping, n * n) && are_finite(modes->participation, n)
+    modes_damp(modes, damping, work);
+    return modes_are_finite(modes->omega, n) && modes_are_finite(modes->shapes, n * n) &&
+                   modes_are_finite(modes->damping, n * n) &&
+                   modes_are_finite(modes->participation, n)
                ? STATUS_OK
                : STATUS_INVALID;
 }
@@ -88,7 +89,7 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                   const double *damping, const double *influence, Problem *problem) {
     const size_t n = storeys;
     memset(modes, 0, sizeof *modes);
-    // One block; omega is its start. The rows of `vectors` come before the two of damp().
+    // One block; omega is its start. The rows of `vectors` come before the two of modes_damp().
     modes->omega = calloc(n, (2 * n + 2) * sizeof *modes->omega);
     long double *work = calloc(n, (n + 2) * sizeof *work);
     if (modes->omega == NULL || work == NULL) {
@@ -100,7 +101,7 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
     modes->shapes = modes->omega + n;
     modes->damping = modes->shapes + n * n;
     modes->participation = modes->damping + n * n;
-    Status status = make(modes, n, mass, stiffness, damping, influence, work);
+    Status status = modes_fill(modes, n, mass, stiffness, damping, influence, work);
     free(work);
     if (status == STATUS_OK)
         return STATUS_OK;
@@ -112,7 +113,7 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                              "masses and stiffnesses are too far apart, or not positive definite");
 }
 
-// What stays moves forward in its array, never past what is still to be read.
+// Entries move forward in their arrays, never past entries that are still to be read.
 void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count) {
     const size_t all = modes->count;
     for (size_t i = 0; i < count; i++) {

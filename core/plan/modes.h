@@ -1,5 +1,5 @@
-// Undamped modes of a structure, K phi = omega^2 M phi with phi' M phi = 1, and what damping and
-// the base's motion are in them. Not a motion: that is solve/. Used by plan/ and solve/.
+// Undamped modes of a structure, K phi = omega^2 M phi with phi' M phi = 1, with the damping matrix
+// and the participation factors in modal coordinates.
 #ifndef CORE_PLAN_MODES_H
 #define CORE_PLAN_MODES_H
 
@@ -8,10 +8,10 @@
 
 #include "core/base/status.h"
 
-// In modal coordinates x = shapes q, to the part of x that the modes span:  q'' + damping q' +
-// omega^2 q = -participation a_g + shapes' N. All zero is empty.
+// In modal coordinates, x = shapes q:  q'' + damping q' + omega^2 q = -participation a_g + shapes'
+// N. All zero is empty.
 typedef struct Modes {
-    size_t count;          // as many as storeys, or those that were kept
+    size_t count;          // as many as storeys, or fewer after modes_keep
     double *omega;         // rising; 0 for a rigid-body motion [rad/s]
     double *shapes;        // storeys x count, row after row [1/sqrt(kg)]
     double *damping;       // shapes' C shapes, count x count, row after row [1/s]
@@ -25,7 +25,7 @@ Status modes_make(Modes *modes, size_t storeys, const double *mass, const double
                   const double *damping, const double *influence, Problem *problem);
 void modes_clear(Modes *modes);
 
-// Keeps the `count` modes listed, by rising index, and forgets the others.
+// Keeps the `count` modes listed by rising index and removes the others.
 void modes_keep(Modes *modes, size_t storeys, const size_t *list, size_t count);
 
 #endif

@@ -3,9 +3,162 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/base/side.h"
+#include "core/result/metric.h"
 
-static Status decide_contact(const Scene *scene, Plan *plan) {
+// clang-format off
+const Field derived_fields[] = {
+    FIELD_COUNT(Derived, damper, NULL, AT_MIN(1), OPTIONAL, "number of the damper"),
+    FIELD_CHOICE(Derived, side, side_names, OPTIONAL, "side of the damper"),
+    FIELD_TEXT(Derived, material, 0, PRESENCE_OPTIONAL, 0, "where the numbers come from"),
+    FIELD_REAL(Derived, restitution, NULL, ANY, OPTIONAL, "coefficient of restitution e"),
+    FIELD_REAL(Derived, contact_time, "s", ANY, OPTIONAL, "contact time T_c of an isolated impact"),
+    FIELD_REAL(Derived, effective_mass, "kg", ANY, OPTIONAL, "effective mass m_e of the pair"),
+    FIELD_REAL(Derived, stiffness, "N/m", ANY, OPTIONAL, "contact stiffness k_b"),
+    FIELD_REAL(Derived, damping, "N s/m", ANY, OPTIONAL, "contact damping c_b"),
+    FIELD_REAL(Derived, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio Z of the contact"),
+    FIELD_REAL(Derived, reached_restitution, NULL, ANY, OPTIONAL, "restitution that an isolated contact really reaches under a power law, or with what was carried over from a rig"),
+    FIELD_REAL(Derived, reached_contact_time, "s", ANY, OPTIONAL, "contact time that it really has"),
+    FIELD_REAL(Derived, identified_mass, "kg", ANY, OPTIONAL, "effective mass of the rig"),
+    FIELD_REAL(Derived, exponent, NULL, ANY, OPTIONAL, "exponent n of a power law"),
+    FIELD_REAL(Derived, factor, NULL, ANY, OPTIONAL, "a power law's dissipation factor: D, or xi"),
+    FIELD_END
+};
+
+const Field mode_fields[] = {
+    FIELD_REAL(PlanMode, frequency, "Hz", ANY, OPTIONAL, "natural frequency without damping"),
+    FIELD_REAL(PlanMode, damping_ratio, NULL, ANY, OPTIONAL, "damping ratio xi of the mode by itself; unknown where it does not swing"),
+    FIELD_END
+};
+
+static const Field attempt_fields[] = {
+    FIELD_TEXT(PlanAttempt, way, 0, PRESENCE_OPTIONAL, 0, "what was run"),
+    FIELD_REAL(PlanAttempt, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold"),
+    FIELD_REAL(PlanAttempt, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
+    FIELD_REAL(PlanAttempt, steps, NULL, ANY, OPTIONAL, "solver steps, counted"),
+    FIELD_END
+};
+
+static const char *const verdict_names[] = {"kept", "missed", "unknown", NULL};
+
+const Field target_fields[] = {
+    FIELD_REAL(PlanTarget, error, NULL, ANY, OPTIONAL, "relative error wanted"),
+    FIELD_CHOICE(PlanTarget, metric, metric_names, OPTIONAL, "what it is of"),
+    FIELD_TEXT(PlanTarget, way, 0, PRESENCE_OPTIONAL, 0, "the way chosen; after a run the one that this answer came by"),
+    FIELD_REAL(PlanTarget, predicted_error, NULL, ANY, OPTIONAL, "relative error foretold for that way"),
+    FIELD_REAL(PlanTarget, estimated_error, NULL, ANY, OPTIONAL, "relative error estimated of the run"),
+    FIELD_CHOICE(PlanTarget, verdict, verdict_names, OPTIONAL, "whether the estimated error keeps the one wanted; unknown where it could not be estimated"),
+    FIELD_LIST(PlanTarget, attempts, attempt_fields, 0, PRESENCE_OPTIONAL, "all runs that were needed"),
+    FIELD_END
+};
+
+const Field plan_report_fields[] = {
+    FIELD_TEXT(PlanReport, contact_model, 0, PRESENCE_OPTIONAL, 0, "the contact model that is run"),
+    FIELD_TEXT(PlanReport, solver, 0, PRESENCE_OPTIONAL, 0, "the solver that is run"),
+    FIELD_ITEM(PlanReport, target, target_fields, NULL, PRESENCE_OPTIONAL, "what accuracy.target came to; null without one"),
+    FIELD_LIST(PlanReport, decisions, decision_fields, 0, PRESENCE_DEFAULT, "choices with their reasons"),
+    FIELD_LIST(PlanReport, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters for this pair of masses"),
+    FIELD_LIST(PlanReport, modes, mode_fields, 0, PRESENCE_DEFAULT, "natural modes of the structure, the slowest first"),
+    FIELD_END
+};
+// clang-format on
+
+// The parameters of an isolated contact of this pair of masses, where they are the same at all
+// speeds.
+static void stops_report(const ContactStop *stop, double mass, Derived *derived) {
+    const ContactParameters *own = &stop->parameters;
+    const bool is_carried = stop->mass != mass;
+    derived->effective_mass = mass;
+    derived->identified_mass = is_carried ? stop->mass : (double)NAN;
+    derived->restitution = own->restitution;
+    derived->contact_time = stop->numbers.contact_time;
+    derived->stiffness =
+        stop->law->form == CONTACT_POWER ? stop->numbers.stiffness : own->stiffness;
+    derived->damping = stop->law->form == CONTACT_POWER ? (double)NAN : own->damping;
+    derived->exponent = own->exponent;
+    derived->damping_ratio = derived->factor = (double)NAN;
+    derived->reached_restitution = derived->reached_contact_time = (double)NAN;
+    if (stop->law->form == CONTACT_IMPULSIVE || stop->numbers.rows.count > 0)
+        return;
+    if (stop->law->form == CONTACT_POWER) {
+        derived->factor = own->factor;
+        derived->reached_restitution = stop->law->reached(own->factor, own->exponent);
+        derived->reached_contact_time =
+            stop->numbers.contact_time * pow(mass / stop->mass, 1 / (own->exponent + 1));
+        return;
+    }
+    const Identified found =
+        identify_given(mass, own->stiffness, own->damping, (Separation)stop->separation);
+    derived->damping_ratio = found.damping_ratio;
+    if (isnan(stop->numbers.contact_time)) {
+        derived->restitution = found.restitution;
+        derived->contact_time = found.contact_time;
+    } else if (is_carried) {
+        derived->reached_restitution = found.restitution;
+        derived->reached_contact_time = found.contact_time;
+    }
+}
+
+// Replaces rows borrowed from the scene by a copy, because the plan outlives the scene.
+static Status stops_copy_rows(ContactRows *rows) {
+    if (rows->count == 0)
+        return STATUS_OK;
+    ContactRow *own = malloc(rows->count * sizeof *own);
+    if (own != NULL)
+        memcpy(own, rows->at, rows->count * sizeof *own);
+    rows->at = own;
+    return own != NULL ? STATUS_OK : STATUS_NO_MEMORY;
+}
+
+// Prepares both stops of the damper `index`, whose mass and effective mass the plan has. Released
+// by stops_clear, also after a failure.
+static Status stops_make(const Scene *scene, Plan *plan, size_t index) {
+    const Damper *damper = &scene->dampers.at[index];
+    PlanDamper *planned = &plan->dampers[index];
+    const double mass = planned->effective_mass;
+    for (int side = 0; side < 2; side++) {
+        const Buffer *buffer = damper_buffer(damper, (Side)side);
+        const ContactNumbers numbers = buffer_numbers(buffer);
+        PlanStop *stop = &planned->stops[side];
+        stop->contact = contact_prepare(plan->law, scene_contact(scene)->separation,
+                                        damper_identified_mass(damper, mass), mass, &numbers);
+        TRY(stops_copy_rows(&stop->contact.numbers.rows));
+        stop->restitution = stop->contact.parameters.restitution;
+        stop->stiffness = stop->contact.parameters.stiffness;
+        stop->damping = stop->contact.parameters.damping;
+        Derived *derived = &plan->report.derived.at[plan->report.derived.count++];
+        derived->damper = index + 1;
+        derived->side = side;
+        stops_report(&stop->contact, mass, derived);
+        if (buffer->material != NULL && (derived->material = strdup(buffer->material)) == NULL)
+            return STATUS_NO_MEMORY;
+    }
+    return STATUS_OK;
+}
+
+static void stops_clear(Plan *plan) {
+    for (size_t i = 0; i < plan->damper_count; i++)
+        for (int side = 0; side < 2; side++)
+            free(plan->dampers[i].stops[side].contact.numbers.rows.at);
+}
+
+static bool stop_varies(const PlanStop *stop) {
+    return stop->contact.numbers.rows.count > 0 ||
+           (stop->contact.law != NULL && stop->contact.law->form == CONTACT_POWER);
+}
+
+bool stops_vary(const PlanDamper *damper) {
+    return stop_varies(&damper->stops[SIDE_LEFT]) || stop_varies(&damper->stops[SIDE_RIGHT]);
+}
+
+ContactParameters stops_freeze(const PlanStop *stop, double approach_speed) {
+    if (stop_varies(stop))
+        return contact_freeze(&stop->contact, approach_speed);
+    return (ContactParameters){
+        .restitution = stop->restitution, .stiffness = stop->stiffness, .damping = stop->damping};
+}
+
+static Status plan_decide_contact(const Scene *scene, Plan *plan) {
     Decisions *decisions = &plan->report.decisions;
     const Contact *contact = scene_contact(scene);
     const ContactLaw *law = plan->law;
@@ -32,8 +185,8 @@ static Status decide_contact(const Scene *scene, Plan *plan) {
                          "a contact stiffness is known");
 }
 
-// Room for matrices, vectors and dampers; one block each, so that plan_free need not know sizes.
-static Status plan_room(Plan *plan, size_t storeys, size_t dampers) {
+// Matrices and vectors in one block, dampers in another.
+static Status plan_allocate(Plan *plan, size_t storeys, size_t dampers) {
     plan->storeys = storeys;
     plan->mass = calloc(storeys, (3 * storeys + 3) * sizeof *plan->mass);
     plan->dampers = calloc(dampers > 0 ? dampers : 1, sizeof *plan->dampers);
@@ -68,7 +221,7 @@ static Status plan_damper(const Scene *scene, Plan *plan, size_t index) {
     return stops_make(scene, plan, index);
 }
 
-static void start(const Reals *given, double *start) {
+static void plan_copy_start(const Reals *given, double *start) {
     for (size_t i = 0; i < given->count; i++)
         start[i] = given->at[i];
 }
@@ -83,10 +236,10 @@ bool plan_is_single(const Plan *plan) {
 }
 
 // The same ratio in every mode is C = M (sum of 2 xi omega_k phi_k phi_k') M.
-static Status damp_modes(Plan *plan, double ratio, Problem *problem) {
+static Status plan_damp_modes(Plan *plan, double ratio, Problem *problem) {
     Modes *modes = &plan->modes;
     const size_t n = plan->storeys;
-    // The columns of M Phi, in place of the damping's rows until those are known.
+    // The columns of M Phi, stored in the damping's rows until these are computed.
     double *moved = modes->damping;
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < n; k++) {
@@ -114,7 +267,7 @@ static Status damp_modes(Plan *plan, double ratio, Problem *problem) {
     return STATUS_OK;
 }
 
-static Status decide_damping(Plan *plan, bool is_ratio) {
+static Status plan_decide_damping(Plan *plan, bool is_ratio) {
     return decisions_add(&plan->report.decisions, "damping",
                          plan->modes.is_classical ? "modal" : "coupled", NAN, NULL, "%s",
                          is_ratio ? "the scene gives one damping ratio for every mode"
@@ -123,7 +276,7 @@ static Status decide_damping(Plan *plan, bool is_ratio) {
                              : "the damping matrix couples the structure's modes");
 }
 
-static PlanMode mode_of(double omega, double damping) {
+static PlanMode plan_mode_of(double omega, double damping) {
     return (PlanMode){omega / (2 * 3.14159265358979323846),
                       omega > 0 ? damping / (2 * omega) : (double)NAN};
 }
@@ -137,29 +290,29 @@ static Status plan_modes(const Structure *structure, Plan *plan, Problem *proble
         return STATUS_NO_MEMORY;
     report->count = n;
     if (plan_is_single(plan)) {
-        report->at[0] =
-            mode_of(sqrt(plan->stiffness[0] / plan->mass[0]), plan->damping[0] / plan->mass[0]);
+        report->at[0] = plan_mode_of(sqrt(plan->stiffness[0] / plan->mass[0]),
+                                     plan->damping[0] / plan->mass[0]);
         return STATUS_OK;
     }
     TRY(modes_make(&plan->modes, n, plan->mass, plan->stiffness, plan->damping, plan->influence,
                    problem));
     if (!isnan(ratio) && n > 1)
-        TRY(damp_modes(plan, ratio, problem));
+        TRY(plan_damp_modes(plan, ratio, problem));
     for (size_t k = 0; k < n; k++)
-        report->at[k] = mode_of(plan->modes.omega[k], plan->modes.damping[k * n + k]);
-    return n > 1 ? decide_damping(plan, !isnan(ratio)) : STATUS_OK;
+        report->at[k] = plan_mode_of(plan->modes.omega[k], plan->modes.damping[k * n + k]);
+    return n > 1 ? plan_decide_damping(plan, !isnan(ratio)) : STATUS_OK;
 }
 
-// All but the modes and the reasons.
+// Everything but modes and decisions.
 static Status plan_values(const Scene *scene, Plan *plan) {
     const Structure *structure = scene_structure(scene);
     const Excitation *excitation = scene_excitation(scene);
     TRY(fields_default(plan_report_fields, &plan->report));
-    TRY(plan_room(plan, structure_storeys(structure), scene->dampers.count));
+    TRY(plan_allocate(plan, structure_storeys(structure), scene->dampers.count));
     structure_fill(structure,
                    &(const Matrices){plan->mass, plan->stiffness, plan->damping, plan->influence});
-    start(&excitation->displacement, plan->displacement);
-    start(&excitation->velocity, plan->velocity);
+    plan_copy_start(&excitation->displacement, plan->displacement);
+    plan_copy_start(&excitation->velocity, plan->velocity);
     plan->duration = scene->duration;
     plan->sample_rate = scene->sample_rate;
     plan->count = scene_sample_count(scene);
@@ -175,7 +328,7 @@ static Status plan_values(const Scene *scene, Plan *plan) {
 static Status plan_fill(const Scene *scene, const char *asked, const char *solver, Plan *plan,
                         Problem *problem) {
     TRY(plan_values(scene, plan));
-    TRY(decide_contact(scene, plan));
+    TRY(plan_decide_contact(scene, plan));
     TRY(plan_modes(scene_structure(scene), plan, problem));
     TRY(decisions_add(&plan->report.decisions, "solver", solver, NAN, NULL,
                       strcmp(asked, solver) == 0 ? "the scene asks for it"

@@ -1,5 +1,5 @@
-// A scene made ready to run, with the reasons for each choice. Never changes once made; shared
-// between threads. Not a run: it has no state. Used by solve/ and simulation/.
+// A scene prepared for a run, with the reason for each choice. A plan is immutable and shared
+// between threads.
 #ifndef CORE_PLAN_PLAN_H
 #define CORE_PLAN_PLAN_H
 
@@ -9,14 +9,14 @@
 #include "core/plan/modes.h"
 #include "core/scene/scene.h"
 
-// What a buffer came to for this pair of masses: one per damper and side. What is not known is NAN.
+// Contact parameters of a pair of masses, one for each damper and side; NAN: unknown.
 typedef struct Derived {
     uint64_t damper; // from 1
     int side;        // Side
     char *material;  // "sponge@1"; NULL if numbers were given
     double restitution, contact_time, effective_mass, stiffness, damping, damping_ratio;
-    // What an isolated contact of this pair comes to, where that may be another: under a power law,
-    // or with parameters carried over from a rig.
+    // Of an isolated contact of this pair, where they differ: under a power law, or with parameters
+    // carried over from a rig.
     double reached_restitution, reached_contact_time;
     double identified_mass; // of the rig; NAN without one
     double exponent, factor;
@@ -26,17 +26,17 @@ typedef struct DerivedList {
     size_t count;
 } DerivedList;
 
-// One natural mode of the structure, as people know it.
+// One natural mode of the structure.
 typedef struct PlanMode {
     double frequency;     // [Hz]
-    double damping_ratio; // of the mode by itself; NAN where it does not swing
+    double damping_ratio; // of the mode alone; NAN for a rigid-body motion
 } PlanMode;
 typedef struct PlanModes {
     PlanMode *at;
     size_t count;
 } PlanModes;
 
-// One run on the way to a target.
+// One run of the search for a target.
 typedef struct PlanAttempt {
     char *way;              // "exact, tolerance 1e-06"
     double predicted_error; // NAN before it was run
@@ -50,15 +50,15 @@ typedef struct PlanAttempts {
 
 typedef enum PlanVerdict { VERDICT_KEPT, VERDICT_MISSED, VERDICT_UNKNOWN } PlanVerdict;
 
-// What accuracy.target came to.
+// The outcome of accuracy.target.
 typedef struct PlanTarget {
-    double error;           // relative, wanted; NAN: no target
+    double error;           // the relative error requested; NAN: no target
     int metric;             // Metric
-    char *way;              // chosen; after a run the one whose answer this is
-    double predicted_error; // of that way
+    char *way;              // settings chosen; after a run those of the result
+    double predicted_error; // of those settings
     double estimated_error; // of the run; NAN before it, or unknown
     int verdict;            // PlanVerdict; CHOICE_ABSENT before the run
-    PlanAttempts attempts;  // all runs that were needed
+    PlanAttempts attempts;  // all runs
 } PlanTarget;
 
 // The readable part of a plan: the API's "plan" object.
@@ -73,9 +73,8 @@ typedef struct PlanReport {
 
 extern const Field plan_report_fields[], derived_fields[], mode_fields[], target_fields[];
 
-// One stop's contact parameters, ready for a solver. The first three are those of every impact;
-// where they depend on its approach speed they are NAN and only contact_freeze(&contact, ...)
-// tells.
+// Contact parameters of one stop. The first three hold for every impact; they are NAN where they
+// depend on the approach speed (stops_freeze).
 typedef struct PlanStop {
     double restitution; // e, under CONTACT_IMPULSIVE
     double stiffness;   // k_b [N/m], under CONTACT_LINEAR
@@ -93,17 +92,17 @@ typedef struct PlanDamper {
     PlanStop stops[2];         // by Side
 } PlanDamper;
 
-// Plain values, written once by plan_new. Matrices are storeys x storeys, row after row.
+// Plain values, written by plan_new. Matrices are storeys x storeys, row after row.
 typedef struct Plan {
     size_t storeys;
     double *mass, *stiffness, *damping; // M, K, C of the structure [kg], [N/m], [N s/m]
     double *influence;                  // r of M x'' + C x' + K x = -M r a_g + N [-]
     double *displacement, *velocity;    // of the storeys at t = 0 [m], [m/s]
-    Modes modes; // of all, or those that are kept; empty where plan_is_single, and in a sketch
-    bool is_truncated; // modes are left out that would move (plan/keep.h)
-    size_t kept;       // of a sketch: modes that a run is asked to keep; 0: all
-    double given_up;   // foretold error of displacement of a truncated plan, over its largest value
-    double fastest;    // of a sketch: no mode is faster, or dies away faster [rad/s]
+    Modes modes;       // all, or those kept; empty where plan_is_single, and in a sketch
+    bool is_truncated; // moving modes are left out (plan/mode_selection.h)
+    size_t kept;       // of a sketch: number of modes that the run keeps; 0: all
+    double given_up;   // predicted error of displacement by modes left out, over its largest value
+    double fastest;    // of a sketch: bound on omega and decay rate of all modes [rad/s]
     PlanDamper *dampers;
     size_t damper_count;
     const ContactLaw *law;
@@ -114,24 +113,30 @@ typedef struct Plan {
     PlanReport report;
 } Plan;
 
-// Makes ready a scene that scene_complete has passed; `solver` is the chosen solver's name, `asked`
-// what the accuracy object said. Freed by plan_free.
+// The plan of a scene that scene_complete has accepted; `solver` is the chosen solver's name,
+// `asked` the name in the accuracy object. Freed by plan_free.
 Status plan_new(const Scene *scene, const char *asked, const char *solver, Plan **plan,
                 Problem *problem);
-// A plan without modes and reasons, in a small part of the time, to tell what a run may cost that
-// keeps so many modes. Freed by plan_free.
+// A plan without modes and decisions, which takes a small part of the time, for the cost of a run
+// with so many modes. Freed by plan_free.
 Status plan_sketch(const Scene *scene, size_t modes, Plan **plan);
 void plan_free(Plan *plan);
 
-// Whether the engine for one mass serves: one storey that moves with the base, at most one damper,
-// and a law whose contact phases are linear or instantaneous.
+// Whether the plan has one storey that moves with the base, at most one damper, and a law whose
+// contact phases are linear or instantaneous.
 bool plan_is_single(const Plan *plan);
-// The same where no stop is ever reached: then the law does not matter.
+// The same for a run that reaches no stop: the law does not matter.
 bool plan_is_single_in_flight(const Plan *plan);
 
-// Of a run.
+// The number of modes of a run.
 static inline size_t plan_mode_count(const Plan *plan) {
     return plan->modes.count > 0 ? plan->modes.count : plan->kept > 0 ? plan->kept : plan->storeys;
 }
+
+// Whether a stop's parameters depend on the approach speed.
+bool stops_vary(const PlanDamper *damper);
+
+// Parameters of an impact that begins with this approach speed [m/s].
+ContactParameters stops_freeze(const PlanStop *stop, double approach_speed);
 
 #endif

@@ -1,6 +1,5 @@
-// What of a scene's mechanics its run will need, proved from bounds before it begins: whether
-// anything forces the structure, whether any free mass can come to a stop, whether anything moves
-// at all. Not a motion: that is solve/. Used by simulation/.
+// Properties of a scene that are proved before the run from bounds: whether the base moves, whether
+// anything moves, and whether any free mass can reach a stop.
 #ifndef CORE_PLAN_REACHABILITY_H
 #define CORE_PLAN_REACHABILITY_H
 
@@ -8,16 +7,15 @@
 #include "core/plan/plan.h"
 
 typedef struct Regime {
-    bool is_unforced; // the base is still
-    bool is_at_rest;  // and nothing else moves
-    bool is_clear;    // no mass comes to a stop; so too where there is no mass
-    // Of the mass that comes nearest to a stop, by the bounds: how far it may come from the middle
-    // of its stops, as a part of the way to them. INFINITY: not bounded, or more than 1 and not
-    // looked into further [-]
+    bool is_unforced; // the base does not move
+    bool is_at_rest;  // nothing moves
+    bool is_clear;    // no mass reaches a stop; true without a mass
+    // Bound on the distance of a mass from the middle of its stops over half their distance, the
+    // largest of all masses; INFINITY: 1 or more, or unknown [-]
     double reach;
 } Regime;
 
-// `base` is the one made for this plan's run. Where memory is short nothing is proved.
+// `base` is the motion that the plan's run has.
 Regime regime_find(const Plan *plan, const Base *base);
 
 #endif

@@ -18,7 +18,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/collision.h"
 #include "core/solve/recorder.h"
 

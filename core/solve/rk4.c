@@ -3,7 +3,7 @@
 // inside a step, the force jumps or bends between the stages and the order drops to one.
 #include <stdlib.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/time_stepping.h"
 
 enum { STAGES = 4, TOTALS = 2 };

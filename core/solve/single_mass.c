@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/linear_contact.h"
 #include "core/solve/single_mass_state.h"
 #include "core/solve/wide.h"

@@ -18,7 +18,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "core/solve/collision.h"
 
 ContactForce step_contact_force(const ModalState *state, size_t d, double r, double w) {

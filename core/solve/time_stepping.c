@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 
 static const double CHECK_COST = 1e6;        // multiplications between two checks, about
 static const double ENERGY_GROWTH_MAX = 1e6; // energy over that of start and base; no sound run

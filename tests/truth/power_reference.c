@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/plan/contact_setup.h"
+#include "core/plan/plan.h"
 #include "tests/support/base_at.h"
 
 enum { X, V, R, W, J, SIZE };

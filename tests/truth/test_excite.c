@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/excitation/chirp.h"
-#include "core/excitation/pulse_common.h"
+#include "core/excitation/pulse.h"
 #include "core/excitation/recorded_motion.h"
 #include "core/excitation/sine.h"
 #include "tests/support/paper.h"

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "core/excitation/pulse_common.h"
+#include "core/excitation/pulse.h"
 #include "tests/support/base_at.h"
 #include "tests/support/fields.h"
 
@@ -72,16 +72,18 @@ static void a_pulse_that_no_clock_can_tell_is_refused(void **state) {
 static void a_pulse_needs_its_amplitude_and_length(void **state) {
     (void)state;
     ExcitationPulse made;
-    assert_int_equal(fields_default(pulse_fields, &made), STATUS_OK);
+    assert_int_equal(fields_default(excitation_half_sine.kind.fields, &made), STATUS_OK);
     assert_true(made.start == 0);
     problem_clear(&problem);
-    assert_int_equal(fields_check(pulse_fields, &made, "", &problem), STATUS_INVALID);
+    assert_int_equal(fields_check(excitation_half_sine.kind.fields, &made, "", &problem),
+                     STATUS_INVALID);
     assert_int_equal(problem.count, 2);
     made.amplitude = 1;
     made.length = 0;
     made.start = -1;
     problem_clear(&problem);
-    assert_int_equal(fields_check(pulse_fields, &made, "", &problem), STATUS_INVALID);
+    assert_int_equal(fields_check(excitation_half_sine.kind.fields, &made, "", &problem),
+                     STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/length"), "must be above 0 s, is 0");
     assert_string_equal(detail_at(&problem, "/start"), "must be at least 0 s, is -1");
 }

@@ -1,0 +1,48 @@
+// What all kinds share, and the kind without motion of the base: free vibration from the initial
+// state.
+#include "core/excitation/excitation.h"
+
+enum { STOREYS_MAX = 200 };
+
+// clang-format off
+const Field excitation_fields[] = {
+    FIELD_LONE_REALS(Excitation, displacement, "m",   ANY, STOREYS_MAX, PRESENCE_OPTIONAL, "of the structure at the start, relative to the base; of several storeys a list of each; 0 if not given"),
+    FIELD_LONE_REALS(Excitation, velocity,     "m/s", ANY, STOREYS_MAX, PRESENCE_OPTIONAL, "of the structure at the start, relative to the base; of several storeys a list of each; 0 if not given"),
+    FIELD_END
+};
+// clang-format on
+
+void excitation_doubt_frequency(double frequency, const Span *span, const char *pointer,
+                                const char *name, Problem *doubts) {
+    if (!(frequency > span->sample_rate / 2))
+        return;
+    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
+    pointer_join(place, sizeof place, pointer, name);
+    (void)problem_add(
+        doubts, STATUS_INVALID, place,
+        "is %s Hz, above half the sample rate, %s Hz: the output's samples do not show "
+        "the motion",
+        text_real(is, frequency), text_real(limit, span->sample_rate / 2));
+}
+
+static Status free_make(const Excitation *excitation, const Span *span, const Progress *progress,
+                        Base *base, Problem *problem) {
+    (void)excitation;
+    (void)span;
+    (void)progress;
+    (void)problem;
+    *base = (Base){0};
+    return STATUS_OK;
+}
+
+static bool free_is_still(const Excitation *excitation) {
+    (void)excitation;
+    return true;
+}
+
+const ExcitationKind excitation_free = {
+    .kind = {"free", "free vibration from the initial state", excitation_fields,
+             sizeof(Excitation)},
+    .is_still = free_is_still,
+    .make = free_make,
+};

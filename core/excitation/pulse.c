@@ -1,0 +1,109 @@
+// Single pulses of the base's acceleration: half a sine, a_g = amplitude sin(pi (t - start) /
+// length), and a triangle that reaches the amplitude at the middle.
+#include "core/excitation/pulse.h"
+
+// clang-format off
+static const Field pulse_fields[] = {
+    FIELD_BASE(ExcitationPulse, excitation, excitation_fields),
+    FIELD_REAL(ExcitationPulse, amplitude, "m/s^2", ANY,         REQUIRED, "base acceleration at the middle of the pulse"),
+    FIELD_REAL(ExcitationPulse, start,     "s",     AT_MIN(0), 0,        "when the pulse begins; the base is still before"),
+    FIELD_REAL(ExcitationPulse, length,    "s",     ABOVE(0),    REQUIRED, "how long the pulse lasts; the base moves on evenly after"),
+    FIELD_END
+};
+// clang-format on
+
+static const ExcitationPulse *pulse_of(const Excitation *excitation) {
+    return (const ExcitationPulse *)(const void *)excitation;
+}
+
+// A pulse shorter than the resolution of time at its end would be lost silently.
+static Status pulse_complete(Excitation *excitation, const Span *span, const char *pointer,
+                             Problem *problem) {
+    (void)span;
+    const ExcitationPulse *pulse = pulse_of(excitation);
+    if (!isfinite(pulse->amplitude) || !isfinite(pulse->start) || !isfinite(pulse->length) ||
+        !(pulse->start >= 0) || !(pulse->length > 0))
+        return STATUS_OK; // the row adds the fault
+    const double least = fmax(1e-12 * pulse->start, 1e-12);
+    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
+    pointer_join(place, sizeof place, pointer, "length");
+    if (pulse->length < least)
+        return problem_add_real(problem, STATUS_INVALID, place, pulse->length, "s",
+                                "must be at least %s s, what a clock can tell at that start, is %s",
+                                text_real(limit, least), text_real(is, pulse->length));
+    if (isfinite(pulse->start + pulse->length) && isfinite(2 * pulse->amplitude / pulse->length))
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, place, pulse->length, "s",
+                            "must leave the pulse's end and slope finite, is %s",
+                            text_real(is, pulse->length));
+}
+
+static void pulse_doubt(const Excitation *excitation, const Span *span, const char *pointer,
+                        Problem *doubts) {
+    const ExcitationPulse *pulse = pulse_of(excitation);
+    char place[sizeof((Fault){0}.pointer)], is[32], limit[32];
+    pointer_join(place, sizeof place, pointer, "start");
+    if (pulse->start >= span->duration)
+        (void)problem_add(doubts, STATUS_INVALID, place,
+                          "is %s s: the run ends at %s s, before the pulse begins",
+                          text_real(is, pulse->start), text_real(limit, span->duration));
+    pointer_join(place, sizeof place, pointer, "length");
+    if (pulse->length * span->sample_rate < 2)
+        (void)problem_add(doubts, STATUS_INVALID, place,
+                          "is %s s, less than two samples of the output, %.3g s: the motion is "
+                          "exact, but its samples hardly show the pulse",
+                          text_real(is, pulse->length), 2 / span->sample_rate);
+}
+
+static bool pulse_is_still(const Excitation *excitation) {
+    return pulse_of(excitation)->amplitude == 0;
+}
+
+static Status half_sine_make(const Excitation *excitation, const Span *span,
+                             const Progress *progress, Base *base, Problem *problem) {
+    (void)span;
+    (void)progress;
+    (void)problem;
+    const ExcitationPulse *pulse = pulse_of(excitation);
+    *base = (Base){.form = BASE_PIECES,
+                   .omega = 3.14159265358979323846 / pulse->length,
+                   .pieces = {{.time = pulse->start, .slope = pulse->amplitude},
+                              {.time = pulse->start + pulse->length}},
+                   .piece_count = 2};
+    return STATUS_OK;
+}
+
+const ExcitationKind excitation_half_sine = {
+    .kind = {"half_sine", "half a sine of the base's acceleration, once", pulse_fields,
+             sizeof(ExcitationPulse)},
+    .complete = pulse_complete,
+    .is_still = pulse_is_still,
+    .make = half_sine_make,
+    .doubt = pulse_doubt,
+};
+
+static Status triangular_make(const Excitation *excitation, const Span *span,
+                              const Progress *progress, Base *base, Problem *problem) {
+    (void)span;
+    (void)progress;
+    (void)problem;
+    const ExcitationPulse *pulse = pulse_of(excitation);
+    const double slope = 2 * pulse->amplitude / pulse->length;
+    *base = (Base){.form = BASE_PIECES,
+                   .pieces = {{.time = pulse->start, .slope = slope},
+                              {.time = pulse->start + pulse->length / 2,
+                               .value = pulse->amplitude,
+                               .slope = -slope},
+                              {.time = pulse->start + pulse->length}},
+                   .piece_count = 3};
+    return STATUS_OK;
+}
+
+const ExcitationKind excitation_triangular = {
+    .kind = {"triangular", "a triangular pulse of the base's acceleration, once", pulse_fields,
+             sizeof(ExcitationPulse)},
+    .complete = pulse_complete,
+    .is_still = pulse_is_still,
+    .make = triangular_make,
+    .doubt = pulse_doubt,
+};
