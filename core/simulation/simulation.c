@@ -4,7 +4,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-const char engine_version[] = "impactd-4";
+const char engine_version[] = "impactd-5";
 
 // clang-format off
 const Field summary_fields[] = {
